@@ -9,26 +9,26 @@ use micromath::F32;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Error {
-    /// Fraction of the exact value.
+    /// Kind of error: the difference from the exact value as a fraction of that value.
     Relative,
-    /// Difference from the exact value, in the unit of the row.
+    /// Kind of error: the difference from the exact value, in the function's `unit`.
     Absolute,
 }
 
-/// Function in both libraries and in f64.
+/// Mathematical function under test, as computed by micromath, by libm and exactly in f64.
 struct Function {
     name: &'static str,
     /// Unit of an absolute error.
     unit: &'static str,
     error: Error,
-    /// Range of x, in even steps, or geometric if it is positive.
+    /// Range of the test points x. A positive range has points at a constant ratio, others at equal distances.
     range: [f64; 2],
-    /// Returns the arguments for x; functions of one argument ignore the second.
+    /// Maps a test point x to the arguments of the function. A function of one argument ignores the second.
     arguments: fn(f64) -> [f64; 2],
     micromath: fn([f32; 2]) -> f32,
     libm: fn([f32; 2]) -> f32,
     exact: fn([f64; 2]) -> f64,
-    /// Largest errors of micromath and libm, measured and rounded up.
+    /// Largest permitted errors of micromath and of libm: the measured errors, rounded up.
     largest: [f64; 2],
 }
 

@@ -16,7 +16,8 @@ use uav_relay_oracle::reference::joint::{Place, sir};
 use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Returns the chain of X = 500, Y = 150, relays at 220 m, a band of 20 m to 300 m. The least separation is 4 m.
+/// Returns a chain of `relays` relays at 220 m, as reference model and as simulation setup. The interferer is at
+/// (500, 150) m, altitudes may be 20 m to 300 m, and the least separation is 4 m.
 fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     let mut link = Link {
         y_i: 150.0,
@@ -39,7 +40,7 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     (link, setup)
 }
 
-/// Returns the chain's SIR by the reference, and the least distance of neighbours, m.
+/// Returns an outcome's lowest SIR by the f64 reference, and the least distance of neighbours in m.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     let places: Vec<Place> = setpoints(outcome).into_iter().map(reference).collect();
     let apart = places.windows(2).map(|pair| pair[0].distance_m(&pair[1]));
@@ -47,7 +48,7 @@ fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     (sir(link, &places).unwrap(), apart)
 }
 
-/// Returns the better position that a local search finds, if any.
+/// Runs a local search to its end. Returns the better position that it finds, or `None`.
 fn searched(mut search: LocalSearch) -> Option<Placement> {
     loop {
         if let Poll::Ready(found) = search.step(500) {
@@ -60,7 +61,8 @@ fn rises(outcome: &Outcome) -> bool {
     outcome.rounds.windows(2).all(|pair| pair[1] >= pair[0])
 }
 
-/// Compares the local searches for fifty relays at 220 m. The optimum, 6.49838, is 19.4 % above the start.
+/// Checks that the fine local search raises the SIR of fifty relays and that a coarse grid does not. The optimum, an
+/// SIR of 6.49838, is 19.4 % above that of the starting positions.
 #[test]
 fn fine_turns_gain_what_a_coarse_grid_does_not() {
     let of = |rounds, local| {
@@ -99,7 +101,8 @@ fn fine_turns_gain_what_a_coarse_grid_does_not() {
     assert!((ten / 5.555 - 1.0).abs() < 1e-3, "{ten}");
 }
 
-/// Compares the paper's grid search with the values of a separate program. Its start is far from balanced.
+/// Compares the moves of the paper's grid search with those that a separate program computes. The starting positions
+/// are far from those with equal SIR on all hops.
 #[test]
 fn the_grid_moves_where_a_separate_program_moves() {
     let link = Link {
@@ -158,7 +161,8 @@ fn the_grid_moves_where_a_separate_program_moves() {
     }
 }
 
-/// Compares the fine search with a dense grid of the same rectangle, separation included.
+/// Checks that the fine search of one relay finds a position as good as the best of a dense grid. Both searches keep
+/// the least separation from the neighbours.
 #[test]
 fn the_fine_search_is_as_good_as_a_dense_grid() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));
@@ -232,7 +236,7 @@ fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
     )
 }
 
-/// Checks that no relay has a better position when the algorithm ends before its last round.
+/// Checks that no relay has a better position when Algorithm 2 ends before its last permitted round.
 #[test]
 fn it_ends_where_nobody_can_do_better() {
     let local = Local::Grid {
@@ -276,7 +280,7 @@ fn it_ends_where_nobody_can_do_better() {
     }
 }
 
-/// Checks the separation, which binds, in both searches.
+/// Checks that both local searches keep the least separation where a smaller one would raise the SIR.
 #[test]
 fn relays_keep_their_distance_where_it_costs() {
     for local in [

@@ -68,7 +68,8 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// Returns the best weakest signal over all ordered choices of `left` further positions on a grid.
+/// Returns the largest value of the weakest signal, W, over positions on a grid. `left` relays are placed in order
+/// after the positions in `chosen`.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {
         return weakest_signal(link, chosen);
@@ -85,7 +86,8 @@ fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) ->
     best
 }
 
-/// Compares random links of 1 to 3 relays with a grid: it is no better, and not far below.
+/// Checks that no grid of positions has a stronger weakest signal than `blind_places`. The random links have 1 to 3
+/// relays.
 #[test]
 fn no_grid_has_a_stronger_weakest_signal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(11));
@@ -117,7 +119,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Checks a chain with a relay above Rx: all other hops are shortened in proportion.
+/// Checks a chain with a surplus relay, which is placed above Rx. All other hops are shortened in proportion.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);
@@ -129,7 +131,7 @@ fn surplus_relays_shorten_all_hops_in_proportion() {
     assert!(off(places[1] - places[0], step * 1000.0 / whole) < 1e-9);
 }
 
-/// Checks a weaker Tx, which gets a relay right above it.
+/// Checks that a Tx with less power has its relay right above it.
 #[test]
 fn the_weaker_ground_station_has_its_relay_above_it() {
     let mut link = Link::paper(60);
@@ -143,7 +145,7 @@ fn the_weaker_ground_station_has_its_relay_above_it() {
     assert!(off(1000.0 - places[59], last * 1000.0 / whole) < 1e-9);
 }
 
-/// Compares the mean over two random relays with its integral over the ordered positions.
+/// Compares the mean SIR of two relays at random positions with its integral over all positions.
 #[test]
 fn the_mean_of_random_chains_is_the_integral() {
     // With an interferer near Tx and relays with a long range, the order of relays matters.

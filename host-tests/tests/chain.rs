@@ -109,7 +109,7 @@ fn random_links_settle_at_their_optimum() {
     assert!(hopeless > 0);
 }
 
-/// Checks the number of targets and the last target with the paper's fixed step of 0.1.
+/// Checks the number of sweeps (along the chain) and the last target SIR with the paper's step of 0.1.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [
@@ -154,7 +154,8 @@ fn silent_places_equal_those_by_messages() {
     }
 }
 
-/// Checks 1 000 seeds with all faults at N = 8: the positions equal those of the faultless run.
+/// Checks that message faults change the duration only, over 1 000 random seeds. The positions of eight relays equal
+/// those of a run without faults.
 #[test]
 fn faults_change_nothing_but_the_time_it_takes() {
     let undisturbed = settle(Setup::new(mission(8)));
@@ -272,7 +273,8 @@ fn one_shared_channel_does_as_well_as_two_wires() {
     }
 }
 
-/// Checks own altitudes and powers. The leader mispredicts, and the search finds the farthest chain's optimum.
+/// Checks relays with their own altitudes and powers. The leader's predicted target is wrong, but the search still
+/// finds the optimum.
 #[test]
 fn a_mixed_chain_is_solved_as_it_is() {
     let mission = mission(8);

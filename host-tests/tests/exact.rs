@@ -17,13 +17,13 @@ use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Relative distance from the optimum that counts as optimal.
+/// Largest relative distance from the optimum that counts as optimal.
 const NEAR: f64 = 1e-3;
 
-/// Relative error by which a bound may be too low: the search's tolerance and f32 rounding.
+/// Relative error by which an upper bound may be too low: search tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
 
-/// Returns true if the chain in which every relay is at its reach meets `target`.
+/// Returns true if `target` is met with every relay as far along the line as the target permits.
 fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {
@@ -61,7 +61,7 @@ fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     }
 }
 
-/// Results of many scenes.
+/// Statistics of the algorithms' results in many random scenes.
 #[derive(Default)]
 struct Tally {
     scenes: usize,
@@ -70,14 +70,14 @@ struct Tally {
     plain: usize,
     worst: f64,
     sweeps: u32,
-    /// Ratios of bound to optimum of all scenes.
+    /// Ratios of the computed upper bound to the optimum, one for each scene.
     bounds: Vec<f64>,
-    /// Ratios of bound to optimum of the scenes whose result is below the optimum.
+    /// Ratios of the upper bound to the optimum, for the scenes whose result is below the optimum.
     bounds_of_short: Vec<f64>,
 }
 
 impl Tally {
-    /// Solves the scene with the optimum `best` and evaluates the result by `sir`.
+    /// Solves a scene with the known optimum `best`, and records the result. `sir` evaluates positions.
     fn judge(
         &mut self,
         mission: &Mission,
@@ -136,14 +136,14 @@ impl Tally {
         println!("  of those short: {}", spread(&mut self.bounds_of_short));
     }
 
-    /// Returns the percentage of bounds at most 1 % above the optimum.
+    /// Returns the percentage of scenes whose upper bound is at most 1 % above the optimum.
     fn tight(&self) -> f64 {
         let tight = self.bounds.iter().filter(|of| **of <= 1.01).count();
         100.0 * tight as f64 / self.scenes as f64
     }
 }
 
-/// Returns the distribution of ratios as text.
+/// Returns the distribution of ratios (upper bound to optimum) as text.
 fn spread(of: &mut [f64]) -> String {
     of.sort_by(f64::total_cmp);
     let Some(most) = of.last() else {
@@ -232,7 +232,8 @@ fn with_a_separation_that_binds() {
     assert!(tally.tight() >= 70.0);
 }
 
-/// Draws identical relays, with two to twelve points of Upsilon within a factor of up to 300.
+/// Draws identical relays in an uneven field of interference. The mean inverse interference, Upsilon, has two to
+/// twelve points within a factor of up to 300.
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -275,7 +276,7 @@ fn in_uneven_fields() {
     assert!(tally.tight() >= 99.0);
 }
 
-/// Checks relays of different altitude and power, half with a separation or hop-sized altitudes.
+/// Checks relays with different altitudes and powers in uneven fields. Half of the scenes have a least separation.
 #[test]
 fn in_uneven_fields_by_relays_that_differ() {
     let mut rng = generator(905);
@@ -318,7 +319,8 @@ fn in_uneven_fields_by_relays_that_differ() {
     assert!(tally.near * 100 >= tally.scenes * 88 && tally.tight() >= 80.0);
 }
 
-/// Checks chains by messages, with and without prediction and losses: equal results within the bound.
+/// Checks that chains agree by messages on targets that they meet, with an upper bound that holds. Runs are with and
+/// without prediction and message faults.
 #[test]
 fn by_messages() {
     let mut rng = generator(904);

@@ -24,7 +24,7 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
     );
 }
 
-/// Returns the records of a test that have positions.
+/// Returns the recorded optima with positions of the tests whose name begins with `set`.
 fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     let wanted = move |record: &&Record| record.set.starts_with(set);
     let placed = |record: &'static Record| {
@@ -34,7 +34,7 @@ fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     all().unwrap().iter().filter(wanted).filter_map(placed)
 }
 
-/// Returns the link with relays at these altitudes and without a least separation.
+/// Returns the link with its relays at the given altitudes, without a least separation.
 fn flown(link: &Link, altitudes: &[f64]) -> Link {
     let relays = link.relays.iter().zip(altitudes);
     let relays = relays.map(|(relay, &altitude_m)| Station {
@@ -48,7 +48,7 @@ fn flown(link: &Link, altitudes: &[f64]) -> Link {
     }
 }
 
-/// Returns the paper's scenario with the interferer at (x, y) and a separation of 4 m.
+/// Returns the paper's scenario with the interferer at (`x_i`, `y_i`), and a separation of 4 m.
 fn paper(relays: usize, x_i: f64, y_i: f64) -> Link {
     Link {
         x_i,
@@ -88,8 +88,8 @@ fn the_recorded_places_reach_the_recorded_optimum() {
     }
 }
 
-/// Compares with a joint solver and with a general-purpose optimiser of all (x, y, h). Both are in other programs; the latter
-/// has 24 starts.
+/// Compares recorded optima with those of two other programs: a joint solver and a general optimiser. The latter
+/// optimises all (x, y, h) from 24 starts.
 #[test]
 fn optima_of_independent_programs_are_recorded() {
     for (n, want) in [
@@ -127,7 +127,8 @@ fn optima_of_independent_programs_are_recorded() {
     }
 }
 
-/// Checks the 2 000 numbered optima, recorded without positions. Forty searches with another seed have positions.
+/// Checks the 2 000 numbered optima, which are recorded without positions. Forty of them were found again, with
+/// positions, from another random seed.
 #[test]
 fn the_numbered_optima_were_found_again() {
     let stored = optima().unwrap();
@@ -140,7 +141,7 @@ fn the_numbered_optima_were_found_again() {
     }
 }
 
-/// Checks that the scenarios are diverse and valid missions.
+/// Checks that the numbered scenarios are of many kinds, and valid missions.
 #[test]
 fn the_numbered_scenarios_are_of_many_kinds() {
     let mut seen = [0; 6];
@@ -169,7 +170,8 @@ fn the_numbered_scenarios_are_of_many_kinds() {
     }
 }
 
-/// Checks random moves of any size, of one relay or all. In the plane, with lateral room, with held relays, and in noise.
+/// Checks that no random move of one or all relays improves a recorded optimum. Scenes are in the plane, with lateral
+/// offsets, with held altitudes, and in noise.
 #[test]
 fn no_move_is_better() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(35));
@@ -207,14 +209,14 @@ fn no_move_is_better() {
     assert!(legal > 50_000, "{legal}");
 }
 
-/// Returns the best of sixty common altitudes.
+/// Returns the best SIR of the relays at one common altitude, over 61 altitudes.
 fn best_common(link: &Link, room: Corridor) -> f64 {
     let altitude = |i: i32| room.least_m * (room.most_m / room.least_m).powf(f64::from(i) / 60.0);
     let level = |h: f64| flown(link, &vec![h; link.len()]).optimum();
     (0..=60).map(altitude).filter_map(level).fold(0.0, f64::max)
 }
 
-/// Returns the best optimum over every assignment of levels to relays.
+/// Returns the best SIR over all ways to give each relay one of the altitudes `levels`.
 fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
     let relays = u32::try_from(link.len()).unwrap();
     let assignments = (0..levels.len().pow(relays)).map(|number| {
@@ -227,7 +229,8 @@ fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Compares with exact optima at given altitudes, for scenes without a separation. A common one, and three levels.
+/// Checks that no common altitude, and no choice among three altitudes, exceeds a recorded optimum. The scenes have
+/// no least separation.
 #[test]
 fn no_common_altitude_and_no_assignment_of_levels_is_better() {
     let (mut common, mut levelled, mut gained) = (0, 0, 0);
@@ -276,7 +279,7 @@ fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f
     best.0
 }
 
-/// Compares one relay with the best x for every lateral offset and altitude.
+/// Compares the recorded optimum of one relay with a search over lateral offset, altitude and x.
 #[test]
 fn one_relay_agrees_with_brute_force() {
     let plane = of("figures aside").step_by(18);

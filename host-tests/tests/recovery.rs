@@ -8,7 +8,7 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Time of the loss, s: long after the chain has settled.
+/// Time at which a relay is lost, s; the chain has settled long before.
 const AT_S: u64 = 60;
 
 /// Returns a chain of `relays` on one radio channel that loses relay `lost`.
@@ -26,7 +26,7 @@ fn recovered(setup: Setup) -> (Outcome, ChainReport) {
     (outcome, report)
 }
 
-/// Returns the only recovery of a run that lost `lost` and settled without it.
+/// Checks that a run lost only relay `lost` and settled without it. Returns the report of that recovery.
 fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
     let [one] = report.recovery.as_slice() else {
         panic!("{:?}", report.recovery);
@@ -39,7 +39,7 @@ fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
     one.clone()
 }
 
-/// Returns the first, middle and last relay.
+/// Returns the first, the middle and the last relay, with their names.
 fn places(relays: u16) -> Vec<(&'static str, u16)> {
     let mut places = vec![
         ("leader", 1),
@@ -94,13 +94,13 @@ fn a_loss_is_noticed_within_15_s_and_costs_up_to_six_sweeps() {
     }
 }
 
-/// Returns the time from the loss to its detection, s.
+/// Returns the time from the loss of a relay to its detection, s.
 fn detected(report: &ChainReport) -> f64 {
     let lost = report.timeline.iter().find(|moment| moment.what == "lost");
     lost.unwrap().at_s - AT_S as f64
 }
 
-/// Checks that the remaining chain agrees, to the bit, with an undisturbed chain of that length.
+/// Checks that the remaining chain agrees on exactly the positions of a new chain of that length.
 #[test]
 fn the_chain_that_is_left_is_as_good_as_a_new_one() {
     for (relays, lost) in [(4, 2), (8, 1), (8, 4), (8, 8), (16, 9)] {
@@ -122,7 +122,7 @@ fn without_a_quorum_the_last_relay_goes_on() {
     assert_eq!(only(&report, 2, 1).view, 1);
 }
 
-/// Checks that authentication changes only the time, by a handshake.
+/// Checks that authentication does not change the positions after a loss. It costs only the time of a handshake.
 #[test]
 fn tags_change_nothing_but_the_time() {
     let (bare, _) = recovered(losing(8, 4));

@@ -18,7 +18,8 @@ fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
     of_stochastic_link(link, min_separation_m).unwrap()
 }
 
-/// Draws a link of identical relays, with `points` points of Upsilon within a factor of `spread`.
+/// Draws a link of identical relays in a field of interference. The mean inverse interference, Upsilon, has `points`
+/// points within a factor of `spread`.
 fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -54,7 +55,8 @@ fn places(outcome: &Outcome) -> Vec<f64> {
     xs(&setpoints(outcome))
 }
 
-/// Compares the closed form of one hop backward with the reference; errors are fractions of the hop.
+/// Compares the closed form for the start of a hop with the reference. The hop's end is given; errors are fractions
+/// of its length.
 #[test]
 fn retreats_agree_with_the_reference() {
     let mut rng = generator(61);
@@ -89,7 +91,8 @@ fn retreats_agree_with_the_reference() {
     assert!(worst < 1e-6);
 }
 
-/// Compares chains in an even field with the closed-form optimum. N 1 to 50, with and without prediction.
+/// Compares chains in a constant field with the closed-form optimum. They have 1 to 50 relays, with and without
+/// prediction.
 #[test]
 fn in_an_even_field_the_optimum_is_found() {
     let mut rng = generator(62);
@@ -113,7 +116,7 @@ fn in_an_even_field_the_optimum_is_found() {
     println!("short by at most {short:.1e}, above by at most {above:.1e}; at most {most} sweeps");
 }
 
-/// Compares the paper's fixed step with the steps of the reference.
+/// Checks that Algorithm 4 with the paper's fixed step takes the same steps as the reference.
 #[test]
 fn the_fixed_step_is_the_papers() {
     let mut rng = generator(63);
@@ -142,7 +145,7 @@ fn the_fixed_step_is_the_papers() {
     assert!(steps > 1000);
 }
 
-/// Checks relays with own altitudes or powers, whose answers overrule the leader's prediction.
+/// Checks relays with own altitudes or powers, for which the leader's predicted target is wrong.
 #[test]
 fn relays_may_differ() {
     let mut rng = generator(68);
@@ -199,7 +202,7 @@ fn silent_places_equal_those_by_messages() {
     }
 }
 
-/// Checks that the separation is kept and limits the target.
+/// Checks that relays in a field keep the least separation, and that it limits the target SIR.
 #[test]
 fn relays_keep_their_distance() {
     let mut link = StochasticLink {
@@ -228,7 +231,7 @@ fn even(relays: usize) -> StochasticLink {
     }
 }
 
-/// Checks that relays configured with an even field measure the true field and agree again.
+/// Checks that relays loaded with a constant field measure the true one, and agree again.
 #[test]
 fn what_is_measured_takes_the_place_of_what_was_agreed() {
     let mut rng = generator(67);

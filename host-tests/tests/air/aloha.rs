@@ -8,10 +8,11 @@ use super::*;
 /// Number of senders to one listener: large enough that none has two frames at once.
 const NODES: usize = 400;
 
-/// Frame length for an air time of whole microseconds.
+/// Length of a frame in bytes, chosen so that its air time is a whole number of microseconds.
 const BYTES: usize = 90;
 
-/// Creates senders with one listener that receives all; with `in_range` they also receive each other.
+/// Creates a radio channel with `NODES` senders and a listener that receives all of them. With `in_range`, the
+/// senders receive each other too.
 fn crowd(access: Access, in_range: bool, seed: u64) -> Bench {
     let listener = NODES;
     let hearers = |node| {
@@ -23,7 +24,8 @@ fn crowd(access: Access, in_range: bool, seed: u64) -> Bench {
     Bench::new(access, (0..=NODES).map(hearers).collect(), seed)
 }
 
-/// Returns the fraction of time with intact frames at the listener. `offered` is the number of frames per frame time.
+/// Returns the fraction of time in which the listener receives intact frames. `offered` is the mean number of frames
+/// sent per frame time, `frames` is the duration in frame times, and `slots` selects slotted ALOHA.
 fn throughput(mut bench: Bench, offered: f64, frames: u64, slots: bool) -> f64 {
     let frame = bench.medium.air_time(BYTES).as_micros();
     let mut rng = ChaCha8Rng::seed_from_u64(7);

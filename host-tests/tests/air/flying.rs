@@ -3,7 +3,7 @@
 use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::watch::{Seen, groups, has_agreed};
 
-/// Returns the observed state of relay `index` in view `view` of `relays` relays.
+/// Returns the state of a flying relay: relay `index` of `relays` relays in membership view `view`.
 fn seen(view: u32, relays: u16, index: u16) -> Seen {
     Seen {
         is_on: true,
@@ -32,7 +32,7 @@ fn relays_of_one_view_are_one_group_and_of_two_views_two() {
     assert_eq!(groups(&halves), 2);
 }
 
-/// Change of a relay's state.
+/// Function that changes one field of a relay's observed state, so that the relay counts as not flying.
 type Change = fn(&mut Seen);
 
 #[test]

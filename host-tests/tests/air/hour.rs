@@ -7,14 +7,15 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Runs of each kind; the environment variable `SEEDS` overrides it.
+/// Number of simulated runs for each kind of channel; the environment variable `SEEDS` overrides it.
 const SEEDS: u64 = 200;
 
-/// Time of relay 4's loss and end of the run, s, in the runs with a loss.
+/// Time at which relay 4 fails, s. Such a run ends at `ENDS_S`.
 const DIES_S: u64 = 60;
 const ENDS_S: u64 = 900;
 
-/// Returns eight relays with CSMA at 57 600 baud and signed frames.
+/// Returns eight relays on a CSMA channel of 57 600 baud that loses the fraction `share` of the frames. The losses
+/// come in runs of `burst` frames. The frames are signed.
 fn losing(share: f64, burst: f64) -> Setup {
     let mut setup = Setup::on_air(mission(8), Access::Csma);
     setup.link.baud = 57_600;
@@ -24,7 +25,7 @@ fn losing(share: f64, burst: f64) -> Setup {
     setup
 }
 
-/// Returns the minimum, median, 99th percentile and maximum as text.
+/// Returns the minimum, median, 99th percentile and maximum of times in seconds as text.
 fn spread(mut times: Vec<f64>) -> String {
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize];
@@ -95,10 +96,11 @@ fn an_hour_on_a_bad_channel() {
     }
 }
 
-/// Seeds of the hours with half of the frames lost in runs of 20.
+/// Random seeds of simulated hours in which half of the frames are lost, in runs of 20.
 ///
-/// The environment variable `SEEDS` (as `201-800`) overrides them. In these hours, one relay loses its links to both sides repeatedly. When each silence between its own rare questions counted as one
-/// more loss, its links were held down for good, and the chain was complete for 4, 2, 11 and 28 % of the hour.
+/// The environment variable `SEEDS` (as `201-800`) overrides them. In these hours, one relay repeatedly loses the
+/// links to both neighbours. If every silence between its own rare requests counted as one more loss, its links would
+/// be held down for good, and the chain would be complete for only 4, 2, 11 and 28 % of the hour.
 const LONG_SEARCHES: [u64; 4] = [519, 625, 777, 1_030];
 
 #[test]

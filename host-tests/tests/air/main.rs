@@ -18,10 +18,10 @@ use uav_relay::{Duration, Instant};
 use uav_relay_sim::simulator::faults::LinkSpec;
 use uav_relay_sim::simulator::medium::{Access, Agenda, AirCounts, AirEvent, Medium, Sent};
 
-/// Medium with its own clock, and the frames received.
+/// Test bench: a radio channel with its own clock, and the frames completed on the channel.
 struct Bench {
     medium: Medium,
-    /// Receivers of each node.
+    /// Receivers of each node's frames: `hearers[n]` has the nodes that receive node n.
     hearers: Vec<Vec<usize>>,
     due: BinaryHeap<Reverse<(Instant, u64, usize, u8)>>,
     order: u64,
@@ -32,7 +32,7 @@ struct Bench {
 const BAUD: u32 = 9_600;
 
 impl Bench {
-    /// Creates a medium on which `hearers[node]` receive `node`.
+    /// Creates a radio channel on which the nodes `hearers[n]` receive the frames of node n.
     fn new(access: Access, hearers: Vec<Vec<usize>>, seed: u64) -> Self {
         let link = LinkSpec {
             baud: BAUD,
@@ -47,13 +47,13 @@ impl Bench {
         }
     }
 
-    /// Creates a medium on which all nodes receive each other.
+    /// Creates a radio channel on which all nodes receive each other.
     fn in_one_range(access: Access, nodes: usize, seed: u64) -> Self {
         let others = |node| (0..nodes).filter(move |by| *by != node).collect();
         Self::new(access, (0..nodes).map(others).collect(), seed)
     }
 
-    /// Advances to `at` and passes a frame to `node`.
+    /// Advances the clock to `at`, then gives `node` a frame to send. Returns true if it accepts the frame.
     fn offer(&mut self, at: Instant, node: usize, frame: &[u8]) -> bool {
         self.go_on(at);
         let mut agenda = Agenda::new();
@@ -74,7 +74,7 @@ impl Bench {
         }
     }
 
-    /// Processes all events before `until`.
+    /// Processes all channel events before `until`.
     fn go_on(&mut self, until: Instant) {
         while let Some(Reverse((at, _, node, kind))) = self.due.peek().copied()
             && at < until
@@ -90,7 +90,8 @@ impl Bench {
         }
     }
 
-    /// Processes all remaining events. Returns senders with their receivers in order, and the counters.
+    /// Processes all remaining events. Returns each frame's sender and receivers in order of completion, and the
+    /// channel's counters.
     fn end(mut self) -> (Vec<(usize, Vec<usize>)>, AirCounts) {
         self.go_on(Instant::from_micros(u64::MAX));
         let sent = self.sent.into_iter();

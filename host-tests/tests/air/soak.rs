@@ -69,7 +69,8 @@ fn the_optimum_is_that_of_exactly_those_who_are_left() {
     assert_eq!(places.len(), 7);
 }
 
-/// Returns a chain split for good between relays 4 and 5.
+/// Returns eight relays whose link between relays 4 and 5 fails for good after 30 s. `quorum` requires a majority of
+/// the relays for an agreement.
 fn split(quorum: bool) -> Setup {
     let mut setup = Setup::on_shared_channel(mission(8));
     setup.settings.quorum = quorum;

@@ -33,7 +33,7 @@ use crate::wire::BAUD;
 
 const START: Placement = Placement::on_line(100.0, 20.0);
 
-/// Queue of bytes with the wakers of its readers.
+/// In-memory serial line: a queue of bytes, and the wakers of the tasks that wait to read them.
 #[derive(Clone, Default)]
 struct Uart(Rc<Queue>);
 
@@ -41,7 +41,7 @@ struct Uart(Rc<Queue>);
 struct Queue {
     bytes: RefCell<VecDeque<u8>>,
     waits: RefCell<Option<Waker>>,
-    /// True while writes never complete.
+    /// True while writes to this queue never complete.
     stuck: Cell<bool>,
 }
 
@@ -84,13 +84,13 @@ impl Write for Uart {
     }
 }
 
-/// PX4 that reaches targets at once; its pilot flies it until `given_at`, then its companion.
+/// Simulated PX4 that reaches targets at once. Until `given_at` its pilot flies it, then the companion.
 struct Vehicle {
     mute: Cell<bool>,
     given_at: Cell<Instant>,
     place: Cell<Placement>,
     told: RefCell<Vec<(Instant, Placement)>>,
-    /// Ground station commands to forward, and their results.
+    /// Commands of a ground station that the autopilot has yet to forward; `results` has the answers.
     commands: RefCell<VecDeque<MavMessage>>,
     results: RefCell<Vec<u32>>,
 }
@@ -118,7 +118,7 @@ fn raw(number: u8, message: &MavMessage) -> Vec<u8> {
     raw.raw_bytes().to_vec()
 }
 
-/// Sends the vehicle's state every 200 ms and flies.
+/// Runs the simulated autopilot: sends its state every 200 ms and flies to the received targets.
 async fn fly(vehicle: &Vehicle, time: &Time, mut to: Uart, from: Uart) -> Infallible {
     let mut number = 0;
     let mut waiting: Vec<u8> = Vec::new();
@@ -198,7 +198,7 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// Creates the first of `relays` relays between the sites, with a guard.
+/// Creates relay 1 of `relays` relays between two sites on earth, with a motion guard.
 fn relay(relays: u16) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -215,7 +215,7 @@ fn relay(relays: u16) -> Relay {
     fixtures::relay(mission, 1, settings)
 }
 
-/// State observed by the firmware.
+/// State of relay and autopilot that the firmware task of the test has observed.
 #[derive(Default)]
 struct Seen {
     events: Vec<AutopilotEvent>,
@@ -232,12 +232,13 @@ struct Scene {
 }
 
 impl Scene {
-    /// Creates a single relay; with `tells` the firmware passes the relay's events to the link.
+    /// Creates a scene with a single relay. With `tells`, the firmware passes the relay's events to the autopilot
+    /// link.
     fn new(tells: bool) -> Self {
         Self::of(1, tells)
     }
 
-    /// Creates the first of `relays` relays.
+    /// Creates a scene with relay 1 of `relays`. With `tells`, the firmware passes its events to the autopilot link.
     fn of(relays: u16, tells: bool) -> Self {
         let time = Time::default();
         let pool = LocalPool::new();
@@ -304,7 +305,8 @@ impl Scene {
     }
 }
 
-/// Checks that the drone reaches the single relay's position, with and without the relay's events.
+/// Checks that the autopilot link flies the drone to the position of a single relay. The firmware may or may not pass
+/// the relay's events to the link.
 #[test]
 fn it_is_engaged_and_led_to_its_place() {
     for tells in [true, false] {
@@ -337,7 +339,7 @@ fn it_is_engaged_and_led_to_its_place() {
     }
 }
 
-/// Checks that relay and firmware treat a drone as not flown while its autopilot is silent.
+/// Checks that a silent autopilot makes the relay and the firmware treat the drone as not flown.
 #[test]
 fn it_falls_silent_and_comes_back() {
     let mut scene = Scene::new(true);
@@ -366,7 +368,7 @@ fn it_falls_silent_and_comes_back() {
     assert!(scene.vehicle.told.borrow().len() > before + 20);
 }
 
-/// Checks a writer that never completes. Received messages are still processed, and the relay continues.
+/// Checks that a blocked writer to the autopilot stops neither the reception of messages nor the relay.
 #[test]
 fn a_stuck_writer_keeps_nobody_from_hearing() {
     let mut scene = Scene::new(true);
@@ -392,7 +394,8 @@ fn a_stuck_writer_keeps_nobody_from_hearing() {
     );
 }
 
-/// Checks a clearance on a board whose firmware passes the relay's events to the link.
+/// Checks an operator's command that declares a neighbour lost for good and so clears it. The firmware passes the
+/// relay's events to the autopilot link.
 #[test]
 fn an_operator_clears_a_lost_relay() {
     let mut scene = Scene::of(2, true);

@@ -25,7 +25,7 @@ pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Fault of a writer, with its relay and port.
+/// Fault to inject, if any: index of the relay, its port, and the behaviour of the port's writer.
 pub(crate) type Trouble = Option<(u16, Port, Fate)>;
 
 fn fate(trouble: Trouble, index: u16, port: Port) -> Fate {
@@ -35,7 +35,7 @@ fn fate(trouble: Trouble, index: u16, port: Port) -> Fate {
     }
 }
 
-/// Result of one relay.
+/// Recorded outputs of one relay: setpoint, events and counters.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Drone {
     pub(crate) setpoint: Option<Placement>,
@@ -45,14 +45,14 @@ pub(crate) struct Drone {
     pub(crate) counted: [SerialStats; 2],
 }
 
-/// Result of a chain.
+/// Result of a simulated chain: the outputs of each relay, and the frames on each serial line.
 pub(crate) struct Flown {
     pub(crate) drones: Vec<Drone>,
-    /// Frames of each line, ordered along the chain, lines toward the receiver first.
+    /// Frames on each serial line: first the lines toward the receiver, then those toward the transmitter.
     pub(crate) lines: Vec<Vec<Heard>>,
 }
 
-/// Runs a task for every relay and its firmware until a time.
+/// Simulates a chain until a given time, with a task for every relay and one for its firmware.
 pub(crate) fn fly(
     wiring: Wiring,
     relays: u16,
@@ -122,7 +122,7 @@ pub(crate) fn fly(
     }
 }
 
-/// Records a relay's events.
+/// Runs a relay's firmware: records the relay's events, setpoint and counters.
 async fn firmware(relay: &AsyncRelay<'_>, time: &Time, drone: &RefCell<Drone>) {
     use uav_relay::asynch::Clock as _;
     loop {

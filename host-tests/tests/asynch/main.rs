@@ -30,7 +30,7 @@ fn five_settle_like_bare_relays() {
     }
 }
 
-/// Checks that each named block of the guide is a part of that file, which `cargo ci` builds.
+/// Checks that each code block of the guide with a file's name is a part of that file. `cargo ci` builds these files.
 #[test]
 fn the_guide_shows_what_is_built() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -81,14 +81,15 @@ fn the_guide_shows_what_is_built() {
     }
 }
 
-/// Returns the lines whose frames or times differ.
+/// Returns the indices of the serial lines whose frames or times differ between two runs.
 fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
     let lines = one.lines.iter().zip(&other.lines);
     let all = lines.enumerate().filter(|(_, (one, other))| one != other);
     all.map(|(at, _)| at).collect()
 }
 
-/// Compares a blocked writer with one that loses its bytes. Others see no difference, to the microsecond.
+/// Checks that a blocked port of one relay delays no frame of any other port, to the microsecond. The comparison is a
+/// run in which that port loses its bytes.
 #[test]
 fn a_stuck_port_delays_nobody() {
     let until = Instant::from_millis(60_000);

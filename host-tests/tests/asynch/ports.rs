@@ -18,19 +18,19 @@ use crate::chain::relay;
 use crate::time::Time;
 use crate::wire::{BAUD, BYTE_TIME, Fate, Rx, Tx, line};
 
-/// Writer that accepts part of each write, or blocks, or fails.
+/// Test writer that accepts only part of the bytes of a write, or blocks for ever, or fails.
 #[derive(Default)]
 struct Taker {
     taken: Rc<RefCell<Vec<u8>>>,
-    /// Number of writes until one that never completes.
+    /// Number of writes that still complete; the next one blocks for ever.
     writes: Rc<Cell<usize>>,
-    /// Interval of failing writes.
+    /// Interval of failing writes: every write with a multiple of this number fails; 0 for none.
     fails: usize,
     done: usize,
 }
 
 impl Taker {
-    /// Creates a writer that blocks after `writes` writes.
+    /// Creates a writer that blocks for ever after `writes` writes.
     fn until(writes: usize) -> Self {
         Self {
             writes: Rc::new(Cell::new(writes)),
@@ -92,7 +92,7 @@ impl Read for Flood {
     }
 }
 
-/// Runs the ports of a relay from the first to the last millisecond, and drops the runner then.
+/// Polls the runner of a relay's ports once in each millisecond of `millis`, then drops it.
 fn run_for(time: &Time, millis: std::ops::Range<u64>, runner: impl Future) {
     let (mut pool, mut cx) = (LocalPool::new(), Context::from_waker(Waker::noop()));
     let mut runner = pin!(runner);
@@ -102,7 +102,7 @@ fn run_for(time: &Time, millis: std::ops::Range<u64>, runner: impl Future) {
     }
 }
 
-/// Returns the numbers of intact and damaged frames.
+/// Returns the numbers of intact frames and of damaged frames in a byte stream.
 fn deframed(bytes: &[u8]) -> [usize; 2] {
     let mut deframer = Deframer::new();
     let mut counted = [0; 2];
@@ -120,7 +120,8 @@ fn deframed(bytes: &[u8]) -> [usize; 2] {
     counted
 }
 
-/// Checks a runner that is dropped during any write and run again: at most one frame is truncated.
+/// Checks that dropping the port runner during a write truncates at most one frame. The runner is run again, and ends
+/// the truncated frame before it sends the next.
 #[test]
 fn a_frame_that_is_cut_short_is_ended_before_the_next() {
     for cut in 1..12 {
@@ -177,7 +178,7 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
     assert!(whole + 3 >= usize::try_from(sent).unwrap() / 2, "{sent}");
 }
 
-/// Checks that a port that is always ready, or always fails, yields to all others.
+/// Checks that a port that is always ready, or always fails, lets all other ports run.
 #[test]
 fn a_port_that_is_always_ready_starves_nobody() {
     for fails in [false, true] {
@@ -197,7 +198,7 @@ fn a_port_that_is_always_ready_starves_nobody() {
     }
 }
 
-/// Edges of the pin with their times.
+/// Output pin that records its edges with their times.
 #[derive(Clone)]
 struct Pin {
     time: Time,
@@ -233,7 +234,8 @@ impl OutputPin for Pin {
     }
 }
 
-/// Checks a writer whose `flush` ignores a FIFO of 4 bytes.
+/// Checks that the transmit-enable pin is high while bytes leave, and at most two byte times longer. The writer's
+/// `flush` ignores a FIFO of 4 bytes.
 #[test]
 fn the_pin_is_high_while_bytes_leave_and_little_longer() {
     for capacity in [1, 4, 16, 1_000] {

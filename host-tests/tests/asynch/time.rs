@@ -17,7 +17,7 @@ pub(crate) struct Time(Rc<Inner>);
 #[derive(Default)]
 struct Inner {
     now: Cell<Instant>,
-    /// Wakers by time; the number separates those of the same instant, latest first.
+    /// Wakers of waiting tasks by wake-up time. A serial number separates equal times: the latest task wakes first.
     sleepers: RefCell<BTreeMap<(Instant, Reverse<u64>), Waker>>,
     asked: Cell<u64>,
 }
@@ -42,7 +42,7 @@ impl Clock for Time {
 }
 
 impl Time {
-    /// Runs the tasks of `pool` until a time.
+    /// Runs the tasks of `pool` in virtual time until `until`.
     pub(crate) fn run(&self, pool: &mut LocalPool, until: Instant) {
         loop {
             pool.run_until_stalled();

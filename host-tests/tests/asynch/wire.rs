@@ -15,38 +15,38 @@ use crate::time::Time;
 
 pub(crate) const BAUD: u32 = 115_200;
 
-/// Time of a byte at [`BAUD`].
+/// Transmission time of a byte at [`BAUD`].
 pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 
 /// Frame with the arrival time of its last byte.
 pub(crate) type Heard = (Instant, Vec<u8>);
 
-/// Fault of a writer.
+/// Behaviour of a port's writer: correct or with a fault.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Fate {
     Well,
-    /// `write` never completes, from the first byte on.
+    /// Fault: `write` never completes, from the first byte on.
     Stuck,
-    /// Bytes take their time and are lost.
+    /// Fault: bytes take their transmission time, but reach no reader.
     Cut,
 }
 
-/// Bytes that have arrived at one reader.
+/// Bytes in transit to one reader or waiting for it, with their arrival times.
 #[derive(Default)]
 struct Inbox {
     bytes: VecDeque<(Instant, u8)>,
     waits: Option<Waker>,
 }
 
-/// Line on which one end at a time sends a frame.
+/// Simulated serial line or shared channel, on which one end at a time sends a frame.
 pub(crate) struct Line {
     inboxes: Vec<Inbox>,
-    /// Departure times of accepted bytes that may still be in the buffer.
+    /// Times at which accepted bytes leave the line's send buffer.
     leaving: VecDeque<Instant>,
     capacity: usize,
     talker: Option<usize>,
     frame: Vec<u8>,
-    /// Frames sent by any end.
+    /// Completed frames of all ends, with the times at which they arrived.
     pub(crate) heard: Vec<Heard>,
 }
 
@@ -146,7 +146,7 @@ impl Write for Tx {
         }
     }
 
-    /// Ignores the last 4 bytes, like a HAL that does not know of its FIFO.
+    /// Waits until all but the last 4 bytes have left, like a HAL that does not know of its FIFO.
     async fn flush(&mut self) -> Result<(), Infallible> {
         let left = {
             let line = self.line.borrow();
@@ -161,7 +161,7 @@ impl Write for Tx {
 }
 
 impl Line {
-    /// Sends bytes up to the end of a frame.
+    /// Sends bytes of end `from`, at most to the end of a frame. Returns the number of bytes sent.
     fn put(&mut self, from: usize, bytes: &[u8], now: Instant, fate: Fate) -> usize {
         let mut count = 0;
         for &byte in bytes {

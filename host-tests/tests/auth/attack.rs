@@ -7,7 +7,7 @@ use uav_relay::{Instant, Phase, Side, Wiring};
 use super::kinds::{Attack, Attacker, KINDS, Kind, raised};
 use super::net::{Deed, Net};
 
-/// Schedule of the run, ms: reboots of relays, new searches by the leader, uploads from both ends.
+/// Scheduled events of the run, with times in ms: reboots, restarted agreements and mission uploads.
 const DEEDS: [(u64, Deed); 11] = [
     (6_000, Deed::Reboot(4)),
     (6_500, Deed::Restart),
@@ -123,7 +123,7 @@ fn under_attack(wiring: Wiring, count: u64) {
     }
 }
 
-/// Returns the number of attacks.
+/// Returns the number of attacks: the environment variable `COUNT`, or a million.
 fn count() -> u64 {
     std::env::var("COUNT")
         .ok()

@@ -102,7 +102,7 @@ fn other_methods_choose_the_same() {
     }
 }
 
-/// Checks that a relay, or the leader, rejoins the chain after a reboot with the next epoch.
+/// Checks that a rebooted relay, also the leader, rejoins the chain with its next epoch.
 #[test]
 fn whoever_is_rebooted_rejoins() {
     let deeds = [

@@ -10,7 +10,7 @@ fn key() -> [u8; 32] {
     std::array::from_fn(|byte| u8::try_from(byte).unwrap())
 }
 
-/// Returns the vector's frame without the CRC, and the frame on the wire.
+/// Returns the signed frame of test vector `name` twice: decoded without its CRC, and as on the wire.
 fn worked(name: &str) -> (Vec<u8>, Vec<u8>) {
     let mut signed = Vectors::load().unwrap().signed.into_iter();
     let mut vector = signed.find(|vector| vector.name == name).unwrap();
@@ -42,7 +42,8 @@ fn the_worked_frames_are_what_the_rules_say() {
     }
 }
 
-/// Checks that relays accept the worked frames: relay 2 of 3 uses its first nonce for relay 1.
+/// Checks that a relay accepts the documentation's worked handshake and computes the same tag. The examples are for
+/// relay 2 of 3 and its first nonce toward relay 1.
 #[test]
 fn the_worked_handshake_is_taken_and_tags_are_the_same() {
     let settings = Settings {

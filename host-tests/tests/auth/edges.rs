@@ -11,14 +11,14 @@ use super::net::{KEY, relay};
 
 const NOW: Instant = Instant::from_millis(5);
 
-/// Relay 2 of 3, and a peer with the key that acts as relay 1.
+/// Link under test: relay 2 of 3, and a simulated relay 1 that has the key.
 struct Link {
     relay: Relay,
     nonces: [u64; 2],
 }
 
 impl Link {
-    /// Creates a link on which both have authenticated each other.
+    /// Creates a link whose two ends have authenticated each other.
     fn new() -> Self {
         let mut relay = relay(3, 2, Wiring::Pair, (4, Instant::ZERO));
         let mut sent = bench::sent(&mut relay, NOW).into_iter();
@@ -42,7 +42,8 @@ impl Link {
         self.give(&handshake.signed(&KEY, nonces))
     }
 
-    /// Sends a heartbeat with the given counter.
+    /// Sends a signed heartbeat with the given frame counter. Returns the statistics counter that it increments at
+    /// relay 2.
     fn say(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
         frame.0.extend([3, 0, 0, 0, 0, 0, 0]);

@@ -12,11 +12,11 @@ pub(crate) const HANDSHAKE: u16 = 0x2000;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
-/// Frame without COBS, delimiter and CRC.
+/// Decoded frame: its bytes without COBS encoding, delimiter and CRC.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Plain(pub(crate) Vec<u8>);
 
-/// Decodes an intact frame.
+/// Decodes an intact frame; panics on a damaged one.
 pub(crate) fn plain(wire: &[u8]) -> Plain {
     let mut bytes = cobs::decode_vec(&wire[..wire.len() - 1]).unwrap();
     let checked = bytes.len() - 4;
@@ -71,12 +71,12 @@ impl Plain {
         self.flags() == SIGNED | HANDSHAKE
     }
 
-    /// Returns a handshake's nonces: the sender's and the receiver's.
+    /// Returns the two nonces of a handshake: the sender's and the receiver's.
     pub(crate) fn nonces(&self) -> [u64; 2] {
         [10, 18].map(|at| u64::from_le_bytes(self.0[at..at + 8].try_into().unwrap()))
     }
 
-    /// Appends a tag by `key` for the nonces of sender and receiver.
+    /// Appends the authentication tag that `key` and the nonces of sender and receiver give.
     pub(crate) fn signed(mut self, key: &[u8; 32], nonces: [u64; 2]) -> Self {
         let tag = tag(key, nonces, &self.0);
         self.0.extend(tag);
@@ -102,7 +102,8 @@ pub(crate) fn tag(key: &[u8; 32], nonces: [u64; 2], signed: &[u8]) -> [u8; TAG] 
     mac.finalize_fixed().into()
 }
 
-/// Creates a handshake as a relay does.
+/// Creates a handshake frame as a relay does. `addresses` are network, sender and receiver; `asks` requests an
+/// answer.
 pub(crate) fn handshake(
     addresses: (u16, u16, u16),
     counter: u32,
@@ -118,7 +119,7 @@ pub(crate) fn handshake(
     handshake
 }
 
-/// Returns a nonce: epoch in the upper half, number of earlier links in the lower.
+/// Returns a handshake nonce: epoch in the upper half, number of earlier nonces in the lower.
 pub(crate) fn nonce(epoch: u32, made: u32) -> u64 {
     u64::from(epoch) << 32 | u64::from(made)
 }

@@ -12,7 +12,7 @@ fn is_handshake(heard: &Heard) -> bool {
     plain(&heard.wire).is_handshake()
 }
 
-/// Replays handshakes at all times, and especially while relays authenticate each other again.
+/// Checks that replayed handshakes change no position, even while relays authenticate each other again.
 #[test]
 fn recorded_handshakes_at_any_time_change_no_place() {
     let mut deeds = vec![(6_000, Deed::Reboot(4))];
@@ -107,7 +107,8 @@ fn recorded_handshakes_are_answered_once_each_and_overtaken() {
     assert!(net.stats(2).received > 0);
 }
 
-/// Checks a genuine handshake that arrives, with a lost answer, while the relay trusts a recorded one.
+/// Checks that a relay deceived by a replayed handshake authenticates its neighbour all the same. The relay has
+/// answered the replay, and its answer is lost.
 #[test]
 fn a_relay_that_took_a_recorded_handshake_finds_out() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -134,7 +135,7 @@ fn a_relay_that_took_a_recorded_handshake_finds_out() {
     assert_eq!(net.stats(2).received, net.genuine[1]);
 }
 
-/// Checks that replayed handshakes are no signs of life.
+/// Checks that replayed handshakes do not keep a silent neighbour from being declared lost.
 #[test]
 fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -154,7 +155,8 @@ fn a_silent_neighbour_is_lost_whatever_is_played_back() {
     assert!((15_000..15_100).contains(&lost_after), "{lost_after}");
 }
 
-/// Returns the time until relay 1 loses its silent neighbour (ms), and the accepted handshakes.
+/// Returns the time until relay 1 declares its silent neighbour lost, and the accepted handshakes. The time is in ms;
+/// meanwhile the `recorded` handshakes are replayed to the relay.
 fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
     let mut lost_after = None;

@@ -13,38 +13,38 @@ use super::net::{Heard, Net};
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
-    /// Frame recorded since both ends started.
+    /// Attack: replay of a frame that was recorded after the last start of both ends.
     Replayed,
-    /// Frame recorded before a start of either end.
+    /// Attack: replay of a frame that was recorded before the last start of one end.
     FromBefore,
-    /// Frame with flipped bits.
+    /// Attack: a recorded frame with flipped bits and a correct CRC.
     Flipped,
-    /// Frame with a changed header field.
+    /// Attack: a recorded frame with a changed header field.
     Header,
-    /// Frame without its tag and the flag for it.
+    /// Attack: a recorded frame without its authentication tag and without the flag for the tag.
     Stripped,
-    /// Frame with a truncated tag.
+    /// Attack: a recorded frame with a truncated authentication tag.
     Truncated,
     RandomTag,
-    /// Frame signed with another key.
+    /// Attack: a valid message that is signed with another key.
     OtherKey,
-    /// Handshake by another key, with a larger epoch.
+    /// Attack: a handshake that is signed with another key and claims the same or a larger epoch.
     ForgedHandshake,
     RecordedHandshake,
     Noise,
-    /// Valid message of any kind, without a tag.
+    /// Attack: a valid message of any kind without an authentication tag.
     Bare,
-    /// Valid message of any kind, with a random tag.
+    /// Attack: a valid message of any kind with a random authentication tag.
     Dressed,
-    /// Offer of a newer mission, recorded since both ends started, played to any relay.
+    /// Attack: replay of a mission offer, recorded after the last start of both ends, to any relay.
     OfferReplayed,
-    /// Offer from before a start of either end.
+    /// Attack: replay of a mission offer that was recorded before the last start of one end.
     OfferFromBefore,
-    /// Offer with another counter, body or tag.
+    /// Attack: a recorded mission offer with a changed counter, body or tag.
     OfferAltered,
-    /// Offer of a mission that was never uploaded, from any node.
+    /// Attack: an offer of a mission that was never uploaded, in the name of any node.
     OfferForged,
-    /// Valid or recorded message with the ground station's address.
+    /// Attack: a valid or recorded message that claims to come from the ground station.
     FromGround,
 }
 
@@ -70,7 +70,7 @@ pub(crate) const KINDS: [Kind; 18] = [
 ];
 
 impl Kind {
-    /// Returns true if the attack needs a recorded offer.
+    /// Returns true if this kind of attack changes or replays a recorded mission offer.
     fn is_of_an_offer(self) -> bool {
         matches!(
             self,
@@ -79,7 +79,7 @@ impl Kind {
     }
 }
 
-/// Attack: receiver, bytes, and the counter that it increments.
+/// Frame to inject: its receiver, its bytes, and the receiver's counter that it must increment.
 pub(crate) struct Attack {
     pub(crate) to: u16,
     pub(crate) port: Port,
@@ -87,7 +87,7 @@ pub(crate) struct Attack {
     pub(crate) raises: &'static str,
 }
 
-/// Returns the counters that attacks may or must not increment, by name.
+/// Returns the counters of received frames by which attacks are judged, with their names.
 pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     [
         ("received", stats.received),
@@ -105,7 +105,8 @@ pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     ]
 }
 
-/// Returns the counter that increased by one; `None` for `malformed` and other counters.
+/// Returns the name of the only counter that has increased, if by exactly one. Returns `None` otherwise; counters
+/// that are not in `counters` are ignored.
 pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
     let (mut name, mut ups) = (None, 0);
     for ((of, before), (_, after)) in counters(before).into_iter().zip(counters(after)) {
@@ -117,7 +118,7 @@ pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
     name.filter(|_| ups == 1)
 }
 
-/// Returns the counter that an intact frame with a wrong tag increments at relay `to`.
+/// Returns the name of the counter that a frame with a wrong tag increments at relay `to`. The frame's CRC is right.
 fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
     let flags = frame.flags();
     if frame.version() != 1 || ![0, SIGNED, SIGNED | HANDSHAKE].contains(&flags) {
@@ -166,7 +167,7 @@ impl Attacker {
         Self { rng, messages }
     }
 
-    /// Creates an attack of `kind`; `None` if no suitable frame has been recorded.
+    /// Creates an attack of kind `kind`; `None` if no suitable frame has been recorded yet.
     pub(crate) fn attack(&mut self, net: &Net, kind: Kind) -> Option<Attack> {
         let heard = if kind.is_of_an_offer() {
             &net.heard[*net.offers.choose(&mut self.rng)?]
@@ -290,7 +291,7 @@ impl Attacker {
         Some((frame, "forged"))
     }
 
-    /// Draws a counter: old, new or arbitrary.
+    /// Draws a frame counter: the recorded one, a slightly larger one or an arbitrary one.
     pub(crate) fn counter(&mut self, recorded: &Plain) -> u32 {
         match self.rng.random_range(0..3) {
             0 => recorded.counter(),
@@ -340,7 +341,7 @@ impl Attacker {
         frame
     }
 
-    /// Draws a COBS frame of random bytes; its length determines the counter that it increments.
+    /// Draws an attack with random bytes in a COBS frame. Its length determines the counter that it must increment.
     fn noise(&mut self, to: u16, port: Port) -> Attack {
         let len = self.rng.random_range(1..300);
         let bytes: Vec<u8> = (0..len).map(|_| self.rng.random()).collect();

@@ -14,7 +14,7 @@ pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
 /// Time that a frame takes between neighbours.
 const ON_THE_WAY: Duration = Duration::from_millis(10);
 
-/// Returns mission version `version`, each with another position of the interferer.
+/// Returns an upload of mission version `version`. Each version places the interferer elsewhere.
 pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
     let config = MissionConfig {
         interference: Interference::Source(Interferer {
@@ -27,51 +27,51 @@ pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Recorded frame.
+/// Frame that the attacker has recorded.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Heard {
     pub(crate) from: u16,
     pub(crate) to: u16,
-    /// Numbers of starts of sender and receiver.
+    /// Start counts of the sender and of the receiver when the frame was sent.
     pub(crate) lives: (u32, u32),
-    /// Index among the recorded frames.
+    /// Index of this frame among all recorded frames.
     pub(crate) number: usize,
     pub(crate) wire: Vec<u8>,
 }
 
-/// Scheduled event.
+/// Scheduled event of the simulation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Deed {
-    /// The relay reboots.
+    /// Event: the relay of this index reboots without the mission upload that it had stored.
     Reboot(u16),
-    /// The relay reboots with its stored upload.
+    /// Event: the relay of this index reboots with the mission upload that it had stored.
     Resume(u16),
-    /// The ground station at the given end uploads a mission of the given version.
+    /// Event: the ground station at this end uploads a mission of this version.
     Upload(Side, u16),
-    /// The leader restarts the agreement.
+    /// Event: the leader restarts the agreement on positions.
     Restart,
 }
 
 #[derive(Clone)]
 pub(crate) struct Net {
     pub(crate) relays: Vec<Relay>,
-    /// Ground stations at the transmitter and the receiver.
+    /// Ground stations: one at the transmitter, one at the receiver.
     pub(crate) grounds: [Ground; 2],
     stored: Vec<Option<Upload>>,
-    /// Number of starts of each relay, its epoch.
+    /// Number of starts of each relay, which is also its epoch.
     pub(crate) lives: Vec<u32>,
     pub(crate) now: Instant,
     pub(crate) heard: Vec<Heard>,
-    /// Indices of offers of a newer mission.
+    /// Indices of the recorded frames that offer a newer mission.
     pub(crate) offers: Vec<usize>,
     pub(crate) handshakes: Vec<usize>,
-    /// Genuine messages received by each relay since its start.
+    /// Number of genuine messages that each relay has received since its start.
     pub(crate) genuine: Vec<u32>,
-    /// Lives of both ends of each link (from, to) on which a message was accepted last.
+    /// Start counts of both ends of each link (from, to) when a message was last accepted there.
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Last life of the sender that the receiver learned, and the receiver's life at that time, by link.
+    /// Start count of the sender that the receiver last learned, and the receiver's own then, by link.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Frames signed before their sender knew of the receiver's last start.
+    /// Indices of frames whose sender signed them before it learned of the receiver's last start.
     outdated: BTreeSet<usize>,
     /// Frames in transit: arrival time, and index of the frame.
     under_way: VecDeque<(Instant, usize)>,
@@ -81,7 +81,7 @@ pub(crate) struct Net {
 }
 
 impl Net {
-    /// Starts `relays` relays at time 0; `deeds` must be in order of time.
+    /// Starts `relays` relays at time 0. The events `deeds`, with times in ms, must be in order of time.
     pub(crate) fn new(relays: u16, wiring: Wiring, deeds: &[(u64, Deed)]) -> Self {
         let mut net = Self {
             relays: (1..=relays)
@@ -123,7 +123,7 @@ impl Net {
         *self.relays[usize::from(index) - 1].stats()
     }
 
-    /// Returns a node's number of starts; 1 for the ground.
+    /// Returns the number of starts of a node; 1 for a ground station.
     pub(crate) fn life(&self, node: u16) -> u32 {
         if self.is_relay(node) {
             self.lives[usize::from(node) - 1]
@@ -149,7 +149,7 @@ impl Net {
         }
     }
 
-    /// Returns true if both ends of the link have authenticated each other.
+    /// Returns true if both ends of the link have authenticated each other since their last starts.
     pub(crate) fn is_proven(&self, from: u16, to: u16) -> bool {
         self.proven.get(&(from, to)) == Some(&(self.life(from), self.life(to)))
     }
@@ -160,7 +160,7 @@ impl Net {
             .is_none_or(|(_, next)| heard.number < *next)
     }
 
-    /// Returns true if the nonces of a frame are still valid at its receiver.
+    /// Returns true if the receiver still uses the nonces with which a recorded frame was signed.
     pub(crate) fn is_of_now(&self, heard: &Heard) -> bool {
         let Heard {
             from, to, lives, ..
@@ -321,7 +321,7 @@ impl Net {
         }
     }
 
-    /// Sends a frame.
+    /// Records a frame from node `from` to node `to`, and puts it in transit.
     fn say(&mut self, from: u16, to: u16, wire: Vec<u8>) {
         let lives = (self.life(from), self.life(to));
         let number = self.heard.len();
@@ -341,7 +341,7 @@ impl Net {
         });
     }
 
-    /// Returns the bits of the relays' setpoints and targets.
+    /// Returns the bits of each relay's setpoint and target SIR, for exact comparison.
     pub(crate) fn bits(&self) -> Vec<Option<([u32; 3], u32)>> {
         self.relays
             .iter()
@@ -361,12 +361,12 @@ fn proof(epoch: u32) -> Auth {
     }
 }
 
-/// Creates relay `index` of `of`, started with an epoch at a time.
+/// Creates relay `index` of `of` relays. `start` has its epoch and the current time.
 pub(crate) fn relay(of: u16, index: u16, wiring: Wiring, start: (u32, Instant)) -> Relay {
     started(of, index, wiring, start, None)
 }
 
-/// Creates relay `index` of `of` with its stored upload, if any.
+/// Creates relay `index` of `of` relays with the mission upload that it had stored, if any.
 fn started(
     of: u16,
     index: u16,

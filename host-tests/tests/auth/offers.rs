@@ -11,14 +11,14 @@ use super::frames::{HEADER, Plain, SIGNED, TAG, nonce, plain};
 use super::kinds::{Attacker, Kind, raised};
 use super::net::{Deed, Heard, Net, newer};
 
-/// First byte of an offer's body.
+/// Message type of a mission offer: the first byte of its body.
 const OFFER: u8 = 14;
 
 pub(crate) fn is_offer(frame: &Plain) -> bool {
     !frame.is_handshake() && frame.0.get(HEADER) == Some(&OFFER)
 }
 
-/// Returns the body of an offer of a mission that was never uploaded.
+/// Returns the message body of an offer of a mission that was never uploaded.
 fn offered(relays: u16, version: u16) -> Vec<u8> {
     let mut body = [0; Upload::LENGTH];
     let len = newer(&mission(relays), version).encode(&mut body).unwrap();
@@ -28,7 +28,8 @@ fn offered(relays: u16, version: u16) -> Vec<u8> {
 }
 
 impl Attacker {
-    /// Returns the relay to which a frame for node `to` is played; `None` if there is none.
+    /// Returns the relay to attack with a frame that was recorded on its way to node `to`. Returns `None` if that
+    /// node is not a relay.
     pub(crate) fn target(&mut self, net: &Net, kind: Kind, to: u16) -> Option<u16> {
         if kind == Kind::OfferReplayed && self.rng.random_bool(0.5) {
             return Some(self.rng.random_range(1..=net.len()));
@@ -36,14 +37,15 @@ impl Attacker {
         Some(to).filter(|to| net.is_relay(*to))
     }
 
-    /// Changes one byte behind the frame's addresses.
+    /// Changes one random byte of the frame behind its addresses.
     pub(crate) fn altered(&mut self, mut frame: Plain) -> Plain {
         let at = self.rng.random_range(HEADER - 4..frame.0.len());
         frame.0[at] ^= self.rng.random_range(1..=u8::MAX);
         frame
     }
 
-    /// Returns sender, receiver and frame of a forged offer, which may claim to be the ground station's.
+    /// Returns sender, receiver and frame of a forged offer, or of any message in the ground's name. Returns `None`
+    /// if the frame would be an unchanged copy.
     pub(crate) fn pretended(
         &mut self,
         net: &Net,
@@ -102,7 +104,7 @@ impl Attacker {
     }
 }
 
-/// Checks a chain without a key, which accepts missions neither from the ground nor from neighbours.
+/// Checks that a chain without a key accepts no mission, neither from the ground nor from neighbours.
 #[test]
 fn a_chain_without_tags_takes_no_mission_from_anybody() {
     for wiring in [Wiring::Pair, Wiring::Shared] {

@@ -38,7 +38,7 @@ fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
     assert!(vehicle.events.contains(&AutopilotEvent::Refused));
 }
 
-/// Checks that an autopilot that does not report its target does not count as refusing.
+/// Checks that an autopilot that does not report its target is not taken for one that refuses targets.
 #[test]
 fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
     let mut vehicle = Vehicle::flying(Kind::ArduCopter);
@@ -82,7 +82,7 @@ fn back_in_its_mode_the_target_is_told_anew() {
     assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
 }
 
-/// Checks that the last target has no velocity, whenever the autopilot reports it.
+/// Checks that the last target of a flight has no velocity, at whatever time the autopilot confirms it.
 #[test]
 fn the_last_target_stands_whenever_it_is_confirmed() {
     for late in 0..100_u16 {

@@ -8,7 +8,7 @@ use uav_relay::{Event, Side};
 use crate::signed::{OTHER, OURS, keyed};
 use crate::vehicle::{SYSTEM, Said, Vehicle};
 
-/// Address of QGroundControl.
+/// MAVLink system and component id of QGroundControl.
 const STATION: [u8; 2] = [255, 190];
 
 const FROM: Address = Address {
@@ -28,7 +28,7 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
     })
 }
 
-/// Returns the results and recipients of all answers to commands.
+/// Returns the results and recipients of all answers to the clearance command, `MAV_CMD_USER_1`.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.said.iter();
     said.filter_map(|(_, said)| match said {
@@ -98,7 +98,8 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
     }
 }
 
-/// Checks commands that a cable or a router delivers two at once. The second one is as good as lost, and its repetition counts.
+/// Checks that of two commands that arrive at once, the second is ignored until it is repeated. A cable or a router
+/// can deliver two commands together.
 #[test]
 fn two_commands_at_once_are_obeyed_one_after_the_other() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
@@ -140,7 +141,7 @@ fn two_commands_at_once_are_obeyed_one_after_the_other() {
     assert_eq!(vehicle.link.poll_cleared(), Some(side));
 }
 
-/// Checks a link with a key: a command counts only if it is signed with that key, and only once.
+/// Checks that a link with a key obeys a command to clear a relay only if signed, and only once.
 #[test]
 fn with_a_key_only_a_signed_command_clears_a_relay() {
     let side = Side::Downstream;

@@ -14,12 +14,12 @@ use mavlink::dialects::common::{
 
 use super::*;
 
-/// Returns a relay with a guard, alone between the sites of the vehicle's line.
+/// Creates the only relay of a chain, with a motion guard, between the two sites of the vehicle.
 fn relay(settings: Settings) -> Relay {
     of(1, 1, settings)
 }
 
-/// Returns relay `index` of `relays`, with a guard.
+/// Creates relay `index` of `relays` relays with a motion guard, between the two sites of the vehicle.
 fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -33,7 +33,7 @@ fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Returns a copy of the link after a repeated hand-over of the relay's outputs.
+/// Returns a copy of the autopilot link that has received the relay's current outputs once more.
 fn told_again(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     let mut link = link.clone();
     link.handle_ready(now, relay.is_ready());
@@ -45,7 +45,8 @@ fn told_again(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     link
 }
 
-/// Runs the vehicle, and checks each exchange.
+/// Runs the vehicle for `ms`, and checks every exchange of autopilot link and relay. Returns the positions that the
+/// relay received.
 fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
     let mut positions = Vec::new();
     for _ in 0..ms / 20 {
@@ -129,7 +130,8 @@ fn an_engaged_drone_flies_to_its_relays_setpoint() {
     }
 }
 
-/// A relay that does not listen refuses the sample, and counts it.
+/// Checks that the autopilot link passes the radio's noise sample to the relay. A relay that does not measure
+/// interference counts the sample as rejected.
 #[test]
 fn a_relay_is_handed_what_the_radio_hears() {
     let (mut vehicle, mut relay) = flies(Kind::ArduCopter, Settings::default());
@@ -207,7 +209,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
     assert!(format!("{first:?}") == format!("{expected:?}"));
 }
 
-/// Checks that a drone on the wrong side of its neighbour cannot be engaged.
+/// Checks that a drone on the wrong side of its neighbour cannot come under setpoint control.
 #[test]
 fn a_drone_out_of_order_cannot_be_engaged() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
@@ -223,7 +225,7 @@ fn a_drone_out_of_order_cannot_be_engaged() {
     assert_eq!(vehicle.events.last(), Some(&waits));
 }
 
-/// Checks that the link follows its relay to a mission with other sites, and back.
+/// Checks that the autopilot link follows its relay to a mission with other sites, and back.
 #[test]
 fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
     let auth = Some(Auth {

@@ -19,22 +19,22 @@ const STEP: Duration = Duration::from_millis(20);
 /// Duration of a flight, s.
 const FLIGHT_S: u64 = 240;
 
-/// Time in which the link learns of a mode: a second, with at most 2 s of delay.
+/// Longest time until the autopilot link knows the vehicle's mode. A heartbeat comes each second, at most 2 s late.
 const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Fault {
     None,
-    /// The cable stores the bytes and then delivers them at once.
+    /// Fault: the cable keeps all bytes, and delivers them at once when the fault ends.
     Keeps,
     Cut,
-    /// The cable delays the bytes by the given time, µs.
+    /// Fault: the cable delays the bytes by the given time in µs.
     Delay(u64),
 }
 
-/// Direction of a cable, which keeps the order of bytes.
+/// Direction of a serial cable with faults. It keeps the order of the bytes.
 struct Cable {
-    /// Times of arrival and sending, and the bytes.
+    /// Bytes in transit, with their times of arrival and of sending.
     waiting: VecDeque<(Instant, Instant, Vec<u8>)>,
     kept: Vec<(Instant, Vec<u8>)>,
     fault: Fault,
@@ -81,7 +81,7 @@ impl Cable {
     }
 }
 
-/// Companion that is polled, or uses the asynchronous runner.
+/// Companion under test: the autopilot link that is polled, or the asynchronous runner.
 enum Companion {
     Polled(Box<Autopilot>),
     Async(Runner),
@@ -95,14 +95,14 @@ struct Flight {
     to: Cable,
     from: Cable,
     companion: Option<Companion>,
-    /// Times of the companion's last start, next start, and end of its pause.
+    /// Time of the companion's last start. The next fields are its next start and the end of its pause.
     started: Instant,
     starts_at: Option<Instant>,
     paused_until: Instant,
     mends_at: Instant,
     gps_until: Instant,
     setpoint: Option<Placement>,
-    /// Times of the pilot's last choice of OFFBOARD or GUIDED, and of the last flight in it.
+    /// Time at which the pilot last chose OFFBOARD or GUIDED. The next field is the last flight in it.
     given_at: Option<Instant>,
     flown_at: Instant,
     texts: Vec<(Instant, String)>,
@@ -285,7 +285,7 @@ impl Flight {
         }
     }
 
-    /// Polls the link. Returns true if the drone becomes engaged.
+    /// Polls the autopilot link. Returns true if the drone comes under setpoint control.
     fn poll(&mut self, link: &mut Autopilot) -> bool {
         let now = self.now;
         let before = link.state();
@@ -314,7 +314,8 @@ impl Flight {
         engages
     }
 
-    /// Runs the asynchronous runner with its relay's setpoint. Returns true if the drone becomes engaged.
+    /// Runs the asynchronous runner with its relay's setpoint. Returns true if the drone comes under setpoint
+    /// control.
     fn run(&mut self, runner: &mut Runner) -> bool {
         let before = runner.is_flown();
         let mut engages = false;
@@ -336,7 +337,7 @@ impl Flight {
         engages
     }
 
-    /// Sends a frame of the companion to the vehicle, and checks the texts in the frame.
+    /// Passes a frame of the companion to the vehicle, and checks the status texts in it.
     fn send(&mut self, frame: &[u8]) {
         let now = self.now;
         if frame[7] == 253 {
@@ -363,7 +364,8 @@ impl Flight {
     }
 }
 
-/// Returns the violations in a flight, and the number of engagements. The last value is true for the asynchronous runner.
+/// Simulates a random flight. Returns its violations, how often setpoint control was engaged, and true if the
+/// asynchronous runner flew it.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);
     for i in 0..FLIGHT_S * 50 {

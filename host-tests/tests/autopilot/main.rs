@@ -56,7 +56,7 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
     }
 }
 
-/// Checks frames at the last representable instants, at which the heartbeat once remained due.
+/// Checks that polling at the last representable instants yields few frames, so that a poll loop ends.
 #[test]
 fn the_frames_of_one_instant_end_at_the_last_instant_too() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -238,7 +238,7 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
     assert!(last.0 > stopped.0);
 }
 
-/// Checks setpoints that are not finite or too far away: they must not end a PX4's stream.
+/// Checks that a setpoint that is not finite or too far away does not end the stream of targets.
 #[test]
 fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -256,7 +256,7 @@ fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
     }
 }
 
-/// Checks that a bearing that is no angle is omitted.
+/// Checks that targets have no yaw if the bearing to be pointed at is not a valid angle.
 #[test]
 fn a_bearing_that_is_none_is_left_out() {
     use uav_relay::pointing::Bearing;
@@ -281,7 +281,7 @@ fn a_bearing_that_is_none_is_left_out() {
     }
 }
 
-/// Checks that nothing is streamed in standby, so that a PX4 refuses OFFBOARD.
+/// Checks that no targets are sent for a relay that is not ready, so that a PX4 refuses OFFBOARD.
 #[test]
 fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
@@ -303,7 +303,7 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
     assert!(vehicle.targets_since(from).len() > 20, "it stays engaged");
 }
 
-/// Checks the text on a new view: one on each drone in flight, none on others.
+/// Checks that a new membership view or mission is reported to the operator once. Only drones in flight report it.
 #[test]
 fn the_operator_reads_of_a_view_and_a_mission_once() {
     use uav_relay::Event;
@@ -359,7 +359,7 @@ fn the_operator_reads_of_a_view_and_a_mission_once() {
     assert_eq!(texts_since(&vehicle, from), ["relay: new mission adopted"]);
 }
 
-/// Checks that reasons which change while an agreement spreads cause no text.
+/// Checks that the operator is not told of reasons to wait that change while an agreement spreads.
 #[test]
 fn a_reason_that_does_not_last_is_not_told() {
     use uav_relay::HoldReason::Close;

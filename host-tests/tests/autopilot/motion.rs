@@ -24,7 +24,7 @@ pub(crate) struct Rig {
 }
 
 impl Rig {
-    /// Creates a drone in the air at x = 100, flown by its pilot.
+    /// Creates a drone in the air at x = 100 m along the line, flown by its pilot.
     pub(crate) fn new(kind: Kind) -> Self {
         let now = Instant::from_millis(1_000_000);
         let mut rig = Self {
@@ -107,7 +107,7 @@ impl Rig {
     }
 }
 
-/// Checks the model: at the sudden stop of a 5 m/s target, a real PX4 overshoots by 2.1 to 2.7 m.
+/// Checks the PX4 model: if a 5 m/s target stops dead, it overshoots by 2.1 to 2.7 m like a real PX4.
 #[test]
 fn the_models_px4_flies_past_a_dead_stop_like_the_real_one() {
     let mut body = Body::default();
@@ -146,7 +146,7 @@ fn what_was_set_is_the_most_that_is_flown() {
     }
 }
 
-/// Withdraws the setpoint: the target must decelerate as gently as it accelerated.
+/// Checks that a drone whose setpoint is withdrawn decelerates as gently as it accelerated.
 #[test]
 fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -173,7 +173,7 @@ fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     }
 }
 
-/// Checks that after the guard's stopping time a drone moves less than 0.5 m. It does not move away from its setpoint.
+/// Checks that a drone flies on by less than 0.5 m after the stopping time that its guard assumes.
 #[test]
 fn a_drone_has_stopped_after_the_stopping_time() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -199,7 +199,8 @@ fn a_drone_has_stopped_after_the_stopping_time() {
     }
 }
 
-/// Checks that a restarted companion that finds OFFBOARD granted, or a failsafe, changes neither.
+/// Checks that a restarted companion takes over no drone that is in OFFBOARD, GUIDED or a failsafe. The pilot must
+/// choose another mode first.
 #[test]
 fn a_restarted_companion_engages_nothing_that_it_finds() {
     for (kind, away_ms) in [
@@ -235,7 +236,7 @@ fn a_restarted_companion_engages_nothing_that_it_finds() {
     }
 }
 
-/// Checks a GPS outage of 30 s: the PX4 lands and does not resume.
+/// Checks a GPS outage of 30 s: the PX4 lands, and does not return to OFFBOARD afterwards.
 #[test]
 fn a_px4_whose_gps_is_back_resumes_nothing() {
     let mut rig = Rig::new(Kind::Px4);
@@ -251,7 +252,8 @@ fn a_px4_whose_gps_is_back_resumes_nothing() {
     assert!(rig.events.iter().any(failsafe), "{:?}", rig.events);
 }
 
-/// Checks clocks that are 1 % slow or lose 1.5 s: the link is blind for seconds at most.
+/// Checks an autopilot clock that is 1 % slow or loses 1.5 s. The autopilot link has no valid position then, but for
+/// seconds at most.
 #[test]
 fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -293,7 +295,7 @@ fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
     }
 }
 
-/// Checks a simulator that pauses for 1.5 s, as on a loaded machine, and loses that time for good.
+/// Checks that setpoint control continues if the simulator pauses for 1.5 s and loses that time.
 #[test]
 fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
     for echoes in [true, false] {
@@ -323,7 +325,7 @@ fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
     }
 }
 
-/// Checks the number of requests in ten minutes of flight.
+/// Checks that messages that never arrive are requested only a few times in ten minutes of flight.
 #[test]
 fn messages_that_never_come_are_not_requested_for_ever() {
     for (kind, most) in [(Kind::Px4, 2), (Kind::ArduCopter, 9)] {
@@ -359,7 +361,7 @@ fn a_fence_that_a_moving_target_leaves_is_named() {
     assert_eq!(rig.says("relay: released, returns (RTL): fence"), 1);
 }
 
-/// Checks a drone given back at full speed: it overshoots and is led on from there.
+/// Checks a drone whose pilot hands over at full speed: it overshoots, stops, and flies on from there.
 #[test]
 fn a_drone_that_is_given_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -382,7 +384,7 @@ fn a_drone_that_is_given_back_at_full_speed_stops() {
     }
 }
 
-/// Checks positions that are half a second older than reported. The drone arrives within the speed limit.
+/// Checks that positions half a second older than stated do not make the drone exceed its speed limit.
 #[test]
 fn late_positions_do_no_harm_to_the_flight() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -401,7 +403,8 @@ fn late_positions_do_no_harm_to_the_flight() {
     }
 }
 
-/// Checks a drone that drifts while the link is blind: it is led on from its new position.
+/// Checks a drone that drifts while the autopilot link has no position. The next targets begin at the drone's new
+/// position.
 #[test]
 fn a_drone_that_drifts_while_blind_is_led_from_where_it_is() {
     let mut rig = Rig::new(Kind::ArduCopter);

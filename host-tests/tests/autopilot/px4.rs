@@ -5,7 +5,7 @@ use mavlink::dialects::common::MavLandedState;
 use super::vehicle::Mode;
 use super::*;
 
-/// Returns the longest gap between targets from `from` on, ms.
+/// Returns the longest gap between targets that were sent after `from`, ms.
 fn longest_gap(vehicle: &Vehicle, from: Instant) -> u64 {
     let times: Vec<Instant> = vehicle
         .targets_since(from)

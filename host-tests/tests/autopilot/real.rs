@@ -12,17 +12,18 @@ use uav_relay::{Duration, Geodetic, Instant, Placement};
 
 pub(crate) type Point = [f64; 3];
 
-/// Time step of the body, s.
+/// Time step of the simulated airframe, s.
 pub(crate) const STEP_S: f64 = 0.02;
 
-/// Timeout of a PX4's stream, and time of renewed streaming before it resumes.
+/// Time without targets after which a PX4 leaves OFFBOARD. `RESUMES` is the time with targets until it resumes.
 const LOST: Duration = Duration::from_millis(1_000);
 const RESUMES: Duration = Duration::from_millis(1_200);
 
-/// Time in which a companion learns of a failsafe, by the heartbeat or the link's delay.
+/// Longest time until a companion knows of a failsafe, by a heartbeat or by the link's delay.
 const KNOWN_WITHIN: Duration = Duration::from_millis(1_300);
 
-/// Duration of an ArduCopter's velocity without a target, and of its dead reckoning without GPS.
+/// Time for which an ArduCopter keeps a velocity without new targets. `RECKONS` is the time for which it navigates
+/// without GPS.
 const VELOCITY: Duration = Duration::from_millis(3_000);
 const RECKONS: Duration = Duration::from_millis(8_000);
 
@@ -58,7 +59,8 @@ const PX4: Gains = Gains {
     most_m_s2: 5.0,
 };
 
-/// Gains fitted to a flight behind a target of 5 m/s and 1 m/s²: 6.2 m/s and 1.1 m of overshoot.
+/// Gains of the ArduCopter model, fitted to a recorded flight. Behind a target of 5 m/s and 1 m/s² the drone reached
+/// 6.2 m/s and overshot by 1.1 m.
 const ARDUCOPTER: Gains = Gains {
     place: 1.0,
     speed: 0.7,
@@ -105,7 +107,7 @@ impl Body {
     }
 }
 
-/// Received target.
+/// Position and velocity target that the simulated autopilot has received.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SentTarget {
     pub(crate) to: Point,
@@ -122,7 +124,7 @@ pub(crate) struct Real {
     pub(crate) body: Body,
     pub(crate) armed: bool,
     pub(crate) in_air: bool,
-    /// Mode chosen by the pilot, and mode in effect.
+    /// Flight mode that the pilot has chosen; `mode` is the one in effect.
     pub(crate) chosen: Mode,
     pub(crate) mode: Mode,
     pub(crate) is_critical: bool,
@@ -134,27 +136,28 @@ pub(crate) struct Real {
     told: Option<SentTarget>,
     told_at: Option<Instant>,
     stream_since: Instant,
-    /// Holding point in the autopilot's own modes.
+    /// Point at which the drone hovers in the autopilot's own modes.
     hold: Point,
     began: Instant,
     pub(crate) away_until: Option<Instant>,
-    /// Clock error: drift as a fraction, and time lost, µs.
+    /// Fraction by which the autopilot's clock runs slow; `lost_us` is the time that it has lost, µs.
     pub(crate) slow: f64,
     slow_since: Instant,
     pub(crate) lost_us: i64,
     pub(crate) echoes: bool,
-    /// True while no position is sent.
+    /// True while the autopilot sends no positions.
     pub(crate) is_mute_of_positions: bool,
     /// Number of simulation steps by which positions are older than their time stamps.
     pub(crate) hidden_lag: usize,
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,
     sequence: u8,
-    /// Start of the failsafe.
+    /// Time at which the current failsafe began.
     fell_at: Instant,
-    /// Sending time of the newest target.
+    /// Time at which the companion sent the newest target.
     sent_at: Instant,
-    /// Resumptions of OFFBOARD without a pilot, by targets sent after the failsafe was known, and before.
+    /// Number of times that OFFBOARD resumed without the pilot, by targets sent in a known failsafe. `resumed_late`
+    /// counts those by targets that were sent before the failsafe was known.
     pub(crate) resumed: u32,
     pub(crate) resumed_late: u32,
     pub(crate) requests: Vec<u32>,
@@ -258,7 +261,7 @@ impl Real {
         (self.told, self.told_at) = (None, None);
     }
 
-    /// Advances by one step. Returns the bytes sent.
+    /// Advances the simulation by one time step. Returns the bytes that the autopilot sends.
     pub(crate) fn step(&mut self, now: Instant) -> Vec<u8> {
         if self.in_air {
             self.decide(now);
@@ -357,13 +360,13 @@ impl Real {
         }
     }
 
-    /// Applies the sticks: the velocity is reached at once.
+    /// Flies by the pilot's sticks for one step. The drone has the velocity at once, m/s.
     pub(crate) fn push(&mut self, velocity: Point) {
         self.body.fly_at(velocity, &PX4);
         self.hold = self.body.at;
     }
 
-    /// Makes the clock run slow from now on.
+    /// Makes the autopilot's clock run slow by the fraction `slow` from `now` on.
     pub(crate) fn runs_slow(&mut self, now: Instant, slow: f64) {
         self.slow = slow;
         self.slow_since = now;

@@ -14,7 +14,7 @@ use uav_relay::asynch::{AsyncAutopilot, AsyncRelay, Clock};
 use uav_relay::flight::autopilot::Autopilot;
 use uav_relay::{Instant, Settings};
 
-/// Polls per step: enough for a received frame, a turn and a dozen sent frames.
+/// Polls per time step: enough for a received frame, a turn of the loop and a dozen sent frames.
 const POLLS: u32 = 64;
 
 #[derive(Clone)]

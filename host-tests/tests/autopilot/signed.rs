@@ -10,10 +10,10 @@ use super::*;
 pub(crate) const OURS: [u8; 32] = [7; 32];
 pub(crate) const OTHER: [u8; 32] = [8; 32];
 
-/// Year 2026 in time stamp units.
+/// Signing time stamp of the year 2026, in MAVLink's unit of 10 µs.
 const STAMP: u64 = 37_527_840_000_000;
 
-/// Key and signing state of the autopilot.
+/// Signing key of the simulated autopilot, with its time stamps.
 pub(crate) struct Key {
     bytes: [u8; 32],
     /// Signing time stamp at the autopilot's start.
@@ -167,7 +167,7 @@ fn a_clock_that_goes_back_is_told_of_and_not_believed() {
     assert_eq!(vehicle.link.state(), State::Silent);
 }
 
-/// Checks that frames recorded in flight and replayed on the ground do not engage the drone.
+/// Checks that frames recorded in flight and replayed on the ground do not start setpoint control.
 #[test]
 fn what_was_recorded_is_refused() {
     let mut vehicle = keyed(Kind::ArduCopter, Some(OURS), Some(OURS));
@@ -195,7 +195,7 @@ fn what_was_recorded_is_refused() {
     assert_eq!(vehicle.link.refused(), 3);
 }
 
-/// Checks RADIO_STATUS of a SiK radio, which has no key.
+/// Checks that RADIO_STATUS of a SiK radio is accepted unsigned, because the radio has no key.
 #[test]
 fn what_a_radio_says_needs_no_signature() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));

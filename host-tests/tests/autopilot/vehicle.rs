@@ -16,10 +16,10 @@ use crate::signed::Key;
 
 pub(crate) const SYSTEM: u8 = 7;
 
-/// Time step, ms.
+/// Time step of the simulation, ms.
 const STEP_MS: u64 = 20;
 
-/// Speed, m/s.
+/// Flight speed of the simulated vehicle, m/s.
 const SPEED: f32 = 8.0;
 
 pub(crate) const fn place(x_m: f32) -> Placement {
@@ -37,7 +37,7 @@ pub(crate) fn axis() -> Axis {
     Axis::between(sites()).unwrap()
 }
 
-/// Message sent by the link.
+/// Message from the link, as the simulated vehicle decodes it.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) enum Said {
     Heartbeat,
@@ -85,11 +85,11 @@ impl Target {
 /// Flight modes with PX4's and ArduCopter's numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Mode {
-    /// Flown by the pilot's sticks.
+    /// Flight mode: the pilot flies by the sticks.
     Position,
-    /// Flown by the autopilot: hold, mission or return.
+    /// Flight mode: the autopilot holds, flies its mission or returns.
     Hold,
-    /// OFFBOARD or GUIDED.
+    /// Flight mode OFFBOARD (PX4) or GUIDED (ArduCopter): the companion's targets are followed.
     Companion,
 }
 
@@ -107,12 +107,12 @@ pub(crate) struct Vehicle {
     pub(crate) mode: Mode,
     pub(crate) place: Placement,
     pub(crate) setpoint: Option<Placement>,
-    /// Target in effect.
+    /// Target that the vehicle is following.
     goal: Option<Target>,
     pub(crate) mute: bool,
     pub(crate) takes_targets: bool,
     pub(crate) says_targets: bool,
-    /// True if the autopilot answers TIMESYNC.
+    /// True if the autopilot answers TIMESYNC requests.
     pub(crate) echoes: bool,
     /// `MAV_STATE`: 4 for active, 5 for a failsafe.
     pub(crate) status: u8,
@@ -182,7 +182,7 @@ impl Vehicle {
         self.run(2_000);
     }
 
-    /// Chooses the companion mode, as the pilot does.
+    /// Chooses OFFBOARD or GUIDED, as the pilot does.
     pub(crate) fn engage(&mut self) {
         self.mode = Mode::Companion;
         self.run(1_100);
@@ -229,7 +229,7 @@ impl Vehicle {
         }
     }
 
-    /// Runs a firmware's main loop once.
+    /// Runs one turn of a firmware's main loop: sets the setpoint, and collects frames and positions.
     pub(crate) fn drive(&mut self) {
         self.link.handle_setpoint(self.now, self.setpoint);
         if self.link.poll_timeout(self.now) <= self.now {
@@ -241,7 +241,7 @@ impl Vehicle {
         }
     }
 
-    /// Receives the link's frames and events.
+    /// Receives the frames and events of the autopilot link.
     pub(crate) fn answer(&mut self) {
         while let Some(frame) = self.link.poll_transmit(self.now) {
             self.hear(&frame);
@@ -290,7 +290,7 @@ impl Vehicle {
         self.heartbeat_of(SYSTEM, 1, 2, autopilot, self.custom_mode());
     }
 
-    /// Sends a heartbeat given by numbers, which need not be in an enum.
+    /// Sends a heartbeat whose fields are raw numbers, so that undefined values can be sent.
     pub(crate) fn heartbeat_of(
         &mut self,
         system: u8,
@@ -334,7 +334,7 @@ impl Vehicle {
         }));
     }
 
-    /// Reports the target, as an ArduCopter does in its mode and a PX4 does not.
+    /// Reports the current target to the link, as an ArduCopter does in GUIDED and a PX4 does not.
     fn say_target(&mut self) {
         if self.kind == Kind::Px4 || self.mode != Mode::Companion || !self.says_targets {
             return;
@@ -370,7 +370,7 @@ impl Vehicle {
         self.say_from([SYSTEM, 1], message);
     }
 
-    /// Forwards a message of a ground station or of another component.
+    /// Sends the link a message with the address of a ground station or of another component.
     pub(crate) fn say_from(&mut self, [system, component]: [u8; 2], message: &MavMessage) {
         let header = MavHeader {
             system_id: system.into(),

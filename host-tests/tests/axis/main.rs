@@ -7,12 +7,12 @@ use serde::Deserialize;
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
 
-/// Largest permitted error of x and y by the length of the line, m.
+/// Length of a line, and the largest permitted error of x and y on it, both in m.
 const ALLOWED: [(f64, f64); 3] = [(1e3, 1e-3), (1e4, 1e-3), (1e5, 5e-3)];
 
 const LINES: usize = 10_000;
 
-/// Point near a line, and its exact coordinates.
+/// Line between two sites, a point near it, and the exact coordinates of that point.
 #[derive(Deserialize)]
 struct Beside {
     tx_lat: i32,
@@ -43,7 +43,7 @@ impl Beside {
         Axis::try_new(tx, rx).unwrap()
     }
 
-    /// Returns the line by the geodesic library, and its length, m.
+    /// Returns the geodesic line between the sites, and its length in m.
     fn line(&self) -> (Line, f64) {
         let earth = Geodesic::wgs84();
         let [tx_lat, tx_lon, rx_lat, rx_lon] =
@@ -58,7 +58,7 @@ impl Beside {
         (line, length)
     }
 
-    /// Returns the errors of D, x and y beyond f32 rounding, m.
+    /// Returns the errors of the line's length, of x and of y, less the rounding to f32, in m.
     fn off(&self) -> [f64; 3] {
         let axis = self.axis();
         let place = axis.place(ground(self.lat, self.lon)).unwrap();
@@ -72,7 +72,7 @@ impl Beside {
     }
 }
 
-/// Line with a geodesic library: a port of GeographicLib that is fast enough for all lines.
+/// Line computed by a geodesic library: a port of GeographicLib that is fast enough for many lines.
 struct Line {
     earth: Geodesic,
     tx: [f64; 2],
@@ -87,7 +87,7 @@ impl Line {
         [lat, lon, azimuth]
     }
 
-    /// Returns a point's distance along the line and beside it.
+    /// Returns a point's distances along the line and to its side, m. `x` is a first guess of the former.
     fn foot(&self, lat: f64, lon: f64, mut x: f64) -> [f64; 2] {
         let mut y = 0.0;
         for _ in 0..20 {
@@ -149,7 +149,7 @@ fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
     point
 }
 
-/// Compares the crate, and the port of GeographicLib, with the points that GeographicLib computed.
+/// Compares the crate, and the port of GeographicLib, with points computed by GeographicLib itself.
 #[test]
 fn the_points_that_geographiclib_made() {
     let mut reader = csv::Reader::from_reader(&include_bytes!("points.csv")[..]);
@@ -246,7 +246,8 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Largest permitted relative error of a distance. The first number is the distance of points from the line's middle, m.
+/// Distance of a point from the line's middle, m, and the largest permitted relative error. The error is that of the
+/// point's distance from the line.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
 #[test]
@@ -282,7 +283,8 @@ fn distances_agree_with_geodesics() {
     }
 }
 
-/// Checks sites with latitude and longitude swapped, and the other side of the earth.
+/// Checks the distance of a drone that is too far away for coordinates on the line. Examples are swapped latitude and
+/// longitude, and the other side of the earth.
 #[test]
 fn a_point_that_has_no_place_has_a_distance() {
     let site = |lat, lon| Geodetic::from_degrees(lat, lon, 420.0).unwrap();

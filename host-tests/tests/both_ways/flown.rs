@@ -8,7 +8,8 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::scenes::{ENDS, adversarial, in_noise, mission, usual};
 
-/// Checks that the agreement equals, to the bit, the positions computed without messages.
+/// Checks that relays agree on exactly the positions that are computed without messages. The chain carries data in
+/// both directions.
 #[test]
 fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     let mut rng = generator(3306);
@@ -48,7 +49,7 @@ fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     assert!(once >= 55, "{once}");
 }
 
-/// Checks that relays whose ways back differ do not form a chain.
+/// Checks that relays with different settings of the return direction do not form a chain.
 #[test]
 fn relays_with_other_ways_back_do_not_form_a_chain() {
     let mut rng = generator(3307);

@@ -1,6 +1,6 @@
 //! Judge of chains with a way back: a grid search in f64, refined. It shares no code with the crate.
 
-/// Chain of relays at one altitude above the line from Tx (0) to Rx.
+/// Reference chain: relays at one altitude above the line from Tx (x = 0) to Rx.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chain {
     /// Distance from Tx to Rx, m.
@@ -9,24 +9,24 @@ pub(crate) struct Chain {
     pub(crate) powers_w: Vec<f64>,
     /// Altitude of the relays, m.
     pub(crate) altitude_m: f64,
-    /// Power of the interferer, W, its x and its y, m.
+    /// Interferer: its power in W, and its x and y in m.
     pub(crate) interferer: [f64; 3],
-    /// Path-loss factors between drones or drone and ground, and on the ground, 1/m^2.
+    /// Path-loss factors, 1/m^2: of links with a drone at one or both ends, and of links on the ground.
     pub(crate) loss: [f64; 2],
     /// Noise power of every receiver, W.
     pub(crate) noise_w: f64,
-    /// Share of the target that the way back needs, above 0.
+    /// Fraction of the target SIR that suffices for the return direction from Rx to Tx, above 0.
     pub(crate) reverse: f64,
 }
 
-/// Grid points of the first search.
+/// Number of equal intervals in the grid of the first search.
 const GRID: usize = 300;
 
-/// Points of a relay's window in the refinement, odd.
+/// Number of grid points around a relay's position in the refinement; odd, to include the position.
 const WINDOW: usize = 15;
 
 impl Chain {
-    /// Number of relays.
+    /// Returns the number of relays.
     pub(crate) fn relays(&self) -> usize {
         self.powers_w.len() - 2
     }
@@ -43,7 +43,8 @@ impl Chain {
         power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
     }
 
-    /// Returns the smaller of forward SIR and backward SIR / r of the hop to `node` at `to`.
+    /// Returns the hop's value: the smaller of its forward SIR and its backward SIR divided by `reverse`. The hop
+    /// ends at `node`, which is at `to`.
     pub(crate) fn hop(&self, node: usize, from: f64, to: f64) -> f64 {
         let climb = if node == 1 || node > self.relays() {
             self.altitude_m
@@ -56,7 +57,7 @@ impl Chain {
         there.min(back / self.reverse)
     }
 
-    /// Returns the worst hop of relays at `x`.
+    /// Returns the value of the worst hop with relays at `x`.
     pub(crate) fn value(&self, x: &[f64]) -> f64 {
         let mut from = 0.0;
         let mut worst = f64::INFINITY;
@@ -67,7 +68,8 @@ impl Chain {
         worst
     }
 
-    /// Returns the best positions with relay k on one of `grids[k - 1]`, whose points rise.
+    /// Returns the best positions with relay k at a point of `grids[k - 1]`. The points of a grid are in ascending
+    /// order.
     fn best_on(&self, grids: &[Vec<f64>]) -> Vec<f64> {
         let first = grids[0].iter().map(|&x| self.hop(1, 0.0, x));
         let mut best: Vec<f64> = first.collect();
@@ -108,7 +110,7 @@ impl Chain {
         places.map(|(grid, &at)| grid[at]).collect()
     }
 
-    /// Returns the points of the first search: even ones, and dense ones near the interferer and the ends.
+    /// Returns the points of the first search: equidistant ones, and dense ones near interferer and ends.
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
         let mut points: Vec<f64> = (0..=GRID).map(|i| d * i as f64 / GRID as f64).collect();
@@ -124,7 +126,8 @@ impl Chain {
         points
     }
 
-    /// Improves positions: searches windows about all of them, smaller ones when that no longer helps.
+    /// Improves positions by searches in windows around them, which shrink when they no longer help. Returns the
+    /// value and the positions.
     pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let mut x = start.to_vec();
         let mut value = self.value(&x);
@@ -153,7 +156,7 @@ impl Chain {
         (value, x)
     }
 
-    /// Returns the best value found, and its positions.
+    /// Returns the best value that the search finds, and the positions for it.
     pub(crate) fn best(&self) -> (f64, Vec<f64>) {
         let grid = self.grid();
         let start = self.best_on(&vec![grid; self.relays()]);

@@ -8,13 +8,13 @@ use super::judge::Chain;
 
 /// Path-loss factor of free space at 2 GHz.
 pub(crate) const LOS: f64 = 7_020.0;
-/// Path-loss factor on the ground, 20.9 dB more.
+/// Path-loss factor on the ground, 20.9 dB above that of free space.
 pub(crate) const NLOS: f64 = 7_020.0 * 123.0;
 
-/// Powers of Tx and Rx, W.
+/// Powers of Tx and Rx in W: strong, weak, and a strong Tx with a weak Rx.
 pub(crate) const ENDS: [[f64; 2]; 3] = [[80.0, 80.0], [1.0, 1.0], [80.0, 1.0]];
 
-/// Rounds a number to the f32 of relays.
+/// Rounds a number to f32, the precision of the relays.
 pub(crate) fn narrow(value: f64) -> f64 {
     f64::from(value as f32)
 }
@@ -28,7 +28,7 @@ fn carrier_hz() -> f64 {
     299_792_458.0 / (4.0 * std::f64::consts::PI)
 }
 
-/// Returns the mission of a chain.
+/// Returns the mission that describes a reference chain.
 pub(crate) fn mission(chain: &Chain) -> Mission {
     let [power_w, x_m, y_m] = chain.interferer.map(|value| value as f32);
     Mission::try_new(MissionConfig {
@@ -52,7 +52,8 @@ pub(crate) fn mission(chain: &Chain) -> Mission {
     .unwrap()
 }
 
-/// Draws a scene as in the specification of the feature.
+/// Draws a scene as in the specification of two-way chains. `ends` are the powers of Tx and Rx in W, `reverse` is the
+/// fraction for the return direction.
 pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
     let relays = log_uniform(rng, 1.0, 50.99) as usize;
     let mut powers_w = vec![1.0; relays + 2];
@@ -88,7 +89,7 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
     chain
 }
 
-/// Adds noise of 1e-3 to 1e2 of the interference at a random position.
+/// Adds receiver noise to a scene: 1e-3 to 1e2 of the interference at a random position on the line.
 pub(crate) fn in_noise(rng: &mut impl Rng, chain: Chain) -> Chain {
     let place = rng.random_range(0.0..=chain.distance_m);
     let [power_w, x, y] = chain.interferer;

@@ -6,10 +6,10 @@ use host_tests::placing::{generator, places, solve};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, in_noise};
 
-/// Number of scenarios.
+/// Number of random scenarios whose results are hashed.
 const SCENARIOS: u32 = 1_000;
 
-/// FNV-1a of the targets, sweeps and positions of all scenarios.
+/// FNV-1a hash of the target SIRs, numbers of sweeps and positions of all scenarios with one direction.
 const RECORDED: u64 = 0x12dc_53fc_8c0c_d073;
 
 fn add(hash: &mut u64, bits: u32) {

@@ -7,10 +7,10 @@ use crate::flying::Flight;
 use crate::peer::{Heard, Peer, RX, Site, TX, apart_m, between_m, on_earth, text};
 use crate::process::Relay;
 
-/// Question in the event line.
+/// Question in the log line about a drone far from its line.
 const SWAPPED: &str = "are latitude and longitude swapped?";
 
-/// Drone at its place, with a relay that has other sites.
+/// Drone at its position, and a relay that is configured with other sites.
 struct Apart {
     drone: Peer,
     relay: Relay,
@@ -114,7 +114,7 @@ fn an_arducopter_far_from_a_swapped_line_is_told_of() {
     is_off_a_swapped_line("arducopter");
 }
 
-/// Checks sites of another valley, which are not swapped: the report suggests no cause.
+/// Checks that the report of a drone in another valley suggests no cause, as no sites are swapped.
 #[test]
 fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
     let moved = |[lat, lon, amsl]: Site| [lat - 0.1, lon, amsl];
@@ -133,7 +133,7 @@ fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
     assert_eq!(apart.position()["sites_look_swapped"], false);
 }
 
-/// Checks a drone outside the geofence, but near the line: the log reports it, and it may be engaged.
+/// Checks that a drone outside the geofence but near the line is reported, and may be controlled.
 #[test]
 fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
     // 380 m along a line that starts 500 m farther on.

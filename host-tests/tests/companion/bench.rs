@@ -44,7 +44,7 @@ fn block(heading: &str, language: &str) -> String {
     script.unwrap().split("```").next().unwrap().to_owned()
 }
 
-/// Runs the two relays of the page's beginning until both have agreed; a user ends them by Ctrl-C.
+/// Runs the two relays of the page's first example until both have agreed. A user ends them by Ctrl-C.
 #[test]
 fn two_relays_on_one_computer_agree() {
     let script = block("## The companion of a drone", "sh");
@@ -76,7 +76,7 @@ fn two_relays_on_one_computer_agree() {
     assert_eq!(agreed, [true; 2]);
 }
 
-/// Runs the bench twice in one folder: files of the first run must not disturb the second.
+/// Runs the bench script twice in one folder. Files of the first run must not disturb the second.
 #[test]
 fn the_bench_of_the_page_runs_twice() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();

@@ -13,10 +13,10 @@ use crate::medium::QUIET;
 use crate::process::Relay;
 use crate::stays::fill_disk;
 
-/// Sender, destination and counter of a frame.
+/// Frame in a capture: its sender, destination and counter.
 type Seen = (u64, u64, u64);
 
-/// Returns the frames in a capture with their directions. A capture may begin with a partial frame.
+/// Returns the frames in a capture file with their directions. The first frame may be partial.
 fn frames(file: &Path) -> Vec<(String, Seen)> {
     let output = Command::new("cargo")
         .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
@@ -81,7 +81,8 @@ fn a_capture_that_cannot_begin_is_refused() {
     assert!(line.contains("--capture /dev/full: "), "{line}");
 }
 
-/// Checks the middle relay, which has two ports and reports the failure once for both.
+/// Checks that a full disk ends a relay's capture but not its flight. The relay has two ports, and reports the
+/// failure once for both.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     let mut chain = Chain::on_wires(3, QUIET).with("--probe-after-ms 300 --dead-after-ms 900");
@@ -113,7 +114,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
         .for_each(|relay| drop(relay.stopped()));
 }
 
-/// Checks a full disk at a ground station. It reports the end of its capture and still answers relays.
+/// Checks that a full disk ends a ground station's capture, but not its service to the relays.
 #[test]
 fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     let chain = Chain::with_ground(1, QUIET);

@@ -10,13 +10,13 @@ use crate::files::Files;
 use crate::medium::{Medium, Noise, QUIET};
 use crate::process::Relay;
 
-/// Options for a chain that notices a lost relay within seconds.
+/// Options of relays that notice the loss of a neighbour within seconds.
 pub(crate) const QUICK: &str = "--probe-after-ms 500 --dead-after-ms 1500";
 
-/// Bits of x, y, altitude and target.
+/// Agreed position and target SIR of a relay, as the f32 bits of x, y, altitude and target.
 pub(crate) type Place = [u32; 4];
 
-/// Returns the places of all relays of the simulated chain.
+/// Returns the agreed positions of all relays of a simulated chain, to compare the processes with.
 pub(crate) fn simulated(scenario: &Scenario, relays: u16) -> Vec<Place> {
     simulated_by(Method::Align, scenario, relays)
 }
@@ -34,22 +34,22 @@ pub(crate) fn simulated_by(method: Method, scenario: &Scenario, relays: u16) -> 
     ends.collect()
 }
 
-/// Relays 1 to N.
+/// Chain of relay processes under test, with the media between them.
 pub(crate) struct Chain {
-    /// Wires between the relays, or one channel.
+    /// Serial wires between the relays, or one shared channel.
     pub(crate) media: Vec<Medium>,
     is_shared: bool,
-    /// Wire between relay 1 (tty 1) and the transmitter (tty 0).
+    /// Serial wire between relay 1 (tty 1) and the ground station at the transmitter (tty 0).
     pub(crate) tx: Option<Medium>,
     of: usize,
     pub(crate) files: Files,
-    /// Common options of the relays.
+    /// Command-line options of all relays.
     options: String,
     pub(crate) relays: Vec<Relay>,
 }
 
 impl Chain {
-    /// Creates the wires between relays, without relays.
+    /// Creates a chain on serial wires with the given noise. No relay is started yet.
     pub(crate) fn on_wires(of: usize, noise: Noise) -> Self {
         let wire = |index: usize| Noise {
             seed: noise.seed * 100 + u64::try_from(index).unwrap(),
@@ -59,7 +59,7 @@ impl Chain {
         Self::on(media, of, None)
     }
 
-    /// Creates the wires, with one to the transmitter, without relays.
+    /// Creates a chain on serial wires, with one to the transmitter. No relay is started yet.
     pub(crate) fn with_ground(of: usize, noise: Noise) -> Self {
         Self {
             tx: Some(Medium::new(2, noise)),
@@ -67,7 +67,7 @@ impl Chain {
         }
     }
 
-    /// Creates a chain on a shared channel; the first `of` ttys belong to the relays.
+    /// Creates a chain on a shared channel, whose first `of` ttys are the relays'. No relay is started yet.
     pub(crate) fn on_channel(of: usize, channel: Medium) -> Self {
         Self {
             is_shared: true,
@@ -87,25 +87,25 @@ impl Chain {
         }
     }
 
-    /// Sets the common options of relays that are started later.
+    /// Sets the options of all relays that are started later.
     pub(crate) fn with(mut self, options: &str) -> Self {
         self.options = options.into();
         self
     }
 
-    /// Starts relays on quiet wires.
+    /// Starts a chain of relays on serial wires without noise.
     pub(crate) fn start(of: usize, options: &str) -> Self {
         Self::on_wires(of, QUIET).started(options)
     }
 
-    /// Starts all relays with common options.
+    /// Starts all relays with the given options.
     pub(crate) fn started(self, options: &str) -> Self {
         let mut chain = self.with(options);
         chain.relays = (1..=chain.of).map(|index| chain.relay(index, "")).collect();
         chain
     }
 
-    /// Starts relay `index` with the common options and its own.
+    /// Starts relay `index` with the options of all relays and its own.
     pub(crate) fn relay(&self, index: usize, own: &str) -> Relay {
         Relay::start(&self.arguments(index, own))
     }
@@ -133,12 +133,12 @@ impl Chain {
         format!("--index {index} --of {of} {ports} {options} {own}")
     }
 
-    /// Returns the places on which the relays agree first.
+    /// Waits for the first agreement. Returns the position and target of each relay.
     pub(crate) fn settled(&mut self) -> Vec<Place> {
         self.relays.iter_mut().map(Relay::settled).collect()
     }
 
-    /// Waits until the relays have agreed on `places`, possibly after others.
+    /// Waits until the relays have agreed on `places`. Other agreements may come first.
     pub(crate) fn settles_at(&mut self, places: &[Place]) {
         assert!(places.len() >= self.relays.len());
         for (relay, place) in self.relays.iter_mut().zip(places) {
@@ -146,7 +146,7 @@ impl Chain {
         }
     }
 
-    /// Waits until every relay has logged `part`.
+    /// Waits until every relay has logged a line that contains `part`. Returns these lines.
     pub(crate) fn lines(&mut self, part: &str) -> Vec<String> {
         self.relays
             .iter_mut()

@@ -12,7 +12,7 @@ use crate::pty::Pty;
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Two relays without drones, loaded with the distance of [`SITED`].
+/// Chain of two relay processes without drones, which are loaded with the distance of [`SITED`].
 struct Bench(Chain);
 
 impl Bench {
@@ -39,7 +39,7 @@ impl Bench {
         Relay::ground(&self.options(version, more))
     }
 
-    /// Returns x of both relays, m, after the next agreement.
+    /// Waits for the next agreement. Returns the x of both relays, m.
     fn agreed(&mut self) -> [f64; 2] {
         [0, 1].map(|at| {
             let relay = &mut self.0.relays[at];
@@ -50,7 +50,7 @@ impl Bench {
     }
 }
 
-/// Returns the text after `event: ` in each line of that event.
+/// Returns the text after `event: ` in each log line about that event.
 fn said(lines: &[String], event: &str) -> Vec<String> {
     let event = format!("  transmitter  {event}: ");
     let lines = lines.iter();
@@ -135,7 +135,7 @@ fn what_leaves_the_geofence_is_refused_before_it_is_sent() {
     assert!(!bench.0.relays[0].has_said("uploaded: "));
 }
 
-/// Checks a dry run: its exit status is that of the upload.
+/// Checks that a dry run fails with status 1 if the upload would leave the geofence, else succeeds.
 #[test]
 fn a_dry_run_that_leaves_the_geofence_fails() {
     let mut bench = Bench::new();
@@ -157,7 +157,8 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
     assert!(!bench.0.relays[0].has_said("uploaded: "));
 }
 
-/// Checks an upload that starts from the loaded values: all that an earlier upload changed goes back.
+/// Checks `--from-loaded`, which uploads the relays' loaded mission with the given changes. The ground station shows
+/// every earlier change that this upload reverts.
 #[test]
 fn an_upload_from_the_loaded_values_shows_what_goes_back() {
     let mut bench = Bench::new();
@@ -190,7 +191,7 @@ fn an_upload_from_the_loaded_values_shows_what_goes_back() {
     bench.0.lines("adopted: the chain flies version 2");
 }
 
-/// Runs the ground station at a terminal and answers its question. Returns exit status and terminal text.
+/// Runs the ground station at a terminal and answers its question. Returns its exit status and output.
 fn at_a_terminal(options: &str, answer: &str) -> (Option<i32>, String) {
     let terminal = Pty::new();
     let tty = || {

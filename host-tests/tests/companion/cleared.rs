@@ -11,7 +11,7 @@ use crate::medium::{Medium, QUIET};
 use crate::peer::Peer;
 use crate::process::{LIMIT, Relay, bits};
 
-/// Sends a command to the socket. Returns true if it was executed, with the text of the answer.
+/// Sends a command to the status socket. Returns true if it was executed, and the text of the answer.
 fn commanded(socket: impl AsRef<Path>, command: &str) -> (bool, String) {
     let said: Value = serde_json::from_str(&answer(socket, command, false)).unwrap();
     let text = said["text"].as_str().unwrap();
@@ -23,7 +23,7 @@ struct Drones {
     chain: Chain,
     fifos: [String; 3],
     at: [[f32; 3]; 3],
-    /// Log lines of each relay.
+    /// Log lines of each relay so far.
     said: [Vec<String>; 3],
 }
 
@@ -49,7 +49,7 @@ impl Drones {
         self.said[index - 1].iter().any(|line| line.contains(part))
     }
 
-    /// Flies until the condition holds.
+    /// Moves drones 1 and 2 to their setpoints until the condition holds.
     fn fly_until(&mut self, is_so: impl Fn(&Self) -> bool) {
         let end = Instant::now() + LIMIT;
         while !is_so(self) {
@@ -110,7 +110,7 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     assert_eq!(asked(&socket)["relay"]["lost"], json!([]));
 }
 
-/// Checks clients that send nothing, like `nc -U`, or half a command: they are answered at once.
+/// Checks that a client that sends nothing, or half a command, is answered at once.
 #[test]
 fn a_client_that_sends_a_part_of_a_command_is_answered() {
     let files = Files::new();
@@ -125,7 +125,8 @@ fn a_client_that_sends_a_part_of_a_command_is_answered() {
     assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
 
-/// Checks clearing through the neighbour's autopilot, as a ground station does it.
+/// Checks that a MAVLink command through the neighbour's autopilot clears a lost relay. A ground station sends such a
+/// command.
 #[test]
 fn an_operator_clears_a_relay_by_a_mavlink_command() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));

@@ -6,11 +6,11 @@ use crate::files::Files;
 use crate::peer::{Heard, Peer, relay};
 use crate::process::Relay;
 
-/// Free UDP ports of this computer.
+/// Free UDP ports of this computer for an autopilot (`port`) and its companion (`local`).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ports {
     pub(crate) port: u16,
-    /// Port of the companion.
+    /// UDP port of the companion.
     pub(crate) local: u16,
 }
 
@@ -28,7 +28,7 @@ impl Ports {
             .expect("one of ten pairs is free")
     }
 
-    /// Returns a free pair of ports whose second is `apart` above the first.
+    /// Returns a free pair of ports, the companion's `apart` above the autopilot's.
     pub(crate) fn apart(apart: u16) -> Self {
         let mut pairs = (0..100).filter_map(|_| {
             let port = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -48,7 +48,8 @@ impl Ports {
         bound.iter().all(Result::is_ok)
     }
 
-    /// Starts a drone on the ground at the first port; it sends to `partner` until it receives a datagram.
+    /// Starts a drone on the ground at the autopilot's port. It sends to the UDP port `partner` until it receives a
+    /// datagram.
     pub(crate) fn drone(self, partner: u16) -> Peer {
         Peer::autopilot("px4", &format!("udp:{}@{partner}", self.port), 380.0, None)
     }
@@ -62,7 +63,7 @@ fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
     drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == serde_json::json!([7, 191]));
 }
 
-/// Starts a companion three times with one autopilot; the first is killed, the second terminates.
+/// Checks that an autopilot answers a companion that restarts, first after a kill, then after an exit.
 fn is_heard_again(address: &str, ports: Ports) {
     let mut drone = ports.drone(ports.local);
     let mut first = relay(address, "");
@@ -97,7 +98,7 @@ fn a_companion_that_restarts_is_heard_at_its_local_port() {
     is_heard_again(&address, ports);
 }
 
-/// Checks a companion restarted in the air: it finds the autopilot and its mode.
+/// Checks that a companion that restarts in the air finds the autopilot and its flight state.
 #[test]
 fn a_companion_that_restarts_in_the_air_is_heard() {
     let ports = Ports::apart(1_000);
@@ -113,7 +114,7 @@ fn a_companion_that_restarts_in_the_air_is_heard() {
     second.line("autopilot: in the air");
 }
 
-/// Checks an autopilot that closes its port: the refused datagrams do not end the companion.
+/// Checks that refused datagrams, while the autopilot's port is closed, do not end the companion.
 #[test]
 fn an_autopilot_that_restarts_is_found_again() {
     let ports = Ports::apart(1_000);
@@ -134,7 +135,7 @@ fn an_autopilot_that_restarts_is_found_again() {
     relay.stopped();
 }
 
-/// Checks the error line: it names the occupied port and the alternative.
+/// Checks that the error line names the occupied local port and the option to choose another one.
 #[test]
 fn a_local_port_that_cannot_be_had_is_named() {
     let ports = Ports::apart(1_000);

@@ -186,7 +186,7 @@ fn what_the_command_line_says_otherwise_is_said_once() {
     }
 }
 
-/// Returns the reported overrides of a started relay.
+/// Stops a relay. Returns the replaced values of the scenario file that it has logged.
 fn overrides(mut relay: Relay) -> Vec<String> {
     relay.line("unguarded: ");
     let lines = relay.stopped().into_iter();

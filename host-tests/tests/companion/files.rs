@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::process::{LIMIT, wait_until};
 
-/// Folder with the key files `key` and `other`.
+/// Temporary folder of a test, with the key files `key` and `other`.
 pub(crate) struct Files(tempfile::TempDir);
 
 impl Files {
@@ -27,25 +27,25 @@ impl Files {
         self.0.path().join(name)
     }
 
-    /// Returns the path of a file as an option.
+    /// Returns the path of a file as text, for a command-line option.
     pub(crate) fn text(&self, name: &str) -> String {
         self.path(name).to_str().unwrap().to_owned()
     }
 
-    /// Writes a file. Returns its path as an option.
+    /// Writes a file. Returns its path as text, for a command-line option.
     pub(crate) fn write(&self, name: &str, text: impl AsRef<[u8]>) -> String {
         std::fs::write(self.path(name), text).unwrap();
         self.text(name)
     }
 
-    /// Writes a key file that only its owner can read. Returns its path as an option.
+    /// Writes a key file that only its owner can read. Returns its path as text, for an option.
     pub(crate) fn write_key(&self, name: &str, key: &str) -> String {
         let file = self.write(name, key);
         std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
         file
     }
 
-    /// Returns the options for signed frames.
+    /// Returns the options for signed frames: a key file and an epoch file.
     pub(crate) fn signed(&self, key: &str, epoch: &str) -> String {
         format!(
             "--key-file {} --epoch-file {}",
@@ -54,7 +54,7 @@ impl Files {
         )
     }
 
-    /// Creates a FIFO. Returns its path as an option.
+    /// Creates a FIFO. Returns its path as text, for a command-line option.
     pub(crate) fn fifo(&self, name: &str) -> String {
         mkfifoat(CWD, self.path(name), Mode::RUSR | Mode::WUSR).unwrap();
         self.text(name)
@@ -93,7 +93,7 @@ pub(crate) fn asked(socket: impl AsRef<Path>) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
 }
 
-/// Queries the status until the condition holds.
+/// Queries the status of a process until the condition holds. Returns that status.
 pub(crate) fn until(socket: impl AsRef<Path>, is_so: impl Fn(&Value) -> bool) -> Value {
     let mut said = Value::Null;
     wait_until(|| {

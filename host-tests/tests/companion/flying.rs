@@ -12,10 +12,10 @@ pub(crate) const ASKED: [(u64, u64); 3] = [(33, 200_000), (245, 500_000), (87, 5
 /// Take-off position along the line, m: about 20 m from the setpoint.
 const START_M: f64 = 380.0;
 
-/// Time in which a companion that streams targets sends several.
+/// Time in which a companion that streams targets sends several of them.
 const MOMENT: Duration = Duration::from_millis(1_500);
 
-/// Drone, its relay, and the agreed position.
+/// Simulated drone in flight and the relay that controls it.
 pub(crate) struct Flight {
     pub(crate) drone: Peer,
     pub(crate) relay: Relay,
@@ -24,12 +24,12 @@ pub(crate) struct Flight {
 }
 
 impl Flight {
-    /// Starts a drone and a relay with additional options, which has found it on the ground.
+    /// Starts a drone and a relay, and waits until the relay has found the drone on the ground.
     pub(crate) fn found(kind: &str, options: &str) -> Self {
         Self::found_by(kind, None, options)
     }
 
-    /// Starts a drone and a relay that sign with `key`, if any, and find each other.
+    /// Starts a drone and a relay that sign with `key`, if any, and waits until both are in contact.
     fn found_by(kind: &str, key: Option<&str>, options: &str) -> Self {
         let mut flight = Self::started(kind, [key; 2], options);
         if key.is_some() {
@@ -43,7 +43,7 @@ impl Flight {
         flight
     }
 
-    /// Starts a drone with the first key, and a relay with the second key and additional `options`.
+    /// Starts a drone with the first key, and a relay with the second key and more `options`.
     pub(crate) fn started(kind: &str, keys: [Option<&str>; 2], options: &str) -> Self {
         let files = Files::new();
         let link = files.text("tty");
@@ -68,7 +68,8 @@ impl Flight {
             .line("autopilot: in the air, not controlled by the relay");
     }
 
-    /// Chooses the companion's mode as the pilot; a PX4 grants it while targets are streamed.
+    /// Chooses OFFBOARD or GUIDED as the pilot, and waits for setpoint control. A PX4 accepts the mode only while
+    /// targets are streamed.
     pub(crate) fn is_engaged(&mut self) {
         // Before that, the companion has seen no other mode.
         self.relay.line("autopilot: ready");
@@ -81,14 +82,14 @@ impl Flight {
             .hears(|heard| heard.says("relay: engaged, flies to position"));
     }
 
-    /// Waits until the drone is at `place`.
+    /// Waits until the drone is within a metre of `place`, under setpoint control.
     pub(crate) fn arrives(&self, place: Site) {
         let is_there = |heard: &Heard| heard.is_any() && apart_m(heard.own(), place) < 1.0;
         let there = self.drone.hears(is_there);
         assert_eq!(there.mode(), "companion");
     }
 
-    /// Changes the flight mode, as the pilot or a failsafe of the autopilot does.
+    /// Changes the flight mode, as the pilot or a failsafe does, and waits until the relay has noticed.
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay
@@ -107,7 +108,7 @@ impl Flight {
     }
 }
 
-/// Checks the sender's identity: an onboard computer of that drone, not an autopilot.
+/// Checks that the companion's heartbeats are those of an onboard computer, not of an autopilot.
 fn is_an_onboard_computer(drone: &Peer) {
     let from = serde_json::json!([7, 191]);
     let heard = drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == from);
@@ -115,7 +116,7 @@ fn is_an_onboard_computer(drone: &Peer) {
     assert_eq!((kind, autopilot), (&18.into(), &8.into()));
 }
 
-/// Checks that the targets lead from the drone to `place` without a jump.
+/// Checks that successive targets lead from the drone to `place` without a jump.
 fn lead_to(targets: &[Heard], place: Site) {
     let mut before = targets[0].own();
     for target in targets {
@@ -129,7 +130,7 @@ fn lead_to(targets: &[Heard], place: Site) {
     assert!(off < 0.05, "{off} m off");
 }
 
-/// Finds, engages and flies a drone to its agreed position.
+/// Starts a drone and a relay, engages setpoint control, and waits for the agreed position.
 fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     let place = agreed();
     let mut flight = Flight::found_by(kind, key, "");
@@ -164,7 +165,7 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     (flight, place)
 }
 
-/// Reboots the autopilot on the ground: it forgets the requests, and its clock restarts.
+/// Reboots the autopilot on the ground. It forgets the message requests, and its clock restarts.
 fn is_switched_off_and_on(flight: &mut Flight) {
     flight.drone.order("reboot");
     flight.relay.line("autopilot: on the ground, or not armed");
@@ -173,7 +174,7 @@ fn is_switched_off_and_on(flight: &mut Flight) {
     assert!(flight.targets_for(MOMENT).is_empty(), "it is on the ground");
 }
 
-/// Mutes the autopilot for more than 3 s.
+/// Silences the autopilot for more than 3 s, and checks that the relay reports it and sends no targets.
 fn falls_silent(flight: &mut Flight) {
     flight.drone.order("mute");
     flight
@@ -183,7 +184,7 @@ fn falls_silent(flight: &mut Flight) {
     flight.drone.order("speak");
 }
 
-/// Signing key of both.
+/// Signing key of both the autopilot and the companion.
 const KEY: Option<&str> = Some("c0ffee0123456789abcdef00112233445566778899aabbccddeeff0102030405");
 
 #[test]
@@ -233,7 +234,7 @@ fn an_arducopter(key: Option<&str>) {
     is_switched_off_and_on(&mut flight);
 }
 
-/// Checks a place outside the fence: the autopilot refuses the target, and the relay reports it.
+/// Checks that the relay reports an ArduCopter that refuses a target, as outside its fence.
 #[test]
 fn an_arducopter_that_refuses_is_told_of() {
     let mut flight = Flight::found("arducopter", "");

@@ -13,7 +13,7 @@ use crate::process::{Relay, bits};
 
 const LISTENING: &str = "--listen --interferer unknown --listen-every 0.5";
 
-/// Feeds a relay through its FIFO with positions and powers along a pilot's flight.
+/// Checks that a relay finds the interferer from positions and powers that its FIFO delivers.
 #[test]
 fn one_finds_the_interferer_by_its_fifo() {
     let scene = Scene::new(&Scenario::default(), 1).unwrap();
@@ -52,7 +52,7 @@ fn one_finds_the_interferer_by_its_fifo() {
     assert!(!believed.ends_with("0.000e0 W"), "{believed}");
 }
 
-/// Checks that a radio's measurements count in the air, and that the relay moves to measure elsewhere.
+/// Checks that a relay uses a radio's noise measurements in the air. It plans to move, to measure at other positions.
 #[test]
 fn a_radio_on_the_autopilots_link_is_heard() {
     let mut flight = Flight::found("arducopter", LISTENING);

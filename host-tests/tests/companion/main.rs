@@ -45,7 +45,7 @@ use rustix::process::Signal;
 use uav_relay::{Adjust, Method};
 use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario, Source};
 
-/// Returns the default scenario with one other interferer.
+/// Returns the default scenario with one interferer of the given power and position.
 fn with_source(power_w: f64, x_m: f64, y_m: f64) -> Scenario {
     let source = Source { power_w, x_m, y_m };
     Scenario {
@@ -95,7 +95,7 @@ fn every_option_of_the_mission_reaches_the_relays() {
     assert_ne!(expected, simulated(&Scenario::default(), 4));
 }
 
-/// Starts the relays above their best altitudes.
+/// Checks that relay processes choose the altitudes of the simulated chain. They start above their best altitudes.
 #[test]
 fn three_processes_choose_the_altitudes_of_the_simulated_chain() {
     let scenario = Scenario {
@@ -151,7 +151,7 @@ fn the_tty_is_set_to_the_speed_asked_for() {
     }
 }
 
-/// Start of a chain on one kind of media.
+/// Function that creates a chain on serial wires or on a shared channel, with the given noise.
 type Media = fn(Noise) -> Chain;
 
 #[test]

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use crate::pty::{Pty, make_raw};
 
-/// Probability of each fault, per byte.
+/// Noise of a medium: the probability per byte of a loss and of a corruption.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noise {
     pub(crate) loss: f64,
@@ -40,20 +40,20 @@ impl Noise {
     }
 }
 
-/// Numbers of lost and corrupted bytes.
+/// Numbers of bytes that a medium has lost and corrupted.
 #[derive(Debug, Default)]
 struct Counts {
     lost: AtomicU64,
     corrupted: AtomicU64,
 }
 
-/// Decides for bytes that tty `from` has sent: true if the other ttys receive them.
+/// Filter for the bytes that tty `from` has sent: true if the other ttys receive them.
 type Gate = Box<dyn FnMut(usize, &[u8]) -> bool + Send>;
 
-/// Ttys of a medium; `None` for one that is unplugged.
+/// Ttys of a medium; `None` for an unplugged tty.
 type Ttys = Mutex<Vec<Option<Arc<Pty>>>>;
 
-/// Running medium; its ttys vanish when it is dropped.
+/// Running medium, which copies the bytes of each tty to all others. Its ttys vanish when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Medium {
     paths: Vec<PathBuf>,
@@ -61,7 +61,7 @@ pub(crate) struct Medium {
     counts: Arc<Counts>,
     stop: Arc<AtomicBool>,
     pump: Option<JoinHandle<()>>,
-    /// Folder of the names of a pluggable medium.
+    /// Folder with the names of the ttys that can be unplugged.
     _folder: Option<TempDir>,
 }
 
@@ -73,7 +73,7 @@ impl Medium {
         Self::of(paths, ptys, noise, Box::new(|_, _| true), None)
     }
 
-    /// Creates a quiet wire that carries what `gate` lets pass.
+    /// Creates a wire without noise that carries only the bytes that `gate` lets pass.
     pub(crate) fn gated(gate: impl FnMut(usize, &[u8]) -> bool + Send + 'static) -> Self {
         let ptys = [Pty::new(), Pty::new()];
         let paths = ptys.iter().map(|pty| pty.path().to_owned()).collect();
@@ -81,7 +81,7 @@ impl Medium {
         Self::of(paths, ptys.into(), QUIET, Box::new(gate), None)
     }
 
-    /// Creates a quiet medium whose ttys can be unplugged.
+    /// Creates a medium without noise whose ttys can be unplugged.
     pub(crate) fn pluggable(ttys: usize) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let name = |index| folder.path().join(format!("radio{index}"));
@@ -117,13 +117,13 @@ impl Medium {
         self.paths[index].to_str().unwrap()
     }
 
-    /// Unplugs a tty of a pluggable medium, and removes its name.
+    /// Unplugs tty `index` of a pluggable medium, and removes its name.
     pub(crate) fn pull(&self, index: usize) {
         std::fs::remove_file(&self.paths[index]).unwrap();
         self.ptys.lock().unwrap()[index] = None;
     }
 
-    /// Plugs another tty in under the name.
+    /// Plugs a new tty in under the name of tty `index`.
     pub(crate) fn plug(&self, index: usize) {
         let pty = Pty::new();
         make_raw(pty.path().to_str().unwrap());

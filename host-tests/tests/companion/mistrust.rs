@@ -2,11 +2,12 @@
 
 use crate::flying::Flight;
 
-/// Keys as a ground station writes them, one with white space around it.
+/// Signing key, written as a ground station does. `OTHER` is another one with white space around it.
 const ONE: &str = "1111111122222222333333334444444455555555666666667777777788888888";
 const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788888889\n";
 
-/// Checks the reported line, whether the relay finds the autopilot, and that no key is logged.
+/// Checks a drone and a relay with different signing keys, or with only one key. The relay logs the mismatch, does
+/// not use the drone's frames, and never logs a key.
 #[test]
 fn keys_that_do_not_fit_are_told_of_and_nothing_is_heard() {
     let unsigned = "signs its frames and ignores unsigned ones: give --autopilot-key-file";

@@ -8,10 +8,10 @@ use crate::medium::{Medium, QUIET};
 use crate::peer::{Heard, RX, Site, TX, agreed, agreed_toward, apart_m, distance_to_m, text};
 use crate::process::Relay;
 
-/// Site about 200 m beyond the old receiver and to the right, on higher ground.
+/// New site of the receiver, about 200 m beyond the old one and to the right, on higher ground.
 const MOVED: Site = [47.4095, 8.5535, 440.0];
 
-/// Time shorter than the guard's wait for the drone to stop.
+/// Time of observation, shorter than the motion guard waits for the drone to stop.
 const STANDS: Duration = Duration::from_millis(2_500);
 
 #[test]

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use crate::process::Relay;
 
-/// Valid options, to which the entries of [`WRONG`] without `--index` are added.
+/// Valid options of a relay, to which the wrong ones in [`WRONG`] without `--index` are added.
 const GOOD: &str = "--index 2 --of 3 --upstream a --downstream b ";
 
-/// Sites and their distance.
+/// Options with the sites of transmitter and receiver, and their distance.
 const SITES: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795 ";
 
 const WRONG: &[&str] = &[
@@ -90,7 +90,7 @@ const WRONG_AUTOPILOT: &[&str] = &[
     "--speed 5",
 ];
 
-/// Returns each of `cases` with its error line, after `good` options.
+/// Runs a relay with each of `cases` after the `good` options. Returns each case with its error line.
 fn refusals(good: &str, cases: &[&str]) -> String {
     let mut all = String::new();
     for case in cases {
@@ -113,7 +113,7 @@ fn wrong_options_of_an_autopilot_are_named() {
     insta::assert_snapshot!(refusals(&good, WRONG_AUTOPILOT));
 }
 
-/// Checks that the error names a link that cannot be opened.
+/// Checks the error of a start with an autopilot link that cannot be opened: it names the link.
 #[test]
 fn an_autopilot_that_is_not_there_at_the_start_is_a_mistake() {
     for (autopilot, why) in [

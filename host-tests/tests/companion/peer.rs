@@ -14,7 +14,7 @@ use uav_relay::flight::axis::Axis;
 
 use crate::process::{LIMIT, Relay, lines_of};
 
-/// Latitude, longitude, and ground height above mean sea level.
+/// Site on earth: latitude and longitude in degrees, ground height above mean sea level in m.
 pub(crate) type Site = [f64; 3];
 
 pub(crate) const TX: Site = [47.40, 8.54, 420.0];
@@ -25,13 +25,13 @@ pub(crate) fn distance_to_m(rx: Site) -> f64 {
     between_m(TX, rx)
 }
 
-/// Returns the distance of two sites by the library, m.
+/// Returns the distance of two sites as the crate computes it, m.
 pub(crate) fn between_m(tx: Site, rx: Site) -> f64 {
     let [tx, rx] = [tx, rx].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
     Axis::try_new(tx, rx).unwrap().distance_m()
 }
 
-/// Returns the earth coordinates of a point along the line, by geodesics.
+/// Returns the earth coordinates of a point along the line to the receiver, by geodesics.
 pub(crate) fn on_earth(x_m: f64, altitude_m: f64) -> Site {
     toward(RX, x_m, altitude_m)
 }
@@ -58,13 +58,13 @@ pub(crate) fn text(site: Site) -> String {
     site.map(|number| number.to_string()).join(",")
 }
 
-/// Returns the options of a relay between the sites, with its autopilot.
+/// Returns the options of a relay between the two sites that is connected to `autopilot`.
 pub(crate) fn options(autopilot: &str) -> String {
     let (tx, rx, distance) = (text(TX), text(RX), distance_to_m(RX));
     format!("--distance {distance} --site-tx {tx} --site-rx {rx} --autopilot {autopilot}")
 }
 
-/// Starts a single relay.
+/// Starts the only relay of a chain, connected to `autopilot`, with `more` options.
 pub(crate) fn relay(autopilot: &str, more: &str) -> Relay {
     Relay::start(&format!("--index 1 --of 1 {} {more}", options(autopilot)))
 }
@@ -83,7 +83,7 @@ pub(crate) fn agreed_toward(rx: Site) -> Site {
     toward(rx, x_m.into(), altitude_m.into())
 }
 
-/// Running autopilot.
+/// Running script that simulates an autopilot, with its input and output.
 #[derive(Debug)]
 pub(crate) struct Peer {
     child: Child,
@@ -91,7 +91,7 @@ pub(crate) struct Peer {
     lines: Receiver<String>,
 }
 
-/// Received message with its fields.
+/// MAVLink message that the simulated autopilot has received, as JSON fields.
 #[derive(Clone, Debug)]
 pub(crate) struct Heard(pub(crate) Value);
 
@@ -104,7 +104,7 @@ impl Heard {
         self.0["own"].is_object()
     }
 
-    /// Returns the UDP port that the drone sends to.
+    /// Returns the UDP port to which the simulated drone sends.
     pub(crate) fn partner(&self) -> Option<u16> {
         let port = self.0["own"]["partner"][1].as_u64()?;
         u16::try_from(port).ok()
@@ -114,12 +114,12 @@ impl Heard {
         self.is("SET_POSITION_TARGET_GLOBAL_INT")
     }
 
-    /// Returns true for a STATUSTEXT with `text`.
+    /// Returns true if this message is a STATUSTEXT with `text`.
     pub(crate) fn says(&self, text: &str) -> bool {
         self.is("STATUSTEXT") && self.0["text"] == text
     }
 
-    /// Returns the requested message and its interval, µs, of a message request.
+    /// Returns the id and interval in µs of the message that this one requests; `None` if it is no request.
     pub(crate) fn asks_for(&self) -> Option<(u64, u64)> {
         let asks = self.is("COMMAND_LONG") && self.0["command"] == 511;
         let number = |name: &str| self.0[name].as_f64().unwrap() as u64;
@@ -130,7 +130,7 @@ impl Heard {
         self.0["type_mask"].as_u64().unwrap() & 0b11_1000 == 0
     }
 
-    /// Returns the position of a target.
+    /// Returns the position of a target message.
     pub(crate) fn to(&self) -> Site {
         let number = |name: &str| self.0[name].as_f64().unwrap();
         [
@@ -140,13 +140,13 @@ impl Heard {
         ]
     }
 
-    /// Returns the drone's position at reception.
+    /// Returns the drone's own position at the time it received this message.
     pub(crate) fn own(&self) -> Site {
         let at = &self.0["own"]["at"];
         [0, 1, 2].map(|part| at[part].as_f64().unwrap())
     }
 
-    /// Returns true if a target is at a position that the drone has recently reported.
+    /// Returns true if this target message has a position that the drone has recently reported as its own.
     pub(crate) fn is_to_own_place(&self) -> bool {
         let said = self.0["own"]["said"].as_array().unwrap().iter();
         let mut said = said.map(|at| [0, 1, 2].map(|part| at[part].as_f64().unwrap()));
@@ -159,7 +159,7 @@ impl Heard {
 }
 
 impl Peer {
-    /// Runs a script; it is ready when this returns.
+    /// Starts a Python script with its arguments, and waits until it is ready.
     pub(crate) fn start(script: &str, arguments: &[&str]) -> Self {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/companion");
         let mut child = Command::new(python::interpreter())
@@ -178,7 +178,7 @@ impl Peer {
         peer
     }
 
-    /// Runs an autopilot of `kind` at `link`, on the ground at `x_m` along the line.
+    /// Starts an autopilot of `kind` (px4 or arducopter) at `link`, on the ground at `x_m` along the line.
     pub(crate) fn autopilot(kind: &str, link: &str, x_m: f64, more: Option<&str>) -> Self {
         let [lat, lon, amsl] = on_earth(x_m, 0.0).map(|number| number.to_string());
         let mut arguments = vec![kind, link, &lat, &lon, &amsl];
@@ -196,12 +196,12 @@ impl Peer {
         self.order("takeoff");
     }
 
-    /// Waits for the next message that is `wanted`, and ignores all messages before it.
+    /// Waits for the next message for which `wanted` is true, and returns it.
     pub(crate) fn hears(&self, wanted: impl Fn(&Heard) -> bool) -> Heard {
         self.hears_until(wanted).pop().unwrap()
     }
 
-    /// Returns all messages up to and including the next `wanted` message.
+    /// Waits for the next message for which `wanted` is true. Returns all messages up to and with that one.
     pub(crate) fn hears_until(&self, wanted: impl Fn(&Heard) -> bool) -> Vec<Heard> {
         let end = Instant::now() + LIMIT;
         let mut all = Vec::new();
@@ -220,14 +220,14 @@ impl Peer {
         }
     }
 
-    /// Returns the messages that are received during the next `span`.
+    /// Returns the messages that arrive during the next `span`.
     pub(crate) fn hears_for(&self, span: Duration) -> Vec<Heard> {
         self.forget();
         std::thread::sleep(span);
         self.so_far()
     }
 
-    /// Returns the messages received and not yet returned.
+    /// Returns the messages that have arrived and were not returned before.
     pub(crate) fn so_far(&self) -> Vec<Heard> {
         let lines = self.lines.try_iter();
         lines
@@ -239,7 +239,7 @@ impl Peer {
         drop(self.so_far());
     }
 
-    /// Waits until the companion has requested the messages `wanted`, in any order.
+    /// Waits until the companion has requested all of the messages `wanted`: their ids and intervals in µs.
     pub(crate) fn is_asked_for(&self, wanted: &[(u64, u64)]) {
         let mut left = wanted.to_vec();
         while !left.is_empty() {

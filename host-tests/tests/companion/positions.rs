@@ -7,7 +7,8 @@ use crate::files::{Files, write};
 use crate::medium::QUIET;
 use crate::process::{LIMIT, Relay, bits};
 
-/// Checks that first setpoints are the drones' positions, and last ones those of an unguarded chain.
+/// Checks relays that receive their drones' positions. Their first setpoints are these positions, and the last ones
+/// are those of a chain without motion guards.
 #[test]
 fn two_that_know_where_they_are_make_room_for_each_other() {
     let mut free = Chain::start(2, "");

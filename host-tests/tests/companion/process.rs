@@ -23,10 +23,10 @@ pub(crate) struct Relay {
     name: String,
 }
 
-/// Exit status and output of a process.
+/// Exit status and output lines of a process that has ended.
 #[derive(Debug)]
 pub(crate) struct Ended {
-    /// Exit status; `None` after a signal.
+    /// Exit status; `None` if a signal ended the process.
     pub(crate) status: Option<i32>,
     pub(crate) stdout: Vec<String>,
     pub(crate) stderr: Vec<String>,
@@ -45,12 +45,12 @@ pub(crate) fn lines_of(pipe: impl Read + Send + 'static) -> Receiver<String> {
 }
 
 impl Relay {
-    /// Starts a companion with options that are separated by white space.
+    /// Starts a companion process. Its options are separated by white space.
     pub(crate) fn start(options: &str) -> Self {
         Self::run(companion(), &words(options), Stdio::piped())
     }
 
-    /// Starts a ground station.
+    /// Starts a ground station process. Its options are separated by white space.
     pub(crate) fn ground(options: &str) -> Self {
         Self::run(ground(), &words(options), Stdio::piped())
     }
@@ -62,7 +62,7 @@ impl Relay {
         Self::of(&mut command)
     }
 
-    /// Starts a command, with its errors piped.
+    /// Starts a command as a process whose error output is read.
     pub(crate) fn of(command: &mut Command) -> Self {
         let piped = command.stdin(Stdio::null()).stderr(Stdio::piped());
         let mut child = piped.spawn().unwrap();
@@ -107,7 +107,7 @@ impl Relay {
         }
     }
 
-    /// Returns the lines that contain `part` since the last call.
+    /// Returns the new lines since the last call that contain `part`.
     pub(crate) fn lines_with(&mut self, part: &str) -> Vec<String> {
         let lines: Vec<String> = self.lines.try_iter().collect();
         self.seen.extend(lines.iter().cloned());
@@ -117,14 +117,14 @@ impl Relay {
             .collect()
     }
 
-    /// Returns the bits of x, y, altitude and target, once the relay has agreed on them.
+    /// Waits for the agreement. Returns the f32 bits of x, y, altitude and target SIR.
     pub(crate) fn settled(&mut self) -> [u32; 4] {
         let setpoint = bits(&self.line("setpoint: "));
         let target = bits(&self.line("converged: "));
         [setpoint[0], setpoint[1], setpoint[2], target[0]]
     }
 
-    /// Waits until the relay has agreed on these bits of x, y, altitude and target, possibly after others.
+    /// Waits until the relay agrees on these bits of x, y, altitude and target SIR. Other agreements may come first.
     pub(crate) fn settles_at(&mut self, expected: [u32; 4]) {
         let mut place = Vec::new();
         loop {
@@ -149,7 +149,7 @@ impl Relay {
         Pid::from_child(&self.child)
     }
 
-    /// Waits for the exit.
+    /// Waits until the process exits. Returns its exit status and its lines.
     pub(crate) fn end(mut self) -> Ended {
         wait_until(|| self.child.try_wait().unwrap().is_some());
         let status = self.child.wait().unwrap();
@@ -162,13 +162,13 @@ impl Relay {
         }
     }
 
-    /// Terminates the process, which exits with status 0 and without an error. Returns its lines.
+    /// Terminates the process. Checks that it exits with status 0 and without an error. Returns its lines.
     pub(crate) fn stopped(self) -> Vec<String> {
         self.signal(Signal::TERM);
         self.succeeds()
     }
 
-    /// Waits for an exit with status 0 and without an error. Returns the lines.
+    /// Waits for the exit, with status 0 and without an error. Returns the lines of the process.
     pub(crate) fn succeeds(self) -> Vec<String> {
         let name = self.name.clone();
         let ended = self.end();
@@ -180,19 +180,19 @@ impl Relay {
         ended.stdout
     }
 
-    /// Waits for an exit with `status` and one error line, which is returned.
+    /// Waits for the exit, with `status` and one error line. Returns that line.
     pub(crate) fn refused(self, status: i32) -> String {
         self.fails(status).1
     }
 
-    /// Waits for an exit with `status` and one error line, which is returned, before any other line.
+    /// Waits for the exit, with `status`, one error line and no other line. Returns the error line.
     pub(crate) fn refused_at_once(self, status: i32) -> String {
         let (said, error) = self.fails(status);
         assert_eq!(said, [""; 0], "{error}");
         error
     }
 
-    /// Waits for an exit with `status` and one error line. Returns the other lines and that one.
+    /// Waits for the exit, with `status` and one error line. Returns the other lines and the error line.
     pub(crate) fn fails(self, status: i32) -> (Vec<String>, String) {
         let name = self.name.clone();
         let mut ended = self.end();
@@ -250,7 +250,7 @@ pub(crate) fn wait_until(mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// Returns the numbers that a line prints as bits.
+/// Returns the f32 bits that a log line prints in hexadecimal, as `(0x...)`.
 pub(crate) fn bits(line: &str) -> Vec<u32> {
     let mut parts = line.split("(0x");
     parts.next();

@@ -44,7 +44,7 @@ impl Pty {
         tcgetattr(&self.tty).unwrap().output_speed()
     }
 
-    /// Reads bytes that the relay has sent, as many as fit into `buffer`.
+    /// Reads bytes that the relay has sent, as many as fit into `buffer`. Returns the part that was read.
     pub(crate) fn read<'a>(&self, buffer: &'a mut [u8]) -> &'a [u8] {
         match rustix::io::read(&self.wire, &mut *buffer) {
             Ok(count) => &buffer[..count],
@@ -62,7 +62,7 @@ impl Pty {
         }
     }
 
-    /// Fills the relay's output until neither the tty nor the kernel's buffer has room.
+    /// Fills the relay's output until neither the tty nor the kernel's buffer accepts more.
     pub(crate) fn stuff(&self) {
         let mut idle = 0;
         while idle < 10 {

@@ -19,7 +19,8 @@ fn start(chain: &Chain, index: usize, key: &str) -> Relay {
     chain.relay(index, &format!("{QUICK} {signed}"))
 }
 
-/// Checks quiet and noisy wires, and a reboot.
+/// Checks that relays with signed frames agree on the simulated chain's positions. The wires are with and without
+/// noise, and a relay reboots.
 #[test]
 fn three_that_sign_settle_where_the_simulated_chain_does() {
     for noise in [QUIET, Noise::bad(3)] {
@@ -62,7 +63,8 @@ fn one_with_another_key_is_not_heard() {
     );
 }
 
-/// Checks files of no use. An epoch must not be used twice, so one that cannot be stored is refused.
+/// Checks the error lines about useless key and epoch files. An epoch that cannot be stored is refused, because it
+/// must not be used twice.
 #[test]
 fn a_bad_key_or_epoch_is_named() {
     let files = Files::new();
@@ -116,7 +118,7 @@ fn a_bad_key_or_epoch_is_named() {
     }
 }
 
-/// Checks a restart with an older epoch file: the neighbour logs the remedy, which helps.
+/// Checks a restart with an older epoch file: the neighbour logs how to repair this, and that works.
 #[test]
 fn an_epoch_that_goes_back_is_told_of_with_the_remedy() {
     let mut chain = Chain::on_wires(2, QUIET);
@@ -137,7 +139,7 @@ fn an_epoch_that_goes_back_is_told_of_with_the_remedy() {
     assert_eq!(chain.relays[1].settled(), settled[1]);
 }
 
-/// Checks a key file that other users can read, at each program that reads one.
+/// Checks that every program refuses a key file that other users of the computer can read.
 #[test]
 fn a_key_that_others_can_read_is_refused() {
     let files = Files::new();

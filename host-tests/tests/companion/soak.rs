@@ -17,12 +17,12 @@ use crate::medium::Medium;
 use crate::process::{LIMIT, Relay, lines_of, words};
 use crate::stays::fill_disk;
 
-/// Statistics of one relay's status answers.
+/// Statistics of the answers to status queries of one relay.
 #[derive(Debug, Default)]
 struct Seen {
     answers: u64,
     slowest: Duration,
-    /// Number of status answers without a setpoint after the first answer with a setpoint.
+    /// Number of status answers in which the relay has no setpoint.
     placeless: u64,
     failed: u64,
 }
@@ -47,7 +47,7 @@ fn watch(socket: &Path, stop: &AtomicBool) -> Seen {
     seen
 }
 
-/// Returns relay `index`'s own options.
+/// Returns the options with relay `index`'s own files: its status socket and its view file.
 fn files(chain: &Chain, index: usize) -> String {
     let file = |name: &str| chain.files.text(&format!("{name}{index}"));
     format!(
@@ -57,14 +57,15 @@ fn files(chain: &Chain, index: usize) -> String {
     )
 }
 
-/// Returns true if the relay has its setpoint and a lease in a chain of three.
+/// Returns true if a status answer shows a chain of three relays and this one's setpoint and lease.
 fn of_three(said: &Value) -> bool {
     said["relay"]["relays"] == 3
         && said["relay"]["setpoint"].is_object()
         && said["relay"]["has_lease"] == true
 }
 
-/// Runs one round of faults.
+/// Injects one round of faults: an unplugged port, a full disk and log lines that are not read. Waits until the chain
+/// has recovered.
 fn round(channel: &Medium, sockets: &[PathBuf], relays: &mut [Relay; 3]) {
     for relay in &*relays {
         relay.signal(Signal::HUP);

@@ -16,7 +16,7 @@ use crate::files::{Files, asked, until, write};
 use crate::medium::{Medium, QUIET};
 use crate::process::{LIMIT, Relay};
 
-/// Options of relay or station `tty` of three relays and two stations on one channel.
+/// Returns the options of relay or ground station `tty`. Three relays and two stations are on one channel.
 fn common(field: &Chain, tty: usize) -> String {
     let socket = field.files.text(&format!("status{tty}"));
     let signed = field.files.signed("key", &format!("epoch{tty}"));
@@ -43,7 +43,7 @@ fn is_about(said: &Value, expected: f64) -> bool {
         .is_some_and(|said| (said / expected - 1.0).abs() < 1e-3)
 }
 
-/// Returns measurements of relay `relay` at three positions, W.
+/// Returns FIFO lines with three positions of relay `relay` and the interference power there, W.
 fn heard(scene: &Scene, relay: usize) -> String {
     let mut lines = String::new();
     for step in 0..3_u8 {
@@ -58,7 +58,8 @@ fn heard(scene: &Scene, relay: usize) -> String {
     lines
 }
 
-/// Writes a level again and again until the condition holds. A station reads a level only when its file has changed.
+/// Writes an interference power to a file until the condition holds. A ground station reads the file only when it has
+/// changed.
 fn write_until(level: &str, power_w: f64, mut is_so: impl FnMut() -> bool) {
     let end = Instant::now() + LIMIT;
     while !is_so() {
@@ -191,7 +192,7 @@ fn options_of_a_station_that_are_wrong_are_named() {
     }
 }
 
-/// Checks that `linux_ground --stand` uploads a mission, reports the result and goes on.
+/// Checks that `linux_ground --stand` uploads a mission, reports the result and continues to run.
 #[test]
 fn a_station_that_stands_uploads_and_stands_on() {
     let chain = Chain::with_ground(1, QUIET);

@@ -44,7 +44,8 @@ fn a_port_that_vanishes_comes_back_and_the_other_one_goes_on() {
     assert!(again.is_empty(), "once each: {again:?}");
 }
 
-/// Checks a reader that stops (full pipe and queue), one that exits (closed pipe), and `/dev/full`.
+/// Checks that a program continues although its output is not read. Cases are a full pipe and queue, a closed pipe,
+/// and `/dev/full`.
 fn goes_on_where_nobody_reads(program: &Path, options: &str) {
     let (kept, stopped) = std::io::pipe().unwrap();
     let (gone, closed) = std::io::pipe().unwrap();
@@ -113,7 +114,7 @@ fn a_closed_standard_error_is_no_panic() {
     }
 }
 
-/// Checks that clients that do not read, or that send data, do not block the others.
+/// Checks that clients of the status socket that do not read, or that send data, do not block others.
 #[test]
 fn the_socket_answers_one_object_whoever_else_is_stuck() {
     let files = Files::new();
@@ -183,7 +184,7 @@ fn seconds_from_now(text: &str) -> u64 {
     now.abs_diff(then.trim().parse().unwrap())
 }
 
-/// Prevents the growth of any file of that process, as on a full disk, or permits it again.
+/// Keeps all files of process `relay` from growing, as on a full disk, or permits it again.
 pub(crate) fn fill_disk(relay: Pid, full: bool) {
     let limit = Rlimit {
         current: full.then_some(0),
@@ -192,7 +193,7 @@ pub(crate) fn fill_disk(relay: Pid, full: bool) {
     prlimit(Some(relay), Resource::Fsize, limit).unwrap();
 }
 
-/// Starts a relay of two on one channel with a status socket.
+/// Starts relay `index` of two on one channel, with a status socket and `more` options.
 fn of_two(chain: &Chain, index: usize, more: &str) -> Relay {
     let socket = chain.files.text(&format!("status{index}"));
     chain.relay(index, &format!("{QUICK} --status-socket {socket} {more}"))
@@ -233,7 +234,8 @@ fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
     assert_eq!(first.end().status, Some(0));
 }
 
-/// Checks a disk that blocks: the new view file is a FIFO that is not read.
+/// Checks that a blocked disk delays the frames that a relay sends, but nothing else. The new view file is a FIFO
+/// that is not read.
 #[test]
 fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
     let chain = Chain::on_channel(2, Medium::pluggable(2));

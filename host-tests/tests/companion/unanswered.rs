@@ -9,7 +9,7 @@ use crate::peer::relay;
 use crate::process::Relay;
 use crate::pty::Pty;
 
-/// Greatest delay of a line on a busy machine, s.
+/// Greatest delay of a log line on a busy machine, s.
 const LATE_S: f64 = 1.5;
 
 struct Unanswered {
@@ -26,7 +26,7 @@ impl Unanswered {
         Self { relay, files }
     }
 
-    /// Starts a relay with an autopilot at the first of two UDP ports.
+    /// Starts a relay that expects its autopilot at UDP port `ports.port`.
     fn at(ports: Ports) -> Self {
         Self::start(&format!("udp:127.0.0.1:{}", ports.port))
     }
@@ -35,7 +35,7 @@ impl Unanswered {
         self.files.path("status")
     }
 
-    /// Checks that the line comes after 3 s, contains `parts`, and is in the status.
+    /// Checks that the report of no answer comes after 3 s, contains `parts`, and is in the status.
     fn is_said(&mut self, parts: &[&str]) {
         let line = self.relay.line(parts[0]);
         let seconds = seconds(&line);
@@ -50,7 +50,7 @@ impl Unanswered {
         assert_eq!(autopilot["state"], "silent", "{autopilot}");
     }
 
-    /// Checks that no further line comes for 7 s, in which the relay sleeps.
+    /// Checks that the report is not repeated for 7 s, in which the relay is nearly idle.
     fn is_said_once(&mut self) {
         let before = self.relay.cost();
         std::thread::sleep(Duration::from_secs(7));
@@ -64,7 +64,7 @@ impl Unanswered {
     }
 }
 
-/// Returns the time since the start that begins a line.
+/// Returns the time since the start, s, with which a log line begins.
 fn seconds(line: &str) -> f64 {
     line.split_whitespace().nth(1).unwrap().parse().unwrap()
 }
@@ -103,7 +103,8 @@ fn a_udp_port_at_which_nobody_listens_is_said_once() {
     unanswered.relay.stopped();
 }
 
-/// Simulates a PX4 that answers another program.
+/// Checks that a relay reports once that an autopilot at a UDP port does not answer it. A PX4 that answers only
+/// another program behaves so.
 #[test]
 fn a_udp_port_that_does_not_answer_is_said_once() {
     let ports = Ports::apart(1_000);
@@ -130,7 +131,7 @@ fn a_tty_that_does_not_answer_is_said_once() {
     unanswered.is_said_once();
 }
 
-/// Simulates a wrong baud rate, with bytes that are no MAVLink 2.
+/// Checks the report on bytes that are not MAVLink 2, as at a wrong baud rate.
 #[test]
 fn noise_is_told_from_silence() {
     let ports = Ports::apart(1_000);
@@ -147,7 +148,7 @@ fn noise_is_told_from_silence() {
     assert!(!unanswered.relay.has_said("no answer"), "bytes came");
 }
 
-/// Simulates a ground station, radio or plane, which are no autopilots that grant control.
+/// Checks the report on frames of a ground station, a radio or a plane. The companion can control none of them.
 #[test]
 fn others_are_told_from_an_autopilot() {
     let ports = Ports::apart(1_000);

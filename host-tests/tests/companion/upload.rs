@@ -17,14 +17,14 @@ use crate::process::{Relay, wait_until};
 use crate::pty::{Pty, make_raw};
 use crate::with_source;
 
-/// Uploaded change as an option of the ground station.
+/// Change of the mission that the tests upload, as an option of the ground station.
 const NEW: &str = "--new-interferer 80,700,-300";
 
 fn new() -> Scenario {
     with_source(80.0, 700.0, -300.0)
 }
 
-/// Starts relay `index` with an upload file.
+/// Starts relay `index` with a file in which it stores uploads.
 fn relay(chain: &Chain, index: usize, own: &str) -> Relay {
     let signed = chain.files.signed("key", &format!("epoch{index}"));
     let file = chain.files.text(&format!("upload{index}"));
@@ -34,14 +34,15 @@ fn relay(chain: &Chain, index: usize, own: &str) -> Relay {
     )
 }
 
-/// Starts the ground station of two relays, which uploads [`NEW`] as `version`.
+/// Starts the ground station of two relays, which uploads the change [`NEW`] as mission `version`.
 fn ground(files: &Files, version: &str, more: &str) -> Relay {
     let signed = files.signed("key", "ground");
     let upload = format!("--of 2 --yes --version {version} {NEW} {signed}");
     Relay::ground(&format!("{upload} {more}"))
 }
 
-/// Uploads from the transmitter over quiet and noisy wires.
+/// Checks that an upload from the transmitter reaches two relays and survives their restarts. The wires are with and
+/// without noise.
 #[test]
 fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     let (loaded, uploaded) = (simulated(&Scenario::default(), 2), simulated(&new(), 2));
@@ -73,7 +74,8 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     }
 }
 
-/// Uploads from the receiver on one channel; a relay without a file receives the mission again.
+/// Checks an upload from the receiver on one channel. A relay that restarts without an upload file receives the
+/// mission again.
 #[test]
 fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     let uploaded = simulated(&new(), 2);
@@ -101,16 +103,16 @@ fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
     assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
 }
 
-/// State of a wire that is cut by the decision on a view.
+/// State of a wire that a relay's decision on a membership view may cut.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Wire {
     Open,
-    /// The next decision cuts the wire, and is lost.
+    /// State of the wire: the next decision on a membership view cuts it, and is lost.
     Armed,
     Cut,
 }
 
-/// Creates a wire whose tty 1 is that of the relay that decides.
+/// Creates a wire that a decision on a membership view cuts, as `state` says. The relay that decides has tty 1.
 fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     let state = Arc::clone(state);
     let mut deframer = Deframer::new();
@@ -129,7 +131,8 @@ fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     })
 }
 
-/// Cuts the chain after the relay that decides on the view with the upload, the first that flies it.
+/// Checks that the ground station reports one relay on the new mission until all fly it. The wire between relays 2
+/// and 3 is cut as soon as relay 3 has decided on the view with the mission.
 #[test]
 fn the_ground_tells_of_one_relay_that_flies_it_until_all_do() {
     let state = Arc::new(Mutex::new(Wire::Open));
@@ -178,7 +181,7 @@ fn the_ground_tells_of_one_relay_that_flies_it_until_all_do() {
     }
 }
 
-/// Returns a relay's upload file of `config` as version 5, based on the loaded `base`.
+/// Returns the contents of an upload file: `config` as version 5, based on the loaded `base`.
 fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
     let [base, new] = [base, config].map(|scenario| mission::mission(scenario, 1, 1e-4).unwrap().0);
     let upload = Upload::new(&base, 5, *new.config()).unwrap();
@@ -245,7 +248,7 @@ fn the_ground_gives_up_in_time_where_nobody_answers() {
     assert!(line.ends_with("; 0 frames refused"), "{line}");
 }
 
-/// Checks guarded relays at 20 m: an altitude outside their geofence is refused by name.
+/// Checks that relays with a geofence refuse an altitude outside it, and name the permitted range.
 #[test]
 fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
     for (band, altitude, range) in [
@@ -306,7 +309,7 @@ const WRONG: &[&str] = &[
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Wrong options that depend on the mission in flight, which the ground station requests first.
+/// Wrong options that only the mission in flight reveals, which the ground station requests first.
 const UNFIT: &[&str] = &[
     "--new-band 30,300",
     "--new-min-separation 1001",

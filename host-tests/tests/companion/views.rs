@@ -12,12 +12,12 @@ use crate::chain::{Chain, QUICK, simulated};
 use crate::medium::{Medium, QUIET};
 use crate::process::Relay;
 
-/// Returns a chain of three on one channel that is quick to notice a loss.
+/// Returns a chain of three relays on one channel that notices the loss of a relay quickly.
 fn channel() -> Chain {
     Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK)
 }
 
-/// Starts relay `index` with a file for its votes.
+/// Starts relay `index` with a file for its votes on views (membership changes).
 fn start(chain: &Chain, index: usize) -> Relay {
     let file = chain.files.text(&format!("views{index}"));
     chain.relay(index, &format!("--view-file {file}"))
@@ -36,7 +36,7 @@ fn store(file: &Path, record: &ViewRecord) -> Vec<u8> {
     bytes
 }
 
-/// Returns the record of a relay; `None` if it has never voted.
+/// Returns the stored voting record of a relay; `None` if it has never voted.
 fn stored(chain: &Chain, index: usize) -> Option<ViewRecord> {
     let bytes = std::fs::read(chain.files.path(&format!("views{index}"))).ok()?;
     Some(ViewRecord::from_bytes(&bytes[..ViewRecord::LENGTH]).unwrap())
@@ -44,7 +44,8 @@ fn stored(chain: &Chain, index: usize) -> Option<ViewRecord> {
 
 const STANDS_BY: &str = "restored: this relay's earlier votes on views were read from --view-file; remove that file before another flight";
 
-/// Kills all relays in a view of two; restarted, three fly, and no view number is used twice.
+/// Checks that relays killed in a view (membership) of two and restarted form a chain of three. No view number is
+/// used twice.
 #[test]
 fn three_that_are_started_again_stand_by_what_they_said() {
     let expected = simulated(&Scenario::default(), 3);
@@ -76,7 +77,7 @@ fn three_that_are_started_again_stand_by_what_they_said() {
     }
 }
 
-/// Exit status after which the unit does not restart the companion.
+/// Exit status after which systemd does not restart the companion.
 const NOT_RETRIED: i32 = 2;
 
 #[test]
@@ -86,7 +87,8 @@ fn the_unit_does_not_retry_what_a_restart_cannot_mend() {
     assert!(unit.lines().any(|line| line == setting), "{unit}");
 }
 
-/// Checks two of three relays, a quorum of the loaded chain, but not of a stored view without them.
+/// Checks that two of three relays do not fly if their stored membership view does not include them. Without that
+/// view they would have a quorum.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly() {
     let mut chain = channel();

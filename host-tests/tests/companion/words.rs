@@ -55,7 +55,7 @@ fn a_port_that_cannot_be_opened_says_why() {
     }
 }
 
-/// Starts two relays on one wire that differ in one option.
+/// Checks the log line about refused frames, for two relays on one wire that differ in one option.
 #[test]
 fn frames_that_are_refused_say_why() {
     let files = Files::new();
@@ -83,7 +83,7 @@ fn frames_that_are_refused_say_why() {
     }
 }
 
-/// Checks that an upload over `tty` fails with the most likely reason.
+/// Checks that an upload over `tty` fails with an error line that contains the likely reason `why`.
 fn upload_fails(files: &Files, tty: &str, key: &str, more: &str, why: &str) {
     let signed = files.signed(key, "ground");
     let upload = format!("--tty {tty} --end tx --version 3 --yes --timeout 8 {signed}");
@@ -95,7 +95,8 @@ fn upload_fails(files: &Files, tty: &str, key: &str, more: &str, why: &str) {
 
 const QUICK: &str = "--probe-after-ms 300 --dead-after-ms 900";
 
-/// Checks reasons on a wire, where relays do not answer strangers and only their logs have the reason.
+/// Checks the likely reasons that a ground station on a wire gives for a failed upload. Relays do not answer
+/// strangers there, so that only the relays' logs have the true reason.
 #[test]
 fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
     let chain = Chain::with_ground(1, QUIET).with(QUICK);
@@ -125,7 +126,8 @@ fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
     assert!(relay.line("rejected: ").contains("have a wrong tag"));
 }
 
-/// Checks the reasons on a channel, where the ground station receives the relays' frames.
+/// Checks the likely reasons that a ground station on a shared channel gives for a failed upload. It receives the
+/// frames of all relays there.
 #[test]
 fn on_a_channel_the_ground_says_what_most_likely_is_wrong() {
     let chain = Chain::on_channel(2, Medium::new(3, QUIET)).with(QUICK);

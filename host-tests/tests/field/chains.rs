@@ -8,10 +8,11 @@ use uav_relay_oracle::reference::{Link, Station};
 
 use super::off;
 
-/// Upsilon of the program's chains, 1/W: 0.8 of `p_u` U / (eta h^2) with the paper's channel and 20 m.
+/// Upsilon = E[1/I] of the chains that a separate program computed, 1/W. It is 0.8 of `p_u` U / (eta h^2) with the
+/// paper's channel and h = 20 m.
 const UPSILON: f64 = 2_301_379.773_574_951;
 
-/// Returns the paper's multi-hop scenario under constant interference.
+/// Returns the paper's multi-hop scenario with constant interference along the line.
 fn paper(n: usize) -> StochasticLink {
     let link = Link::paper(n);
     StochasticLink {
@@ -24,7 +25,8 @@ fn paper(n: usize) -> StochasticLink {
     }
 }
 
-/// Returns one relay at 10 m on 100 m, 10 W against 1 W, all path-loss factors 1.
+/// Returns a chain of one relay at 10 m altitude over a line of 100 m. Tx has 10 W, the relay 1 W, and all path-loss
+/// factors are 1.
 fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
     StochasticLink {
         distance_m: 100.0,
@@ -39,7 +41,7 @@ fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
     }
 }
 
-/// Checks positions from `first` on, `step` apart.
+/// Checks that positions have equal distances: they begin at `first` and are `step` apart.
 fn evenly(got: &[f64], first: f64, step: f64) {
     for (k, got) in (0..).zip(got) {
         let want = first + step * f64::from(k);
@@ -112,7 +114,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
     assert!(off(link.backward_best(2000), optimum) < 1e-3);
 }
 
-/// Draws a chain of identical relays under constant interference.
+/// Draws a chain of identical relays with constant interference along the line.
 fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
     let distance_m = log_uniform(rng, 10.0, 1e5);
     let station = Station {

@@ -5,7 +5,7 @@ use uav_relay_oracle::reference::stochastic::upsilon_by_mgf;
 
 use super::off;
 
-/// Returns E[exp(-y u)] of a Beta distribution, by the trapezoidal rule in the logit of u.
+/// Returns E[exp(-y u)] for a Beta-distributed u, by the trapezoidal rule in the logit of u.
 fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     const STEP: f64 = 0.125;
     // The peak is at most 4 wide where both shapes are large.
@@ -29,7 +29,8 @@ fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     with / without
 }
 
-/// Returns E[exp(-y u)] of a Beta distribution by the series e^-y 1F1(beta; alpha + beta; y), y to 500.
+/// Returns E[exp(-y u)] for a Beta-distributed u, by the series e^-y 1F1(beta; alpha + beta; y). It is accurate for y
+/// up to 500.
 fn beta_mgf_series(alpha: f64, beta: f64, y: f64) -> f64 {
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 0..3_000 {
@@ -69,7 +70,7 @@ fn upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf() {
     assert!(worst < 1e-12);
 }
 
-/// Checks the integral against distributions with known E[1/I].
+/// Checks the integral for Upsilon = E[1/I] against distributions with a known E[1/I].
 #[test]
 fn the_integral_finds_what_is_known_of_other_distributions() {
     let constant = |level: f64| upsilon_by_mgf(move |t| (t * level).exp()).unwrap();

@@ -13,10 +13,10 @@ const SEEDS: u64 = 100;
 
 const I_MAX_W: f32 = 3.476_175_5e-7;
 
-/// Results of one pair of shapes.
+/// Statistics of the estimates of Upsilon, the mean inverse interference, for one pair of Beta shapes.
 #[derive(Default, Debug)]
 struct Found {
-    /// Number of estimates.
+    /// Number of estimates that could be made.
     made: u32,
     /// Number of estimates within 5 % of the truth.
     close: u32,
@@ -37,7 +37,7 @@ fn estimate(alpha: f64, beta: f64, samples: u32, seed: u64) -> Option<Estimate> 
     estimator.estimate()
 }
 
-/// Estimates from `samples` samples each, in [`SEEDS`] seeds.
+/// Returns statistics of estimates from `samples` samples each, one for each of [`SEEDS`] seeds.
 fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> Found {
     let truth = FieldPoint::beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);
     let mut found = Found::default();
@@ -66,7 +66,7 @@ fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> Found {
     found
 }
 
-/// Returns each alpha with a small, a medium and a large beta.
+/// Returns pairs of Beta shapes: each alpha with a small, a medium and a large beta.
 fn grid(alphas: [f64; 3]) -> [(f64, f64); 9] {
     std::array::from_fn(|k| (alphas[k / 3], [0.5, 3.0, 20.0][k % 3]))
 }

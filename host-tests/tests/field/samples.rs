@@ -81,7 +81,8 @@ fn no_estimate_without_enough_samples_or_spread() {
     assert_eq!(scaled(0.8e-12), None);
 }
 
-/// Returns the estimate of Upsilon from random powers with mean `mean_w`; `I_max` is 1e-6 W.
+/// Returns the estimate of Upsilon = E[1/I] from powers around `mean_w`. The largest permitted power, `I_max`, is
+/// 1e-6 W.
 fn scaled(mean_w: f32) -> Option<Estimate> {
     let mut estimator = Estimator::new(1e-6);
     for k in 0..1_000_u16 {
@@ -112,7 +113,7 @@ fn a_bound_that_is_none_takes_no_sample() {
     }
 }
 
-/// Checks a million samples around one value, where f32 sums would stagnate or cancel.
+/// Checks the estimate from two million samples around one value, where f32 sums would lose accuracy.
 #[test]
 fn many_samples_close_together_lose_nothing() {
     let mut estimator = Estimator::new(1.0);
@@ -139,7 +140,7 @@ fn config(cases: u32) -> Config {
     }
 }
 
-/// Draws powers of every kind: any bits, and some close to the limits.
+/// Draws sample powers of every kind: any f32 bits, and values close to the limits.
 fn powers() -> impl Strategy<Value = f32> {
     prop_oneof![
         any::<u32>().prop_map(f32::from_bits),

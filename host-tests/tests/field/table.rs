@@ -11,7 +11,7 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Table as in a firmware, with one point from a closed form.
+/// Table of the mean inverse interference Upsilon in a firmware, with one point from a closed form.
 const POINTS: [FieldPoint; 3] = [
     at(0.0, 4.0),
     match FieldPoint::from_beta(100.0, 2.0, 2.0, 1.5) {

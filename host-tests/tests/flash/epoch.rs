@@ -36,7 +36,7 @@ fn after_the_last_epoch_there_is_none() {
     assert_eq!(start(&mut Ram::blank(7 * ENTRY, 1), u32::MAX), None);
 }
 
-/// Checks power failures at any moment, also during an erase or a word: no used epoch comes again.
+/// Checks that no used epoch comes again, whatever moment the power fails, even during an erase.
 #[test]
 fn no_epoch_comes_twice_whenever_power_fails() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(31));
@@ -63,7 +63,7 @@ fn no_epoch_comes_twice_whenever_power_fails() {
     assert!(failures > 1_000);
 }
 
-/// Checks that a flash that cannot be written does not reset the epoch.
+/// Checks that a flash that cannot be written does not set the epoch back.
 #[test]
 fn a_write_that_fails_never_puts_the_epoch_back() {
     for worn in 0..=5 {

@@ -47,7 +47,7 @@ fn records_fill_both_sectors_and_the_newest_counts() {
     assert_eq!(newest(&mut flash), Some(entry(12)));
 }
 
-/// Checks that the newest record's sector is never erased, and that each erase frees a full sector.
+/// Checks that a full journal erases the sector without the newest record, and so frees a full sector.
 #[test]
 fn a_full_log_goes_on_in_the_sector_with_the_older_records() {
     let mut flash = Ram::blank(4 * RECORD, 1);
@@ -106,7 +106,8 @@ fn a_place_that_is_worn_is_passed_over() {
     assert!(!log(&mut none).keep(&entry(1), WhenFull::Erase));
 }
 
-/// Checks power failures during an erase, record or word: stored records stay, and no others appear.
+/// Checks that a power failure at any moment neither loses stored records nor creates others. It may happen during an
+/// erase, a record or a word.
 #[test]
 fn nothing_is_lost_whenever_power_fails() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(37));

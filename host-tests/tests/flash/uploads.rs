@@ -7,7 +7,7 @@ use uav_relay::Upload;
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
 
-/// Words in a sector of 128 KiB.
+/// Number of 32-bit words in a flash sector of 128 KiB.
 const SECTOR: usize = 32 * 1024;
 
 fn version(number: u16) -> Upload {

@@ -6,7 +6,7 @@ use host_tests::firmware::views::{SECTORS, WORDS, kept, record};
 use host_tests::fixtures::voted;
 use uav_relay::ViewRecord;
 
-/// Words in a sector of 16 KiB.
+/// Number of 32-bit words in a flash sector of 16 KiB.
 const SECTOR: usize = 4 * 1024;
 
 fn found(log: &mut Journal<&mut Ram>) -> Option<ViewRecord> {
@@ -30,7 +30,8 @@ fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
     assert_eq!(found(&mut start), Some(voted(7, 5, 1_000, true)));
 }
 
-/// Checks a power failure during a record: the record before is valid, and the new vote was not sent.
+/// Checks a power failure while a vote is recorded. The previous record stays valid, because the new vote was not
+/// sent.
 #[test]
 fn of_a_record_that_is_torn_the_one_before_holds() {
     for written in 1..WORDS + AROUND {

@@ -25,7 +25,8 @@ pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink 
     }
 }
 
-/// Draws identical relays in a field of one to twelve points, Upsilon within a factor of up to 300.
+/// Draws identical relays in a field of interference. The mean inverse interference, Upsilon, has one to twelve
+/// points within a factor of up to 300.
 fn random_field(rng: &mut impl Rng) -> StochasticLink {
     let d = round(log_uniform(rng, 10.0, 1e5));
     let points = rng.random_range(1..=12);
@@ -47,7 +48,8 @@ fn random_field(rng: &mut impl Rng) -> StochasticLink {
     link
 }
 
-/// Returns the fewest relays on a grid, with hops up to `longer` grid steps too long. 0 if more than `most`.
+/// Returns the fewest relays that meet `target` from positions on a grid; 0 if more than `most`. Hops may be `longer`
+/// grid steps longer than `target` permits.
 fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> usize {
     const STEPS: usize = 4000;
     let (d, relay) = (link.distance_m, link.relays[0]);
@@ -151,7 +153,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
     assert!(same > 300 && none > 20 && fewer > 10 && largest > 30);
 }
 
-/// Checks the best target of N identical relays against the closed form and Algorithm 4.
+/// Checks the best target SIR of N identical relays against the closed form and Algorithm 4.
 #[test]
 fn the_best_of_equals_in_a_field() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));
@@ -194,7 +196,8 @@ fn the_best_of_equals_in_a_field() {
     assert!(above > 5);
 }
 
-/// Checks that relays with own powers in a field use Algorithm 4 and are not called proven.
+/// Checks that the number of relays with different powers in a field is not called proven. It is found by Algorithm
+/// 4.
 #[test]
 fn what_differs_in_a_field_is_not_proven() {
     let link = field(1000.0, 20.0, vec![(0.0, 3e6), (1000.0, 5e6)]);

@@ -11,14 +11,15 @@ use uav_relay_oracle::reference::Link;
 
 use super::{ROUNDING, chain, round};
 
-/// Returns the mission of `link` and its relays' profiles by index. Further relays are like the last one.
+/// Returns the mission of `link`, and its relays' profiles by index. Relays beyond the last one have the common
+/// profile.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
     let of = move |index: u16| profile_of(&mission, &own, index);
     (mission, of)
 }
 
-/// Returns `link` with `relays` relays, padded with the common profile.
+/// Returns `link` with `relays` relays. Additional relays are like the first one.
 fn with(link: &Link, relays: usize) -> Link {
     let mut link = link.clone();
     let common = link.relays[0];
@@ -26,7 +27,7 @@ fn with(link: &Link, relays: usize) -> Link {
     link
 }
 
-/// Returns the fewest relays that meet `target` in f64, by trying each number. 0 if `most` are not enough.
+/// Returns the fewest relays that meet `target`, by trying each number in f64; 0 if more than `most`.
 fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
     let all = with(link, most);
     let mut from = 0.0;
@@ -48,7 +49,8 @@ fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
     last.sir_rx(x).unwrap()
 }
 
-/// Draws a target that one to several dozen relays meet, as a fraction of the outer hops' maximum SIR.
+/// Draws a target SIR that needs one to several dozen relays. It is a fraction of the most that the first and the
+/// last hop permit.
 fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
     let d = link.distance_m;
     let first = (0..200)
@@ -167,7 +169,8 @@ fn with_a_separation_what_is_proven_is_the_fewest() {
     assert!(proven > 500 && none > 100);
 }
 
-/// Checks that the maximum is met and no number of relays meets a slightly higher target.
+/// Checks the highest target SIR of any number of relays: it is met, and a slightly higher one is not. The second
+/// claim holds only without a least separation.
 #[test]
 fn the_most_is_what_no_number_of_relays_exceeds() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(603));

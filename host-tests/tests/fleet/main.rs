@@ -7,14 +7,15 @@ mod known;
 use host_tests::placing::xs;
 use uav_relay::{Mission, Placement, Profile};
 
-/// Relative loss of a target by f32 rounding: half a step of x is 6e-8 D, over an altitude of 0.002 D.
+/// Relative loss of a target SIR because positions are rounded to f32. Half a rounding step of x is 6e-8 D, compared
+/// with an altitude of 0.002 D.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
 pub(crate) fn round(value: f64) -> f64 {
     f64::from(value as f32)
 }
 
-/// Returns the positions along Tx-Rx, m, of `relays` relays that meet `target`.
+/// Returns x, m along the line from Tx to Rx, of `relays` relays that meet the SIR `target`.
 pub(crate) fn chain(
     mission: &Mission,
     relays: u16,

@@ -26,11 +26,11 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use super::*;
 
-/// Position error configured in the guard, m.
+/// Position error configured in the motion guard, m.
 const ERROR_M: f64 = 2.0;
 const NOISE_M: f64 = 0.3;
 
-/// End of the events, and end of the flight, s.
+/// Time of the last random event, s. The flight ends at `ENDS_S`.
 const EVENTS_S: u64 = 180;
 const ENDS_S: u64 = 420;
 
@@ -64,7 +64,7 @@ fn starts(rng: &mut ChaCha8Rng, tame: bool) -> Vec<Point> {
     starts
 }
 
-/// Draws an upload that turns the line.
+/// Draws a mission upload whose sites turn the line from Tx to Rx by up to 80 degrees.
 fn turned(rng: &mut ChaCha8Rng, setup: &Setup, axis: &Axis) -> UploadSpec {
     let config = *setup.mission.config();
     let angle = rng.random_range(-80.0_f64..=80.0).to_radians();
@@ -162,7 +162,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns true if the order of the drones is always certain, so that all must arrive.
+/// Returns true if the drones' order along the line is always certain, so that all must arrive.
 fn is_orderly(setup: &Setup) -> bool {
     let Some(spec) = &setup.fleet else {
         return false;

@@ -11,14 +11,15 @@ fn ends(outcome: &Outcome) -> Vec<f32> {
     places.map(|place| place.x_m).collect()
 }
 
-/// Returns the final setpoints without any events, x in m.
+/// Returns the final setpoints of the same chain without faults, x in m.
 fn undisturbed(setup: &Setup) -> Vec<f32> {
     let mut clean = Setup::new(setup.mission);
     clean.seed = 1;
     ends(&run(clean).unwrap())
 }
 
-/// Checks a relay that returns after its neighbours have closed up as far as its silent drone permits.
+/// Checks that a relay that was off returns to its position although its neighbours have closed up. They close up
+/// only as far as its silent drone permits.
 #[test]
 fn a_relay_that_returns_between_two_others_gets_its_place() {
     for silent in 1..=8 {
@@ -46,7 +47,7 @@ fn a_relay_that_returns_between_two_others_gets_its_place() {
     }
 }
 
-/// Checks two neighbours in each other's position. All drones stay, because others do not know of the swap.
+/// Checks that all drones stay while two neighbours are in each other's position. The others do not know of the swap.
 #[test]
 fn while_two_are_in_the_wrong_order_all_stay() {
     for first in 0..7 {

@@ -15,7 +15,8 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
     places.collect()
 }
 
-/// Flies 200 random scenes with lateral room. Counts failures and the scenes with neighbours closer along x.
+/// Checks that drones reach agreed positions closer along x than the least separation. It flies the chains with such
+/// positions among 200 random scenes.
 #[test]
 fn drones_get_to_places_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));

@@ -5,17 +5,19 @@ use uav_relay_sim::simulator::chain::run;
 
 use super::*;
 
-/// Time limit from the last repair until all relays are in one view, s.
+/// Longest time from the last repair of the chain until all relays are in one membership view, s.
 const SOON_S: f64 = 120.0;
 
-/// Returns all pairs of cuts, of relays 1 to `.0` and then 1 to `.1`; the first heals first.
+/// Returns all pairs of cuts of the chain. A cut is the number of the relay behind which the chain is separated, and
+/// the first cut of a pair heals first.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {
     (1..8)
         .flat_map(|first| (1..8).map(move |second| (first, second)))
         .filter(|(first, second)| first != second)
 }
 
-/// Flies every pair of cuts at each set of times: start, end, start, end, s. In the last one they heal a second apart.
+/// Checks that all relays are in one membership view soon after two overlapping cuts of the chain. Times are start,
+/// end, start, end, s; in the last set the cuts heal a second apart.
 #[test]
 fn all_are_in_one_view_soon_after_two_cuts() {
     let all = [

@@ -15,13 +15,13 @@ const NOISE_M: f64 = 0.3;
 /// Largest standard deviation of gusts, m/s.
 const GUST_MPS: f64 = 0.3;
 
-/// Position error configured in the guard, m: noise, gusts and overshoot.
+/// Position error configured in the motion guard, m: noise, gusts and overshoot.
 const HOVER_M: f64 = 1.5;
 
-/// Permitted shortfall of the separation, m: bias and hovering error of both drones.
+/// Permitted shortfall of the least separation, m: bias and hovering error of both drones.
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
-/// End of the events, s.
+/// Time of the last random event, s.
 const EVENTS_S: u64 = 240;
 
 fn during(rng: &mut ChaCha8Rng) -> Instant {
@@ -108,7 +108,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns the first violation in a flight, if any, and the smallest distances between drones, m.
+/// Returns a flight's first violation, if any, its smallest distance of drones, m, and duration, s.
 fn judged(seed: u64) -> (Option<String>, f64, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

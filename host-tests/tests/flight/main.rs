@@ -20,7 +20,7 @@ use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 const SEPARATION_M: f64 = 10.0;
 
-/// Position errors: constant bias, and noise of each report, m.
+/// Constant error of each drone's reported position, m. `NOISE_M` is the noise of each report.
 const BIAS_M: f64 = 0.5;
 const NOISE_M: f64 = 0.5;
 
@@ -44,12 +44,13 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
 
 /// Returns the smallest permitted distance of drones that were each started at most `starts` times, m.
 ///
-/// The guard separates estimated positions. Each is off by its bias, and by the noise once for each start.
+/// The motion guard separates estimated positions. Each is off by its bias, and by the noise once for each start.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }
 
-/// Returns the time when the last of eight relays accepted the final common view, if there is one.
+/// Returns the time when the last of eight relays accepted their final common membership view. Returns `None` if the
+/// relays differ.
 fn together(outcome: &Outcome) -> Option<Instant> {
     let view = outcome.relays[0].view;
     let all = outcome

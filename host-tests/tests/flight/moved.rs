@@ -11,12 +11,13 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use super::*;
 
-/// Noise and hovering error of the drones, m, and the permitted shortfall of the separation. As in `fleet`.
+/// Noise of the drones' positions, m. The next constants are their hovering error and the permitted shortfall of the
+/// separation, as in `fleet`.
 const NOISE_M: f64 = 0.3;
 const HOVER_M: f64 = 1.5;
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
-/// Largest displacement of the receiver along the line and sideways, m: about 17 degrees.
+/// Largest displacement of the receiver along the line and to the side, m. It turns the line by about 17 degrees.
 const ON_M: f32 = 300.0;
 const ASIDE_M: f32 = 300.0;
 
@@ -89,7 +90,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns the fault of a flight, if any, and the smallest distance.
+/// Returns the fault of a flight, if any, and the smallest distance between drones, m.
 fn judged(seed: u64) -> (Option<String>, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

@@ -8,7 +8,7 @@ use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Place};
 
-/// Returns true for a message of Algorithm 2's last round.
+/// Returns true for a message with which Algorithm 2 ends its last round.
 pub(crate) fn is_stop(frame: &Frame) -> bool {
     frame.is(|message| matches!(message, Message::Token(token) if token.turn == AdjustStep::Stop))
 }
@@ -21,7 +21,7 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// Creates the paper's link, with altitudes within `band` that start at `altitude_m`.
+    /// Creates a chain on the paper's link. Altitudes are within `band` and start at `altitude_m`.
     pub(crate) fn new(relays: usize, altitude_m: f64, band: Band, settings: Settings) -> Self {
         let mut link = Link {
             y_i: 150.0,
@@ -60,7 +60,7 @@ impl Chain {
         self.bench.step(Instant::from_micros(u64::MAX));
     }
 
-    /// Runs until `done`, for at most `limit_ms`. Returns the time taken, ms.
+    /// Runs the chain until `done`, for at most `limit_ms`. Returns the time taken in ms; `None` if too long.
     pub(crate) fn until(&mut self, limit_ms: u64, done: impl Fn(&Bench) -> bool) -> Option<u64> {
         let took = self
             .bench
@@ -68,7 +68,7 @@ impl Chain {
         Some(took.as_micros().div_ceil(1000))
     }
 
-    /// Returns the chain's relative SIR margin over its target, and the smallest distance of relays, m.
+    /// Returns the chain's SIR divided by its target, less 1, and the smallest distance of relays in m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self
@@ -93,7 +93,7 @@ impl Chain {
     }
 }
 
-/// Bands of one altitude and of many.
+/// Altitude band of one altitude. `WIDE` permits a range of altitudes.
 pub(crate) const LOW: Band = Band::at(20.0);
 pub(crate) const WIDE: Band = Band {
     least_m: 20.0,

@@ -6,7 +6,8 @@ use uav_relay::{Adjust, Local, Method, Settings};
 use crate::hand::{Chain, LOW, WIDE, is_stop};
 use host_tests::bench::Bench;
 
-/// Delays a leader's first pass beyond its reboot and an agreement by Algorithm 2. No relay may follow it.
+/// Checks that no relay follows a leader's first pass if that is delayed beyond the leader's reboot. It arrives
+/// during the last round of the next agreement by Algorithm 2.
 #[test]
 fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {
@@ -41,7 +42,7 @@ fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
     }
 }
 
-/// Checks that a view request delayed beyond a newer view has no effect.
+/// Checks that a request for a membership view has no effect if it is delayed beyond a newer view.
 #[test]
 fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
@@ -72,7 +73,8 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     assert_eq!(chain.bench.setpoints(), before);
 }
 
-/// Checks that a relay requests a view when an incompatible neighbour reports a newer one.
+/// Checks that a relay requests a membership view when a neighbour reports a newer one. That neighbour refuses the
+/// relay's frames.
 #[test]
 fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());

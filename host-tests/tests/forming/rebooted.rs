@@ -5,7 +5,8 @@ use uav_relay::{Method, Phase, Settings};
 use crate::hand::{Chain, LOW, WIDE};
 use host_tests::bench::Bench;
 
-/// Checks that a rebooted leader with any pass number agrees within a second at a `hop_time` of 30 ms.
+/// Checks that a rebooted leader agrees with its neighbour within a second, at a `hop_time` of 30 ms. Each seed gives
+/// it another number for its first pass.
 #[test]
 fn a_rebooted_leader_is_answered_whatever_its_seed() {
     // With prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
@@ -32,7 +33,8 @@ fn a_rebooted_leader_is_answered_whatever_its_seed() {
     }
 }
 
-/// Reboots a relay during the leader's second pass: it gets its position by a new view.
+/// Checks that a relay that reboots during the leader's second pass gets a position by a new view. The view is a new
+/// agreement on the members of the chain.
 #[test]
 fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
     let settings = Settings {
@@ -57,7 +59,8 @@ fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
     }
 }
 
-/// Reboots a relay of a settled chain: it requests a view at the first unknown renewal, or on its own.
+/// Checks that a relay that reboots in a settled chain gets a position by a new membership view. It requests the view
+/// at the first lease renewal that it does not know, or on its own.
 #[test]
 fn a_relay_rebooted_later_gets_a_place_by_a_new_view() {
     for rebooted in 1..4 {

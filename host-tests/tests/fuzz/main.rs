@@ -14,7 +14,7 @@ mod replay;
 mod seeds;
 mod tools;
 
-/// Counter of heap allocations, of which the crate makes none.
+/// Heap that counts its allocations. The crate must make none.
 #[global_allocator]
 static HEAP: Counting = Counting;
 
@@ -23,7 +23,7 @@ fn folder(target: &str) -> PathBuf {
     PathBuf::from(fuzz).join(target)
 }
 
-/// Returns the inputs of a target with their file names, in order.
+/// Returns the corpus of a fuzz target: file names and inputs, in order.
 fn corpus(target: &str) -> Vec<(String, Vec<u8>)> {
     let mut inputs: Vec<_> = fs::read_dir(folder(target))
         .unwrap()

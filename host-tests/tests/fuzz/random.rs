@@ -7,7 +7,7 @@ use uav_relay_oracle::random::seed;
 
 use super::corpus;
 
-/// Number of inputs of each kind and target.
+/// Number of random inputs of each kind for each fuzz target.
 const INPUTS: usize = 1000;
 
 const LONGEST: usize = 300;
@@ -16,7 +16,7 @@ fn rng() -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed(1))
 }
 
-/// Runs `target` on drawn inputs and shows an input that fails.
+/// Runs a fuzz target on inputs from `draw`. Panics with the first input on which it fails.
 fn explore(target: fn(&[u8]), mut draw: impl FnMut() -> Vec<u8>) {
     for _ in 0..INPUTS {
         let input = draw();
@@ -32,7 +32,8 @@ fn bytes(rng: &mut impl Rng) -> Vec<u8> {
     bytes
 }
 
-/// Returns an input with up to four bytes changed, removed or doubled, or with another input's end.
+/// Returns a corpus input with up to four changes. Each changes, removes or doubles a byte, or appends the end of
+/// another input.
 fn changed(rng: &mut impl Rng, inputs: &[(String, Vec<u8>)]) -> Vec<u8> {
     let pick = |rng: &mut dyn Rng| inputs[rng.random_range(0..inputs.len())].1.clone();
     let mut input = pick(rng);

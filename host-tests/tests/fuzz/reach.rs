@@ -9,7 +9,7 @@ use uav_relay_fuzz::{chain, relay};
 
 use super::corpus;
 
-/// Returns the name of a relay's method.
+/// Returns the name of the method by which a relay computes positions.
 fn method(watched: &Watched) -> &'static str {
     match watched.settings().method {
         _ if watched.relay().mission().field().is_some() => "field",
@@ -19,7 +19,7 @@ fn method(watched: &Watched) -> &'static str {
     }
 }
 
-/// Returns the sums of every counter over some relays.
+/// Returns the sum of each statistics counter over some relays.
 fn counted<'a>(relays: impl IntoIterator<Item = &'a Watched>) -> [u64; 23] {
     relays.into_iter().fold([0; 23], |sums, watched| {
         let counters = all(watched.relay().stats());

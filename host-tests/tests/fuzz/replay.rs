@@ -5,15 +5,15 @@ use uav_relay_xtask::FUZZ_TARGETS;
 
 use super::corpus;
 
-/// Largest number of files and bytes of all corpora.
+/// Largest permitted number of files, and of bytes, of all corpora.
 const MOST: (usize, usize) = (200, 200 << 10);
 
-/// Targets for Miri, which is a thousand times slower, and their numbers of short inputs.
+/// Fuzz targets to run under Miri, which is a thousand times slower, and their numbers of short inputs.
 const FOR_MIRI: [(&str, usize); 4] = [("deframe", 4), ("frame", 6), ("relay", 3), ("mavlink", 2)];
 
 const SHORT: usize = 60;
 
-/// Returns the inputs of a target to run: all, or few under Miri.
+/// Returns the corpus inputs of a target to run: all of them, or only a few under Miri.
 fn chosen(target: &str) -> Vec<(String, Vec<u8>)> {
     let mut inputs = corpus(target);
     assert!(!inputs.is_empty(), "{target}");

@@ -18,7 +18,7 @@ use uav_relay_fuzz::{TARGETS, setting};
 
 use super::folder;
 
-/// Number of recorded frames of a flight: a few passes of every kind.
+/// Number of recorded frames of a simulated flight: a few passes of every kind of message.
 const FRAMES: usize = 24;
 
 const MOST_WAKES: u8 = 64;
@@ -27,7 +27,7 @@ fn golden() -> Vec<Frame> {
     Vectors::load().unwrap().frames
 }
 
-/// Returns inputs of the target `deframe`: each golden frame, and three of them with noise in between.
+/// Returns corpus inputs for the target `deframe`: test vectors, and three of them with noise between.
 ///
 /// Each starts with the two lengths of the pieces into which the stream is cut.
 fn deframe() -> Vec<Vec<u8>> {
@@ -46,7 +46,7 @@ fn deframe() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns each golden frame without its check sequence.
+/// Returns corpus inputs for the target `frame`: each test vector without its check sequence.
 fn frame() -> Vec<Vec<u8>> {
     golden()
         .iter()
@@ -62,7 +62,7 @@ fn scenario() -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Returns the starts of chains: mission, number of relays, method and parameters of Algorithm 2.
+/// Returns beginnings of inputs: mission, number of relays, method and parameters of Algorithm 2.
 fn missions() -> Vec<Vec<u8>> {
     let align = (0..6).flat_map(|mission| [0, 8].map(|how| vec![mission, 3, how]));
     let joint = [1, 33, 65, 73].map(|how| vec![1, 3, how]);
@@ -70,7 +70,7 @@ fn missions() -> Vec<Vec<u8>> {
     align.chain(joint).chain(adjust).collect()
 }
 
-/// Returns inputs of the target `chain`: every mission, and each operation and fault between rounds.
+/// Returns inputs for the target `chain`: every mission, and each operation and fault between rounds.
 fn chain() -> Vec<Vec<u8>> {
     let with = |mission: &[u8], operations: &[u8]| {
         // Seed, four relays without individual settings, to the end.
@@ -116,7 +116,7 @@ fn chain() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns seeds of the relay target: frames of a chain's relays, and operations on one relay.
+/// Returns inputs for the target `relay`: frames of a chain's relays, and operations on one relay.
 fn relay() -> Vec<Vec<u8>> {
     let mut seeds = Vec::new();
     for mission in missions() {
@@ -137,14 +137,16 @@ fn relay() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns an offer of the next version from `side`. It is the paper's mission with another interferer position.
+/// Returns input bytes with an offer of the next mission version, from `side`. It is the paper's mission with the
+/// interferer at another position.
 fn offer(side: u8) -> Vec<u8> {
     let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
     [&head[..], &interferer, &[255, 1, 1, 0, 0]].concat()
 }
 
-/// Returns the second of four relays with a key, which receives a mission that a view adopts.
+/// Returns an input: the second of four relays with a key receives a mission, and adopts it. The chain adopts it by a
+/// new membership view.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
     let asks = [9, 0, 10, 0, 2, 1, 0, 0, 0, 1, 1, 0];
@@ -167,7 +169,8 @@ fn uploaded(how: u8) -> Vec<u8> {
     parts.concat()
 }
 
-/// Returns the first or last of four relays with a key, with two queries and offers from Tx or Rx.
+/// Returns an input: an end relay of four with a key receives two queries and offers from the ground. `index` 0 is
+/// the first relay, at Tx; the other is the last, at Rx.
 fn by_the_ground(index: u8) -> Vec<u8> {
     let head = [0, 3, 0, index, 8, 0, 0, 0, 0, 1, 0];
     let side = u8::from(index > 0);
@@ -176,7 +179,8 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns the last of four guarded relays. It receives its position, two views, a fence and late frames.
+/// Returns an input: the last of four relays receives membership views, a fence and late frames. It has a motion
+/// guard and a position.
 fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];
@@ -190,7 +194,7 @@ fn formed(wiring: u8) -> Vec<u8> {
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
 
-/// Returns the input of a relay with a key that receives frames of another mission, and without a tag.
+/// Returns an input: a relay with a key receives a frame of another mission, and one without a tag.
 fn refused() -> Vec<u8> {
     let head = [0, 3, 0, 1, 8, 0, 0, 0, 0, 1, 0];
     let other = [9, 0, 3, 255, 0, 0];
@@ -198,7 +202,7 @@ fn refused() -> Vec<u8> {
     [&head[..], &other, &bare].concat()
 }
 
-/// Returns the second of four relays, which receives its leader's first pass twice.
+/// Returns an input: the second of four relays receives its leader's first pass twice.
 fn again() -> Vec<u8> {
     let head = [0, 3, 0, 1, 0, 0, 0, 0, 0, 1, 0];
     let pass = [9, 192, 0, 250, 64, 0, 0, 0];
@@ -206,7 +210,7 @@ fn again() -> Vec<u8> {
     [&head[..], &pass, &targets].concat()
 }
 
-/// Returns a chain's flight as one of its relays receives it.
+/// Returns an input with the frames that relay `index` receives in a simulated flight of a chain.
 fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     let mut input = Input::new(prefix);
     let mission = setting::mission(&mut input, 5).unwrap();
@@ -247,7 +251,7 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     seed
 }
 
-/// Exchanges all frames; appends those of relay `own` (from 0) to `seed` and returns their number.
+/// Exchanges all pending frames. Appends those to relay `own` (from 0) to `seed`, and returns their number.
 fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) -> usize {
     let (mut heard, mut said) = (0, true);
     let mut buffer = [0; MAX_FRAME];
@@ -277,7 +281,7 @@ fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) 
     heard
 }
 
-/// Returns streams of frames with noise, and flights with a PX4 and an ArduCopter.
+/// Returns inputs for the target `mavlink`: frames with noise, and flights with PX4 and ArduCopter.
 fn mavlink() -> Vec<Vec<u8>> {
     let heartbeat = [1, 0, 7, 1, 0, 9, 0, 0, 6, 0, 2, 12, 129, 4, 3];
     let noise = [0, 12, 253, 9, 0, 0, 0, 1, 1, 0, 0, 0, 253, 255];

@@ -13,7 +13,7 @@ pub(crate) const ROUGH_S: f64 = 200.0;
 pub(crate) const SLOWEST: f64 = 2.0;
 pub(crate) const FASTEST: f64 = 40.0;
 
-/// Event at the drone with the index `.0`.
+/// Random event of a flight. The first field is the index of the drone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum What {
     Hear(usize, Point),
@@ -22,12 +22,14 @@ pub(crate) enum What {
     Mute(usize),
     Unmute(usize),
     Vanish(usize),
-    /// The drone links to the relay in the last field, past the silent relay in the third.
+    /// Event: the drone's relay links to another one past a silent relay. The third field is the silent relay, and
+    /// the last one is the new neighbour, if any.
     Around(usize, Side, usize, Option<usize>),
     Back(usize, Side, usize),
     Forget(usize, Side),
     Speed(usize, f64),
-    /// Control by the pilot, who moves the drone aside and gives control back. The guard is informed of both.
+    /// Event: the drone's pilot takes control; the guard is informed. The next events move the drone and give control
+    /// back.
     Take(usize),
     Hears(usize),
     Aside(usize, (usize, bool, f64)),
@@ -77,7 +79,7 @@ pub(crate) fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
     plan
 }
 
-/// Plans reboots, silences and removals. Of three relays in a row at most one falls silent or is removed.
+/// Plans reboots, silent relays and removed drones. Of three relays in a row, at most one falls silent or is removed.
 pub(crate) fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
     let mut plan = Vec::new();
     let mut left_out = 0;
@@ -98,7 +100,7 @@ pub(crate) fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> 
     plan
 }
 
-/// Plans pilots' takeovers, except beside a removed drone, which an operator has cleared.
+/// Plans takeovers by pilots, but none next to a removed drone, which an operator has cleared.
 pub(crate) fn pilots(
     rng: &mut ChaCha8Rng,
     relays: usize,
@@ -143,7 +145,7 @@ pub(crate) fn pilots(
     plan
 }
 
-/// Plans the silence of relay `k`, and the link of its neighbours past it. The relay returns unless it is `gone`.
+/// Plans the silence of relay `k`, and when its neighbours link past it. The relay returns unless it is `gone`.
 pub(crate) fn around(
     rng: &mut ChaCha8Rng,
     plan: &mut Vec<(f64, What)>,
@@ -175,7 +177,7 @@ pub(crate) fn around(
     }
 }
 
-/// Returns random positions in order along x, at least the separation apart.
+/// Returns random positions in order along x, with the least separation or more between neighbours.
 pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(confines.fence.most_x_m);
     let step = f64::from(confines.separation_m) + 5e-7 * distance;
@@ -202,9 +204,9 @@ pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize
         .collect()
 }
 
-/// Moves half of the neighbours closer along x, with the separation kept in space.
+/// Moves half of the neighbours closer along x, but keeps their least separation in space.
 ///
-/// Relays that are not neighbours stay the separation apart along x, unless `wild`.
+/// Relays that are not neighbours keep the least separation along x, unless `wild`.
 pub(crate) fn closer(
     rng: &mut ChaCha8Rng,
     confines: &GuardConfig,

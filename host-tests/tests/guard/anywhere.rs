@@ -29,18 +29,18 @@ use crate::world::beside;
 const STEP_S: f64 = 0.1;
 const SPEED: f64 = 5.0;
 
-/// Acceleration limit of the autopilot's target, m/s².
+/// Acceleration limit of the target that the simulated autopilot follows, m/s².
 const TARGET_ACCELERATION: f64 = 1.0;
 const ACCELERATION: f64 = 3.0;
 
 /// Longest time from a release at full speed until the drone hovers, overshoot included, s.
 const BRAKES_S: f64 = 8.0;
 
-/// End of the faults, s. The flight ends when all drones have arrived, or fails at `LAST_S`.
+/// Time of the last fault, s. The flight ends when all drones have arrived, or fails at `LAST_S`.
 const ROUGH_S: f64 = 120.0;
 const LAST_S: f64 = 900.0;
 
-/// Line over the ground; all lines start at the same transmitter.
+/// Line of relays over the ground. All lines start at the same transmitter.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     number: u32,
@@ -80,13 +80,13 @@ struct Drone {
     at: Point,
     velocity: Point,
     bias: Point,
-    /// Target of the autopilot: position and velocity over the ground.
+    /// Point that the autopilot is following, over the ground. The next field is its velocity.
     target: Point,
     target_velocity: Point,
     guard: Guard,
     line: Line,
     agreed: Option<(u32, Point)>,
-    /// Position to which the pilot flies the drone; `None` under setpoint control.
+    /// Position to which the pilot flies the drone; `None` while its guard controls it.
     pilot: Option<Point>,
     reminder_s: f64,
     letters: u64,
@@ -153,9 +153,9 @@ impl Drone {
 )]
 #[derive(Debug, Default)]
 struct Report {
-    /// Smallest margin of two drones' distance over the required distance, m.
+    /// Smallest difference between two drones' distance and the distance required of them, m.
     margin_m: f64,
-    /// Indices of those drones, their distance, m, and the time, s.
+    /// Drones with the smallest margin: their indices, their distance in m, and the time in s.
     nearest: Option<(usize, usize, f64, f64)>,
     in_order: bool,
     arrived: bool,
@@ -172,17 +172,20 @@ struct World {
     faults: Faults,
     now_s: f64,
     noise_m: f64,
-    /// Required distance of each pair: the smaller of the separation and the distance at the start, m.
+    /// Distance required of each pair of drones, m: the separation, or the distance at the start if less.
     least_m: Vec<f64>,
-    /// Time since which each drone hovers under its pilot's control; infinite otherwise.
+    /// Time since which each drone has hovered under its pilot's control, s; infinite for other drones.
     hovers_s: Vec<f64>,
-    /// Time when a drone first received its hovering neighbour's position; infinite before.
+    /// Time when a drone first received the position of its hovering neighbour, s; infinite before. The neighbour
+    /// hovers under its pilot's control.
     known_s: Vec<f64>,
-    /// Required distance of a drone and its hovering neighbour, from `BRAKES_S` after `known_s`, m.
+    /// Distance required of a drone and a neighbour that hovers under its pilot's control, m. It is set `BRAKES_S`
+    /// after `known_s`.
     hovering_m: Vec<f64>,
-    /// Drones that their pilots give back once no other drone is passing them.
+    /// Indices of drones whose pilots give control back as soon as no other drone is passing them.
     later: Vec<usize>,
-    /// Drones given back in motion, and the end of their braking, from which their distances are checked.
+    /// Drones whose pilots gave control back in motion, and the times at which their braking ends, s. Their distances
+    /// are checked from then on.
     brakes: Vec<(usize, f64)>,
     rng: ChaCha8Rng,
 }
@@ -192,7 +195,7 @@ impl World {
         k * self.drones.len() + other
     }
 
-    /// Restarts the distance check of drone `k` at its present distances.
+    /// Sets the distances required of drone `k` to its present distances, or the separation if smaller.
     fn begin(&mut self, k: usize) {
         for other in 0..self.drones.len() {
             let apart = length(way(self.drones[k].at, self.drones[other].at));
@@ -296,7 +299,7 @@ impl World {
         }
     }
 
-    /// Updates which drones hover under a pilot's control, and the distances required of their neighbours.
+    /// Updates which drones hover under a pilot's control, and what distance their neighbours must keep.
     fn watch_pilots(&mut self) {
         for k in 0..self.drones.len() {
             let drone = &self.drones[k];
@@ -366,7 +369,7 @@ impl World {
     }
 }
 
-/// Returns random positions in order and the separation apart along the line, within the box across it.
+/// Returns random agreed positions: in order along the line, separated, and within the box across it.
 fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(config.fence.most_x_m);
     let step = f64::from(config.separation_m) * 1.001;
@@ -405,7 +408,7 @@ fn config(rng: &mut ChaCha8Rng, relays: usize) -> GuardConfig {
     }
 }
 
-/// Returns random start positions: anywhere across the line, and close together along it.
+/// Returns random start positions of drones: anywhere across the line, and close together along it.
 fn starts(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let apart = f64::from(config.separation_m);
     let step = apart

@@ -21,7 +21,7 @@ pub(crate) fn length([dx, dy, dh]: Point) -> f64 {
     dx.hypot(dy).hypot(dh)
 }
 
-/// Returns the point at the fraction `share` of the vector `way` from `at`.
+/// Returns the point that is the fraction `share` of the vector `way` away from `at`.
 pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
     [0, 1, 2].map(|part| at[part] + share * way[part])
 }
@@ -29,43 +29,43 @@ pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
 #[derive(Debug)]
 pub(crate) struct Drone {
     pub(crate) body: Body,
-    /// Position one step earlier.
+    /// Position of the drone one time step earlier.
     pub(crate) was: Point,
-    /// Point that the flight controller flies to.
+    /// Point to which the flight controller is flying the drone.
     goal: Point,
-    /// Setpoints in transit to the flight controller, with their arrival times.
+    /// Setpoints in transit to the flight controller: arrival time in s, and point.
     orders: VecDeque<(f64, Point)>,
-    /// Position reports in transit to the guard: time of measurement, time of arrival, position.
+    /// Position reports in transit to the guard: times of measurement and of arrival in s, and position.
     reports: VecDeque<(f64, f64, Point)>,
     pub(crate) speed: f64,
-    /// Acceleration limit, m/s².
+    /// Acceleration limit of the drone, m/s².
     pub(crate) acceleration: f64,
-    /// Delay of setpoints, s: at most the guard's lag.
+    /// Delay of setpoints to the flight controller, s. It is at most the guard's `lag`.
     pub(crate) latency_s: f64,
-    /// Guard; `None` while the relay is switched off.
+    /// Motion guard of the drone; `None` while the relay is switched off.
     pub(crate) guard: Option<Guard>,
-    /// First setpoint after a time without a setpoint.
+    /// First setpoint of the guard after a time without one.
     begun: Option<Placement>,
-    /// Indices of the neighbours toward Tx and Rx.
+    /// Indices of the drones with which the relay has links, toward Tx and toward Rx.
     pub(crate) links: [Option<usize>; 2],
     pub(crate) flies: bool,
-    /// True while the radio works.
+    /// True while the drone's radio works.
     pub(crate) speaks: bool,
-    /// True while the pilot flies the drone and the guard's setpoint is ignored.
+    /// True while the pilot flies the drone, so that the guard's setpoint is ignored.
     pub(crate) taken: bool,
-    /// True once the neighbour toward Tx or Rx knows that the pilot flies this drone.
+    /// True for each side whose neighbour knows that the pilot flies this drone.
     pub(crate) told: [bool; 2],
-    /// Range along x that the neighbours keep out of since the takeover.
+    /// Range of x that both neighbours keep clear, since they know that the pilot flies this drone.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
-    /// Association numbers that this drone sent last, by side.
+    /// Numbers of the associations with the neighbours toward Tx and Rx, in the last messages to them.
     pub(crate) said: [u16; 2],
     next_report_s: f64,
     next_reminder_s: f64,
     pub(crate) messages: u64,
 }
 
-/// Reporting behaviour of the flight controller.
+/// Timing of the flight controller's position reports.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Board {
     /// Longest interval between two reports, s.
@@ -101,7 +101,7 @@ impl Drone {
         }
     }
 
-    /// Switches the guard on with the neighbours of the mission, then reports the present links to it.
+    /// Switches the guard on with the mission's neighbours, then tells it the links that exist.
     pub(crate) fn boot(
         &mut self,
         confines: GuardConfig,
@@ -125,7 +125,7 @@ impl Drone {
         self.guard = Some(guard);
     }
 
-    /// Gives control to the pilot: the drone brakes and hovers where it stops.
+    /// Gives control of the drone to its pilot. The drone brakes and hovers where it stops.
     pub(crate) fn take(&mut self, now_s: f64) {
         self.taken = true;
         self.taken_s = now_s;
@@ -135,7 +135,7 @@ impl Drone {
         self.goal = self.body.stops_at(self.acceleration);
     }
 
-    /// Records that by a message of `sent_s` the neighbour on `side` knows of the takeover.
+    /// Records that the neighbour on `side` knows of the pilot's takeover by a message sent at `sent_s`.
     ///
     /// From then on the neighbour stays within `(low, high)` along x.
     pub(crate) fn is_known(&mut self, side: usize, sent_s: f64, (low, high): (f64, f64)) {
@@ -153,12 +153,13 @@ impl Drone {
         self.goal
     }
 
-    /// Moves the hovering point by `way_m` along the axis `part`, as the pilot does.
+    /// Moves the hovering point by `way_m` along axis `part`, as the pilot does. The axis is 0 for x, 1 for y or 2
+    /// for altitude.
     pub(crate) fn aside(&mut self, part: usize, way_m: f64) {
         self.goal[part] += way_m;
     }
 
-    /// Ends the pilot's control: the drone hovers where it stops and follows its setpoints from then on.
+    /// Ends the pilot's control. The drone hovers where it stops, and follows its setpoints from then on.
     pub(crate) fn give(&mut self, now_s: f64) {
         if core::mem::take(&mut self.taken) {
             self.goal = self.body.stops_at(self.acceleration);
@@ -166,7 +167,7 @@ impl Drone {
         }
     }
 
-    /// Reports to the guard whether the drone is under setpoint control.
+    /// Tells the guard whether the drone follows setpoints or its pilot flies it.
     pub(crate) fn is_flown(&mut self, now_s: f64) {
         if let Some(guard) = &mut self.guard {
             guard.control(instant(now_s), !self.taken);
@@ -183,7 +184,7 @@ impl Drone {
             .fly(self.goal, self.speed, self.acceleration, step_s);
     }
 
-    /// Generates position reports, and passes the reports that have arrived to the guard.
+    /// Creates reports of the drone's position, and passes those that have arrived to the guard.
     pub(crate) fn report(&mut self, rng: &mut ChaCha8Rng, board: Board, hover_m: f64, now_s: f64) {
         if now_s >= self.next_report_s {
             self.next_report_s = now_s + rng.random_range(0.02..=1.0) * board.every_s;
@@ -200,7 +201,7 @@ impl Drone {
         }
     }
 
-    /// Updates the guard's setpoint and sends a change to the flight controller with a delay.
+    /// Asks the guard for the setpoint, and sends a changed one to the flight controller with a delay.
     pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, confines: &GuardConfig, now_s: f64) {
         let Some(guard) = &mut self.guard else {
             return;
@@ -240,7 +241,7 @@ impl Drone {
         self.orders.push_back((due_s, point));
     }
 
-    /// Calls the guard's reminder once per second.
+    /// Calls `Guard::remind` once per second.
     pub(crate) fn reminded(&mut self, now_s: f64) {
         if now_s >= self.next_reminder_s {
             self.next_reminder_s = now_s + 1.0;
@@ -250,7 +251,7 @@ impl Drone {
         }
     }
 
-    /// Returns the ranges of x, y and altitude open to the drone without further messages.
+    /// Returns the ranges of x, y and altitude in which the drone may be before new setpoints arrive.
     pub(crate) fn stretch(&self) -> [(f64, f64); 3] {
         let stop = self.body.stops_at(self.acceleration);
         [0, 1, 2].map(|part| {

@@ -45,7 +45,7 @@ fn commit(world: &mut World, places: &[Point]) {
     }
 }
 
-/// Returns the time until all drones have arrived, s.
+/// Returns the time until all drones have reached their agreed positions, s.
 fn time(world: &mut World) -> f64 {
     let begun_s = world.now_s;
     while !world
@@ -80,7 +80,8 @@ fn a_tight_row_shifts_either_way() {
     }
 }
 
-/// Checks three agreed positions 4 m apart along x, of which the outer two stay 10 m apart.
+/// Checks agreed positions that are too close: three at 4 m along x, where the outer two need 10 m. The drones
+/// approach these positions as far as the separation permits.
 #[test]
 fn places_too_close_are_approached() {
     let mut world = world(5, 100.0, 100.0);
@@ -125,7 +126,7 @@ fn places_too_close_are_approached() {
     assert_eq!(before, after, "they stay");
 }
 
-/// Checks positions above and beside one another, and an exchange of sides.
+/// Checks that drones reach agreed positions above and beside one another, swap them, and leave them.
 #[test]
 fn places_above_each_other_are_flown_to_and_left() {
     let mut world = world(4, 300.0, 20.0);

@@ -7,9 +7,9 @@ use uav_relay::guard::Fence;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Faults {
-    /// Fraction of messages that is lost, 0 to 1.
+    /// Probability that a message is lost, 0 to 1.
     pub(crate) loss: f64,
-    /// Fraction of messages that is duplicated, 0 to 1.
+    /// Probability that a message is duplicated, 0 to 1.
     pub(crate) twice: f64,
     pub(crate) delay_s: f64,
 }
@@ -20,14 +20,14 @@ pub(crate) struct Letter {
     due_s: f64,
     pub(crate) to: usize,
     pub(crate) from: usize,
-    /// Side of the receiver on which the sender is.
+    /// Side of the receiver on which the sender of the message is.
     pub(crate) side: Side,
     pub(crate) fence: Fence,
-    /// Number of the line in whose coordinates the message is.
+    /// Number of the line from Tx to Rx in whose coordinates the message's positions are.
     pub(crate) line: u32,
 }
 
-/// Messages in transit.
+/// Simulated medium: the messages between drones that are in transit.
 #[derive(Debug, Default)]
 pub(crate) struct Medium {
     letters: Vec<Letter>,
@@ -61,7 +61,7 @@ impl Medium {
         }
     }
 
-    /// Removes and returns the messages due by `now_s`, in no particular order.
+    /// Removes and returns the messages that have arrived by `now_s`, in no particular order.
     pub(crate) fn arrived(&mut self, now_s: f64) -> Vec<Letter> {
         if self.letters.is_empty() {
             return Vec::new();

@@ -38,11 +38,11 @@ pub(crate) struct Report {
     pub(crate) reboots: u64,
     pub(crate) silences: u64,
     pub(crate) gone: u64,
-    /// Drones taken by their pilots.
+    /// Number of drones of which pilots took control.
     pub(crate) taken: u64,
-    /// Drones moved along the line by their pilots.
+    /// Number of drones that their pilots moved along the line.
     pub(crate) along: u64,
-    /// Neighbours whose final positions are closer along x than the separation.
+    /// Number of neighbours whose final positions are closer along x than the separation.
     pub(crate) close: u64,
     pub(crate) closest_m: f64,
     pub(crate) share_of_time: f64,
@@ -105,7 +105,7 @@ fn confines(rng: &mut ChaCha8Rng) -> GuardConfig {
     }
 }
 
-/// Returns the guard's configuration with the line's length, and the start positions.
+/// Draws the line's length. Returns the guard's configuration with it, and the drones' start positions.
 fn line(
     rng: &mut ChaCha8Rng,
     mut confines: GuardConfig,
@@ -123,7 +123,7 @@ fn line(
     (confines, starts)
 }
 
-/// Runs the phase of the flight with all faults.
+/// Runs the first phase of the flight, with all random faults and events.
 fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     world.faults = Faults {
         loss: rng.random_range(0.0..=0.5),
@@ -217,7 +217,7 @@ fn happen(world: &mut World, what: What, report: &mut Report) {
     }
 }
 
-/// Runs the final phase: all relays receive the same agreement and reach their positions.
+/// Runs the final phase of the flight. All relays receive the same agreement and must reach their positions.
 fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     world.faults = Faults {
         loss: rng.random_range(0.0..=0.3),

@@ -23,7 +23,7 @@ pub(crate) struct World {
     medium: Medium,
     pub(crate) faults: Faults,
     pub(crate) board: Board,
-    /// Smallest margin seen, m.
+    /// Smallest margin over the permitted distance between two drones so far, m.
     pub(crate) closest_m: f64,
     pub(crate) steps: u64,
 }
@@ -72,7 +72,7 @@ impl World {
         }
     }
 
-    /// Returns the permitted shortfall of the separation, m: four times the report error, and rounding.
+    /// Returns the permitted shortfall of the separation, m: four position errors and f32 rounding.
     pub(crate) fn allowed_m(&self) -> f64 {
         let rounding = f64::from(self.confines.fence.most_x_m) * f64::from(f32::EPSILON);
         4.0 * f64::from(self.confines.hover_m) + 8.0 * rounding
@@ -123,7 +123,7 @@ impl World {
         self.check();
     }
 
-    /// Sends all pending messages of drone `k`.
+    /// Sends all messages that the guard of drone `k` has pending.
     fn talk(&mut self, k: usize) {
         let drone = &mut self.drones[k];
         let Some(guard) = &mut drone.guard else {
@@ -151,7 +151,8 @@ impl World {
         }
     }
 
-    /// Moves drone `k` up to `most_m` along an axis across the line, away from nearby drones if possible.
+    /// Moves drone `k` up to `most_m` along axis `part`, if this is away from all nearby drones. `part` is 1 for y or
+    /// 2 for altitude; `up` selects the direction.
     pub(crate) fn aside(&mut self, k: usize, (part, up, most_m): (usize, bool, f64)) {
         let (low, high) = self.drones[k].stretch()[part];
         let near = k.saturating_sub(3)..(k + 4).min(self.drones.len());
@@ -166,7 +167,8 @@ impl World {
         }
     }
 
-    /// Moves drone `k` along the line, clear of its neighbours, once both know that its pilot flies it.
+    /// Moves drone `k` along the line, clear of its neighbours, as its pilot does. Returns false if a neighbour does
+    /// not know of the pilot yet, or if there is no space between the neighbours.
     pub(crate) fn along(&mut self, k: usize, share: f64) -> bool {
         if !self.drones[k].taken || self.drones[k].told != [true; 2] {
             return false;
@@ -191,7 +193,7 @@ impl World {
         least < most
     }
 
-    /// Checks that no two drones came too close in this step, or can come too close before they stop.
+    /// Checks that no two drones came closer in this step, or can come before they stop, than permitted.
     fn check(&mut self) {
         let separation = f64::from(self.confines.separation_m);
         let floor = separation - self.allowed_m();
@@ -222,12 +224,12 @@ impl World {
     }
 }
 
-/// Returns the neighbours of drone `k` in a mission with `relays` relays.
+/// Returns the indices of drone `k`'s neighbours toward Tx and Rx, among `relays` drones.
 pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
     [k.checked_sub(1), (k + 1 < relays).then_some(k + 1)]
 }
 
-/// Returns the distance between two boxes, m.
+/// Returns the distance between two boxes, m. A box is given by its ranges of x, y and altitude.
 fn between(one: [(f64, f64); 3], other: [(f64, f64); 3]) -> f64 {
     length([0, 1, 2].map(|part| {
         let ((low, high), (least, most)) = (one[part], other[part]);
@@ -235,7 +237,7 @@ fn between(one: [(f64, f64); 3], other: [(f64, f64); 3]) -> f64 {
     }))
 }
 
-/// Returns the smallest distance of two drones during a step of straight flight, m.
+/// Returns the smallest distance of two drones, m, that each fly straight from one point to another.
 fn nearest(one: (Point, Point), other: (Point, Point)) -> f64 {
     let (from, to) = (way(other.0, one.0), way(other.1, one.1));
     let change = way(from, to);

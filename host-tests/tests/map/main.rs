@@ -22,7 +22,7 @@ fn best(scenario: &Scenario, relays: u16) -> Plan {
     plan(scenario, &ask).unwrap()
 }
 
-/// Writes the plan as GeoJSON and KML, checks both, and returns them as other libraries read them.
+/// Writes the plan as GeoJSON and KML, and checks both. Returns what other libraries read from them.
 fn read(scenario: &Scenario, plan: &Plan) -> Value {
     let line = scenario.line.unwrap();
     let map = Map::new(scenario, plan).unwrap();
@@ -122,7 +122,7 @@ fn without_a_geoid_there_is_no_height_that_would_be_wrong() {
     assert_eq!(found["geojson_dimensions"], json!([2]));
 }
 
-/// Checks a line across the antimeridian, with lateral room: its middle hops are cut in two there.
+/// Checks a line across the antimeridian: the hop in its middle is cut in two there.
 #[test]
 fn a_line_across_the_antimeridian_is_cut() {
     let text = "[geometry]\naltitude_m = 30\naltitude_max_m = 90\nlateral_min_m = -200\nlateral_max_m = 200\n\

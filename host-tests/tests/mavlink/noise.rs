@@ -5,7 +5,7 @@ use super::*;
 
 const FRAMES: usize = 20_000;
 
-/// Damages a frame: a bit flips, bytes are missing, or bytes are inserted.
+/// Damages a frame: flips a bit, removes or inserts bytes, or sets a wrong length.
 fn hurt(rng: &mut ChaCha8Rng, frame: &mut Vec<u8>) {
     let at = rng.random_range(0..frame.len());
     match rng.random_range(0..4) {
@@ -54,7 +54,7 @@ fn every_frame_that_is_whole_is_found_whatever_is_around_it() {
     assert!(extra < FRAMES / 100, "{extra} more than were whole");
 }
 
-/// Checks that frames inside another frame's payload are not read.
+/// Checks that a frame that is carried in another frame's payload is not read.
 #[test]
 fn what_is_carried_by_another_message_is_not_read() {
     let inner = by_the_crate(&said(&mut rng(5)).0, 1);
@@ -71,7 +71,7 @@ fn what_is_carried_by_another_message_is_not_read() {
     assert_eq!((read[0].id, read[0].message), (385, None));
 }
 
-/// Checks an unknown message, and one truncated by zeros at its end.
+/// Checks that an unknown message is skipped, and the message after it is read.
 #[test]
 fn an_unknown_message_costs_nothing_but_its_bytes() {
     let mut rng = rng(6);
@@ -90,7 +90,8 @@ fn an_unknown_message_costs_nothing_but_its_bytes() {
     assert_eq!(parser.counters().broken, 0);
 }
 
-/// Checks the costliest known input: three false frame starts per sixteen bytes. Each costs a checksum over 260 bytes.
+/// Checks the costliest known input: five bytes of it cause a checksum over 260 bytes. Each sixteen bytes have three
+/// false frame starts.
 #[test]
 fn bytes_that_are_made_for_it_cost_a_checksum_for_five_of_them() {
     let made = [

@@ -9,7 +9,7 @@ use uav_relay::flight::mavlink::outgoing::{Outgoing, severity};
 
 use super::*;
 
-/// Number of messages of each kind.
+/// Number of test messages of each kind.
 const EACH: usize = 200;
 
 fn messages() -> Vec<Outgoing<'static>> {
@@ -70,7 +70,7 @@ pub(super) fn framed() -> Vec<(Outgoing<'static>, u8, Vec<u8>)> {
         .collect()
 }
 
-/// Returns the part of a text that fits.
+/// Returns the first `most` bytes of a text, or all of a shorter one.
 fn cut(text: &str, most: usize) -> &str {
     &text[..text.len().min(most)]
 }

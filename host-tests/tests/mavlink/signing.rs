@@ -14,18 +14,18 @@ use super::*;
 const KEY: [u8; 32] = [0x5A; 32];
 const OTHER: [u8; 32] = [0xA5; 32];
 
-/// 2026-11-22 12:00 UTC, s, and in time stamp units.
+/// Time 2026-11-22 12:00 UTC in Unix seconds. `STAMP` is the same in MAVLink's unit of 10 µs since 2015.
 const UNIX_S: u64 = 1_795_348_800;
 const STAMP: u64 = (UNIX_S - 1_420_070_400) * 100_000;
 
-/// Minute in time stamp units.
+/// Number of MAVLink time stamp units of 10 µs in a minute.
 const MINUTE: u64 = 6_000_000;
 
 fn at(units: u64) -> Instant {
     Instant::from_micros(units * 10)
 }
 
-/// Returns a signer that knows the time.
+/// Returns a signer that knows the time, with `key`.
 fn signing(key: [u8; 32]) -> Signing {
     Signing::new(key, 2, Stamp::of_unix_micros(UNIX_S * 1_000_000), at(0))
 }
@@ -36,7 +36,7 @@ fn stamp_of(frame: &[u8]) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
-/// Returns a signed frame, by an independent implementation.
+/// Returns a heartbeat frame signed with `key`, by code that is independent of the crate.
 fn signed(key: [u8; 32], from: Address, link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = Outgoing::Heartbeat.encode(from, from, 0).to_vec();
     frame.truncate(frame.len() - 2);
@@ -50,7 +50,7 @@ fn signed(key: [u8; 32], from: Address, link: u8, stamp: u64) -> Vec<u8> {
     frame
 }
 
-/// Returns the verdict on the only frame in `bytes`.
+/// Returns the signer's verdict on the only frame in `bytes`.
 fn checked(signing: &mut Signing, now: Instant, bytes: &[u8]) -> Result<(), Flaw> {
     let mut parser = Parser::new();
     let mut all = Vec::new();
@@ -193,7 +193,7 @@ fn a_board_without_a_clock_takes_the_time_from_whom_it_hears() {
     );
 }
 
-/// Checks that changing senders do not displace an active one.
+/// Checks that many changing senders do not make a signer forget the time stamp of an active sender.
 #[test]
 fn many_senders_do_not_make_an_old_frame_new() {
     let mut ours = signing(KEY);

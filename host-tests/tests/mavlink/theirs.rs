@@ -11,14 +11,14 @@ use uav_relay::flight::mavlink::incoming::Incoming;
 
 use super::*;
 
-/// Number of messages of each kind.
+/// Number of test messages of each kind.
 const EACH: usize = 200;
 
 fn bytes(rng: &mut ChaCha8Rng) -> [u8; 4] {
     [0; 4].map(|_| rng.random())
 }
 
-/// Returns messages for pymavlink to write, with arbitrary enum values, and the expected readings.
+/// Returns messages for pymavlink to encode, and how the crate must read them. Their enum values are arbitrary.
 #[expect(clippy::too_many_lines, reason = "a table")]
 pub(super) fn written() -> Vec<(String, Option<Incoming>)> {
     let mut rng = rng(2);
@@ -148,7 +148,7 @@ fn every_field_that_pymavlink_writes_is_read() {
     }
 }
 
-/// Encodes a frame with the mavlink crate.
+/// Encodes a message as a frame with the `mavlink` crate.
 pub(super) fn by_the_crate(message: &MavMessage, sequence: u8) -> Vec<u8> {
     let header = MavHeader {
         system_id: 3,
@@ -160,7 +160,7 @@ pub(super) fn by_the_crate(message: &MavMessage, sequence: u8) -> Vec<u8> {
     raw.raw_bytes().to_vec()
 }
 
-/// Draws an autopilot's message, and its expected reading.
+/// Draws a message of an autopilot, and how the crate must read it.
 pub(super) fn said(rng: &mut ChaCha8Rng) -> (MavMessage, Incoming) {
     match rng.random_range(0..4) {
         0 => {

@@ -11,39 +11,43 @@ use uav_relay::{Auth, Event, Identity, Key, Port, Relay, Settings, Wiring};
 
 use super::*;
 
-/// Latency of a frame, and interval of the observations, ms.
+/// Latency of a frame, and interval at which the setpoints are observed, ms.
 const STEP_MS: u64 = 10;
 
-/// Time limit for one duplicate to give up its setpoint after it has received the other duplicate, ms.
+/// Longest time that a duplicate relay may keep its setpoint after a frame between the duplicates, ms. Duplicates are
+/// two relays with the same index.
 const LIMIT_MS: u64 = 2_000;
 
-/// Time limit for two setpoints at duplicates that receive each other, ms. A settled chain sends few frames.
+/// Longest time with setpoints at two duplicate relays that receive each other, ms. Few frames are sent in a settled
+/// chain.
 const HEARD_MS: u64 = 10_000;
 
-/// Time limit as above, ms, on a channel that loses frames: handshakes of settled chains may be lost.
+/// Longest time with setpoints at two duplicate relays on a channel that loses frames, ms. The frames that reveal a
+/// duplicate may be lost.
 const HEARD_LOSSY_MS: u64 = 20_000;
 
-/// Time limit for duplicates that do not receive each other, ms: several claims in a row may be lost.
+/// Longest time with setpoints at two duplicate relays that do not receive each other, ms. Several index claims in a
+/// row may be lost.
 const HIDDEN_MS: u64 = 40_000;
 
-/// Time limit until the whole chain has setpoints for good, with one of the duplicates, ms.
+/// Longest time until the whole chain, with one of the duplicate relays, has setpoints for good, ms.
 const FLIES_MS: u64 = 60_000;
 
-/// Time of observation after the second duplicate was switched on, ms.
+/// Time of observation after the second duplicate relay was switched on, ms.
 const WATCHED_MS: u64 = 100_000;
 
-/// Time at which two settled chains come into range, ms, and time of observation after it.
+/// Time at which two settled chains come into range, ms. They are observed for `MET_MS` after that.
 const MEETING_MS: u64 = 200_000;
 const MET_MS: u64 = 60_000;
 
-/// Medium between the duplicates and the other relays.
+/// Medium between two duplicate relays and the other relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Medium {
-    /// Shared channel on which the duplicates receive each other.
+    /// Medium: a shared channel on which the duplicate relays receive each other.
     Shared,
-    /// Links to both neighbours, shared by the duplicates, which receive each other.
+    /// Medium: links to both neighbours on which the duplicate relays receive each other.
     Links,
-    /// Links to both neighbours, shared by the duplicates, which do not receive each other.
+    /// Medium: links to both neighbours on which the duplicate relays do not receive each other.
     HiddenLinks,
 }
 
@@ -63,7 +67,7 @@ struct Case {
     medium: Medium,
     signed: bool,
     loss: f64,
-    /// True if both are switched on at time 0.
+    /// True if both duplicate relays are switched on at time 0.
     at_once: bool,
     seed: u64,
 }
@@ -71,17 +75,18 @@ struct Case {
 /// Durations measured in one simulated chain, ms.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
-    /// Longest time with two setpoints, from `LIMIT_MS` after the first frame between the duplicates.
+    /// Longest time with setpoints at both duplicates, from `LIMIT_MS` after the first frame between them.
     both: u64,
-    /// Longest time with two setpoints, from the start of the second duplicate.
+    /// Longest time with setpoints at both duplicates, from the start of the second one.
     both_at_all: u64,
-    /// Total time without a setpoint at either duplicate, from the start of the second.
+    /// Total time without a setpoint at either duplicate, from the start of the second one.
     neither: u64,
-    /// Time from the second start until the whole chain, with one duplicate, has setpoints for good.
+    /// Time from the second duplicate's start until the whole chain has setpoints for good. One duplicate is a part
+    /// of the chain then.
     flies: u64,
-    /// True if the duplicate that started first has the setpoint in the end.
+    /// True if the duplicate that was switched on first has the setpoint in the end.
     first_stays: bool,
-    /// Records for each duplicate that it raised `Event::DuplicateIndex`.
+    /// True for each duplicate that raised `Event::DuplicateIndex`.
     reported: [bool; 2],
 }
 
@@ -162,7 +167,7 @@ fn flown(case: Case) -> Found {
     found
 }
 
-/// Flies `count` chains of one kind and prints the results.
+/// Simulates `COUNT` chains with duplicate relays, and prints the results. Returns each with its seed.
 fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Found)> {
     let found: Vec<(u64, Found)> = (0..number("COUNT", 12))
         .map(|seed| {
@@ -196,7 +201,8 @@ fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Foun
     found
 }
 
-/// Checks the time limits, the report of a duplicate, and that the chain flies within `FLIES_MS`.
+/// Checks that one of two duplicate relays gives up its setpoint in time, and one reports the other. The chain has to
+/// fly within `FLIES_MS`.
 fn at_most_one_flies(medium: Medium, most_ms: u64) {
     let mut faults = Vec::new();
     for kind in 0..8 {
@@ -240,9 +246,9 @@ struct Meeting {
     relays: u16,
     twice: u16,
     loss: f64,
-    /// Epochs of the duplicates.
+    /// Epochs of the two duplicate relays.
     epochs: [u32; 2],
-    /// True if only the duplicates receive each other, false if all relays do.
+    /// True if only the two duplicates receive each other after the meeting, false if all relays do.
     only_duplicates: bool,
     seed: u64,
 }
@@ -264,7 +270,7 @@ impl Meeting {
         }
     }
 
-    /// Returns the indices in the chain of the first duplicate, without its own.
+    /// Returns the other relays in the chain of the first duplicate, by index.
     fn first_chain(&self, rng: &mut ChaCha8Rng) -> Vec<u16> {
         let mut others: Vec<u16> = (1..=self.relays).collect();
         others.retain(|index| *index != self.twice);
@@ -283,7 +289,7 @@ impl Meeting {
         }
     }
 
-    /// Returns the longest time with two setpoints, ms, and the number of setpoints in the end.
+    /// Returns the longest time with setpoints at both duplicates, ms, and their final number of setpoints.
     fn fly(self) -> (u64, usize) {
         let rng = &mut ChaCha8Rng::seed_from_u64(self.seed);
         let chain = self.first_chain(rng);
@@ -344,7 +350,8 @@ impl Meeting {
     }
 }
 
-/// Checks that handshakes go with lease renewals. Two settled chains send no others, and no other frame makes a duplicate passive.
+/// Checks that one of two duplicates in settled chains gives up its setpoint when the chains meet. Only handshakes
+/// reveal a duplicate. Settled chains send them with the lease renewals alone.
 #[test]
 fn of_two_settled_chains_with_one_index_one_loses_it() {
     let mut faults = Vec::new();

@@ -8,7 +8,7 @@ use uav_relay_sim::simulator::outcome::Ending;
 
 use super::*;
 
-/// Returns a guarded flight of eight drones on one radio channel.
+/// Returns the setup of a flight of eight drones with motion guards on one radio channel.
 fn guarded(rng: &mut ChaCha8Rng) -> Setup {
     let mut setup = Setup::on_shared_channel(eight_apart(SEPARATION_M));
     guard(&mut setup, rng);
@@ -70,7 +70,7 @@ fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
     }
 }
 
-/// Checks that without a guard drones come too close, so that the test is able to fail.
+/// Checks that drones come too close without a motion guard, so that the test is able to fail.
 #[test]
 fn without_a_guard_some_come_close() {
     let close = (1..=40).any(|seed| {

@@ -7,7 +7,7 @@ use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
 
-/// Returns the time from the last loss to the settled chain, and the sweeps since.
+/// Returns the time from the last loss to the settled chain, and the sweeps along the chain meanwhile.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, TimelineEvent::Lost(_));
     let last = outcome
@@ -77,7 +77,8 @@ fn a_relay_that_comes_back_takes_its_place_again() {
     }
 }
 
-/// Checks that one of two adjacent lost relays returns into the closed gap while the other stays off.
+/// Checks that one of two adjacent lost relays returns into the gap that the others have closed. The second lost
+/// relay stays off.
 #[test]
 fn one_of_two_in_a_row_returns_into_the_closed_gap() {
     for (index, off) in [(2, 3), (3, 2), (4, 5), (5, 4), (6, 7), (7, 6)] {

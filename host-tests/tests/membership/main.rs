@@ -19,7 +19,7 @@ fn paper(relays: u16) -> Setup {
     Setup::on_shared_channel(mission(relays))
 }
 
-/// Runs `setup`. Checks that the relays `left` end at the positions of an undisturbed chain of these relays.
+/// Runs `setup`. Checks that the relays `left` end at the positions of a chain of only these relays.
 fn settles(setup: &Setup, left: &[u16], name: &str) -> Outcome {
     let outcome = run(setup.clone()).unwrap();
     assert_eq!(outcome.ending, Ending::Settled, "{name}");
@@ -27,21 +27,22 @@ fn settles(setup: &Setup, left: &[u16], name: &str) -> Outcome {
     outcome
 }
 
-/// Compares the relays `left` with an undisturbed chain.
+/// Compares the positions of the relays `left` with those of a chain of only these relays. Returns the difference as
+/// an error.
 fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
     ledger::judge(setup, outcome, left, 0, *setup.mission.config())
 }
 
 const ALL: [u16; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
 
-/// Returns the relays of eight without `gone`.
+/// Returns the indices 1 to 8 without those in `gone`.
 fn without(gone: &[u16]) -> Vec<u16> {
     ALL.into_iter()
         .filter(|index| !gone.contains(index))
         .collect()
 }
 
-/// Returns how often a relay accepted a new view.
+/// Returns the number of times that a relay accepted a new membership view.
 fn views(outcome: &Outcome, relay: u16) -> usize {
     let reformed = |what| matches!(what, TimelineEvent::ViewAccepted { .. });
     outcome

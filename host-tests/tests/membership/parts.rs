@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Returns the part that continues after a split behind relay `after`. The majority, or the leader's half.
+/// Returns the relays that continue after a chain of eight is split behind relay `after`. They are the majority, or
+/// the half with the leader.
 fn goes_on(after: u16) -> Vec<u16> {
     if after >= 4 {
         (1..=after).collect()
@@ -63,7 +64,8 @@ fn a_split_chain_heals() {
     }
 }
 
-/// Returns the most views of any relay in ten minutes of a link that toggles every `half` seconds.
+/// Returns the most membership views that a relay accepts while a link toggles every `half` seconds. The link is
+/// behind relay `after`, and the simulated time is ten minutes.
 fn flaps(half: u64, after: u16) -> usize {
     let mut setup = paper(8);
     for n in 0..600 / (2 * half) {

@@ -13,13 +13,13 @@ use super::seal::{Seal, taken};
 use super::tally::Tally;
 use super::wires::{FLIGHT, Flying, Wires, end, message, pass};
 
-/// Relative error by which f32 arithmetic may miss a target.
+/// Relative error by which f32 arithmetic may make a hop miss its target SIR.
 pub(crate) const MISS: f64 = 2e-4;
 
-/// Relative error by which f32 arithmetic may miss the least separation.
+/// Relative error by which f32 arithmetic may make neighbours closer than the least separation.
 const CLOSE: f64 = 1e-5;
 
-/// Chain of relays, its model, and the clock.
+/// Chain of real relays under test, with its clock and a model of each relay.
 pub(crate) struct World<'a> {
     pub(crate) scenario: &'a Scenario,
     pub(crate) now: Instant,
@@ -27,12 +27,12 @@ pub(crate) struct World<'a> {
     pub(crate) wires: Wires,
     pub(crate) ledgers: Vec<Ledger>,
     pub(crate) tally: Tally,
-    /// Largest epoch with which a relay was started.
+    /// Largest epoch with which any relay has been started.
     pub(crate) epochs: u32,
 }
 
 impl<'a> World<'a> {
-    /// Creates a chain of relays that have just been switched on.
+    /// Creates a chain of relays that have just been switched on. The seeds of the relays follow from `seed`.
     pub(crate) fn new(scenario: &'a Scenario, seed: u32) -> Checked<Self> {
         let now = Instant::from_millis(1);
         let relays = scenario.relays();
@@ -51,7 +51,8 @@ impl<'a> World<'a> {
         Ok(world)
     }
 
-    /// Runs the main loop of relay `at`, counted from 0, once: timers, frames, events, next wake-up time.
+    /// Runs the main loop of relay `at` (from 0) once: timers, frames, events and next wake-up time. The model checks
+    /// all outputs.
     pub(crate) fn turn(&mut self, at: usize) -> Checked {
         let now = self.now;
         let relay = &mut self.relays[at];
@@ -124,7 +125,8 @@ impl<'a> World<'a> {
         (0..self.relays.len()).try_for_each(|at| self.turn(at))
     }
 
-    /// Checks neighbours that hold positions for the same target: separation, and SIR of the hop.
+    /// Checks each pair of neighbours that hold positions for the same target SIR. Their separation must be kept, and
+    /// the hop between them must meet the target.
     fn neighbours_agree(&mut self) -> Checked {
         let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
         let hops = self.scenario.judge.hops(&places);
@@ -175,13 +177,13 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Delivers bytes of a frame at the end of a line and runs the receiver's main loop.
+    /// Delivers bytes of a frame at the end of a line, then runs the receiver's main loop.
     pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
         self.hear(line, bytes, frame)?;
         self.turn(end(line).0)
     }
 
-    /// Delivers bytes of a frame; the ledger checks how the relay counts a pass.
+    /// Delivers bytes of a frame at the end of a line. The model checks how the relay counts a pass.
     pub(crate) fn hear(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
         let (to, port) = end(line);
         let from = match port {
@@ -238,7 +240,7 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Processes the next frame or timer in order. Returns true if there was one by `until`.
+    /// Processes the next frame or timer in order of time. Returns false if there is none by `until`.
     pub(crate) fn flow(&mut self, until: Instant) -> Checked<bool> {
         let timer = self.next_timer();
         match self.wires.next() {
@@ -255,7 +257,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Returns true if every relay holds a position, all for the same target.
+    /// Returns true if every relay holds its position, all for the same target SIR.
     pub(crate) fn agrees(&self) -> bool {
         let target = self.ledgers[0].target.map(f32::to_bits);
         self.ledgers

@@ -47,7 +47,7 @@ impl World<'_> {
         }
     }
 
-    /// Delivers the frame that is `behind` places after the next frame of `line`, `times` times.
+    /// Delivers a frame of `line` `times` times; 0 times loses it. The frame is `behind` frames after the next one.
     fn deliver(&mut self, line: u8, behind: u8, times: usize) -> Checked {
         let Some(line) = self.wires.pick(line) else {
             return Ok(());
@@ -152,7 +152,7 @@ impl World<'_> {
         self.turn(leader)
     }
 
-    /// Hands a relay the samples that it wants, at about `part` per cent of the agreed interference.
+    /// Passes interference samples to a relay, at about `part` per cent of the agreed interference.
     fn measure(&mut self, relay: u8, part: u8) -> Checked {
         let at = usize::from(relay) % self.relays.len();
         let field = self.scenario.mission.field();

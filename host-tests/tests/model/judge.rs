@@ -4,24 +4,24 @@ use uav_relay_oracle::reference::joint::Place;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Station};
 
-/// Relative excess over the optimum that f32 rounding permits a target.
+/// Relative excess over the optimum that f32 rounding permits a target SIR.
 const ABOVE: f64 = 1e-4;
 
-/// Reference model of a mission's chain.
+/// Reference model of a mission's chain, in f64.
 #[derive(Debug)]
 pub(crate) enum Judge {
-    /// Chain with an interferer at a known position.
+    /// Reference model of a chain with an interferer at a known position.
     Source {
         link: Link,
-        /// Best target within the relays' altitudes.
+        /// Highest target SIR within the relays' altitude limits.
         optimum: f64,
     },
-    /// Chain in a field of interference.
+    /// Reference model of a chain in a field of interference.
     Field(StochasticLink),
 }
 
 impl Judge {
-    /// Returns the SIRs of the N + 1 hops; those of a relay without a position are meaningless.
+    /// Returns the SIRs of the N + 1 hops. Those at a relay without a position are meaningless.
     pub(crate) fn hops(&self, places: &[Option<Place>]) -> Vec<f64> {
         let x: Vec<f64> = places
             .iter()
@@ -44,7 +44,8 @@ impl Judge {
         }
     }
 
-    /// Returns the SIR at `x_m` over that with the measured Upsilon, 1/W; 1 for a known interferer.
+    /// Returns the ratio of the SIR at `x_m` with the measured Upsilon = E[1/I] to that with the true one.
+    /// `measured_per_w` is the measured value in 1/W. Returns 1 for a known interferer.
     pub(crate) fn louder(&self, x_m: f64, measured_per_w: f64) -> f64 {
         match self {
             Self::Source { .. } => 1.0,
@@ -52,7 +53,8 @@ impl Judge {
         }
     }
 
-    /// Returns true if a chain may meet `target`, when no measured Upsilon is above `measured_per_w`, 1/W.
+    /// Returns true if a chain can meet `target`, given the largest Upsilon = E[1/I] that a relay measured.
+    /// `measured_per_w` is that Upsilon in 1/W, or `None` without a measurement.
     pub(crate) fn may_meet(&self, target: f64, measured_per_w: Option<f64>) -> bool {
         match self {
             Self::Source { optimum, .. } => target <= optimum * (1.0 + ABOVE),

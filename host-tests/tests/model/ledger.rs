@@ -14,13 +14,14 @@ use super::seal::{Taken, refused, taken};
 use super::signs::{LONGEST, QUESTIONS, Signs};
 use super::wires::{Ended, Flying, message};
 
-/// Maximum number of frames per drain. A pass, busy, decision, two for a renewal, and per side a heartbeat and a hello.
+/// Maximum number of frames that a relay sends in one turn of its main loop. These are a pass, `Busy`, a decision,
+/// two for a lease renewal, and a heartbeat and a hello on each side.
 pub(crate) const MOST_FRAMES: u32 = 9;
 
-/// Observed state of one relay since it was switched on.
+/// Model of one relay: its state as observed since it was switched on.
 #[derive(Debug)]
 pub(crate) struct Ledger {
-    /// Last setpoint.
+    /// Last setpoint; `None` before the first.
     pub(crate) place: Option<Place>,
     pub(crate) target: Option<f32>,
     pub(crate) holding: bool,
@@ -29,43 +30,43 @@ pub(crate) struct Ledger {
     ended: Ended,
     refused: u32,
     signs: [Signs; 2],
-    /// Longest lease granted, at least `dead_after`.
+    /// Longest lease granted to the relay; it is at least `dead_after`.
     longest: Duration,
-    /// Accepted view, 0 after each start.
+    /// Membership view that the relay has accepted; 0 after each start.
     pub(crate) view: ViewId,
-    /// Last pass of that view in which the relay took part.
+    /// Number of the last pass of this view in which the relay took part.
     pub(crate) pass: Option<u16>,
-    /// Last passes of earlier lives.
+    /// Numbers of the last passes in which the relay took part before its reboots.
     pub(crate) passes_before: Vec<u16>,
-    /// Largest Upsilon measured in this life or an earlier one, 1/W.
+    /// Largest Upsilon = E[1/I] that the relay has measured, also before its reboots, 1/W.
     pub(crate) measured_per_w: Option<f64>,
-    /// Epoch of this life: at least 1, increasing, unique among the relays.
+    /// Epoch of the relay since its last start: at least 1, increasing, different for all relays.
     pub(crate) epoch: u32,
-    /// Acceptor state in flash after the last vote.
+    /// Record of the relay's votes in its flash, after the last vote.
     pub(crate) record: Option<ViewRecord>,
-    /// Accepted frames.
+    /// Signed frames that the relay has accepted since its last start.
     taken: Taken,
 }
 
-/// Returns the shortest interval of questions to a neighbour, limited by the channel's capacity.
+/// Returns the shortest interval of heartbeat requests to a neighbour. The channel's capacity limits it.
 fn tick(settings: &Settings, relays: usize) -> Duration {
     let span = settings.dead_after.as_micros() - settings.probe_after.as_micros();
     let round = 2 * relays as u64 * settings.hop_time.as_micros();
     Duration::from_micros(round.clamp(span / 64 + 1, span / QUESTIONS as u64))
 }
 
-/// Returns the longest interval of questions to a neighbour.
+/// Returns the longest interval of heartbeat requests to a neighbour, from the shortest one.
 fn spread(tick: Duration) -> Duration {
     Duration::from_micros(tick.as_micros() + tick.as_micros() / 8 + 1)
 }
 
-/// Results of one turn of a relay's main loop.
+/// Outputs of one turn of a relay's main loop.
 pub(crate) struct Turn<'a> {
     pub(crate) now: Instant,
     pub(crate) relay: &'a Relay,
     pub(crate) sent: u32,
     pub(crate) events: &'a [Event],
-    /// Largest Upsilon measured by any other relay, 1/W.
+    /// Largest Upsilon = E[1/I] that any relay has measured, 1/W.
     pub(crate) measured_per_w: Option<f64>,
 }
 
@@ -99,7 +100,7 @@ impl Ledger {
         }
     }
 
-    /// Resets the ledger after a reboot, in which the relay loses everything but its flash.
+    /// Resets the model of a relay after a reboot, in which the relay loses all but its flash.
     pub(crate) fn reboot(&mut self, now: Instant, epoch: u32) {
         let mut passes_before = core::mem::take(&mut self.passes_before);
         passes_before.extend(self.pass);
@@ -111,7 +112,8 @@ impl Ledger {
         };
     }
 
-    /// Records frames received from the neighbour at `from`, one of which may have been accepted.
+    /// Records frames that the relay received from the neighbour at `from`. `taken` is the frame that the relay
+    /// accepted, if any.
     pub(crate) fn heard(
         &mut self,
         from: Side,
@@ -153,12 +155,13 @@ impl Ledger {
         }
     }
 
-    /// Records samples given to a relay that does not use them.
+    /// Records that the relay received interference samples that it does not use.
     pub(crate) fn refuses(&mut self, samples: u32) {
         self.refused += samples;
     }
 
-    /// Checks a turn of relay `at`, from 0. Returns true if setpoint, target or phase has changed.
+    /// Checks a turn of the main loop of relay `at`, from 0. Returns true if its setpoint, target or phase has
+    /// changed.
     pub(crate) fn audit(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked<bool> {
         let before = (self.place, self.target, self.holding);
         self.sent += turn.sent;
@@ -172,7 +175,7 @@ impl Ledger {
         Ok(before != (self.place, self.target, self.holding))
     }
 
-    /// Checks that the chain has the same relays in every view, and that new views are reported.
+    /// Checks that every membership view of the relay has all relays of the mission. New views must be reported.
     fn form(&self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let own = at as u16 + 1;
@@ -198,7 +201,7 @@ impl Ledger {
             .reduce(f64::max);
     }
 
-    /// Checks that a setpoint is never lost and changes only together with its event.
+    /// Checks that a relay never loses its setpoint, and reports each change of it by an event.
     fn follow(&mut self, turn: &Turn) -> Checked {
         let place = turn.relay.setpoint().map(as_told);
         let told = turn.events.contains(&Event::SetpointChanged);
@@ -215,7 +218,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks that a setpoint is finite, between Tx and Rx, and within the relay's altitude limits.
+    /// Checks that the setpoint is finite, between Tx and Rx, and within the relay's altitude limits.
     fn bounds(&self, scenario: &Scenario, at: usize) -> Checked {
         let Some(place) = self.place else {
             return Ok(());
@@ -240,7 +243,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks that a relay holds its position only for a target that the chain can meet.
+    /// Checks that a relay holds its position only for a target SIR that the chain can meet.
     fn aim(&mut self, scenario: &Scenario, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let target = relay.target();
@@ -278,7 +281,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks that counters never fall, and that each complete frame is counted once.
+    /// Checks that statistics counters never fall, and that each complete frame is counted once.
     fn count(&mut self, scenario: &Scenario, stats: &Stats) -> Checked {
         let rising = [self.stats, *stats].map(|stats| {
             [
@@ -330,7 +333,8 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks questions after `probe_after` of silence. Losses follow enough of them, or the longest lease.
+    /// Checks that a relay sends heartbeat requests to a neighbour that is silent for `probe_after`. A neighbour must
+    /// be reported as lost after enough unanswered requests, or after the longest lease.
     fn miss(&mut self, scenario: &Scenario, at: usize, turn: &Turn) -> Checked {
         let there = [at > 0, at + 1 < scenario.relays()];
         for event in turn.events {

@@ -45,14 +45,14 @@ type Checked<T = ()> = Result<T, TestCaseError>;
 
 const LONGEST: usize = 200;
 
-/// Number of operation sequences for each random mission.
+/// Number of operation sequences that are run with each random mission.
 const SEQUENCES_A_MISSION: u32 = 10;
 
 fn count() -> u32 {
     std::env::var("COUNT").map_or(2_000, |text| text.parse().unwrap())
 }
 
-/// Runs one sequence, from power-on to the agreement after the last fault.
+/// Runs one sequence of operations, from power-on to the agreement after the last fault.
 fn flown(scenario: &Scenario, seed: u32, sequence: &[Operation], tally: &mut Tally) -> Checked {
     let mut world = World::new(scenario, seed)?;
     for operation in sequence {
@@ -63,7 +63,7 @@ fn flown(scenario: &Scenario, seed: u32, sequence: &[Operation], tally: &mut Tal
     Ok(())
 }
 
-/// Returns a readable failure report: the reason, the mission, and the operations in order.
+/// Returns a readable report of a failure: its reason, the mission, and the operations in order.
 fn described(reason: &str, seed: u64, scenario: &Scenario, sequence: &[Operation]) -> String {
     let listed: Vec<String> = (1..)
         .zip(sequence)

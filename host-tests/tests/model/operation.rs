@@ -6,54 +6,60 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Operation on a chain. A line is one direction of a link, counted among those with a frame in flight.
+/// Operation on the simulated chain. A line is one direction of a link between neighbours; its number counts only
+/// lines with a frame in transit.
 #[derive(Clone, Debug)]
 pub(crate) enum Operation {
-    /// The next frame of a line arrives.
+    /// Operation: the next frame of a line arrives.
     Deliver(u8),
-    /// The next frame on this line is lost.
+    /// Operation: the next frame of a line is lost.
     Drop(u8),
-    /// The next frame of a line arrives twice.
+    /// Operation: the next frame of a line arrives twice.
     Twice(u8),
-    /// A frame of one line overtakes the frames before it.
+    /// Operation: a frame of a line overtakes frames before it. The fields are the line, and a number that selects
+    /// one to four frames to overtake.
     Overtake(u8, u8),
-    /// Several frames of one line arrive in one read: the line, and the number of frames.
+    /// Operation: several frames of a line arrive in one read. The fields are the line and their number.
     Burst(u8, u8),
-    /// The next frame of a line is delayed: line, ms.
+    /// Operation: the next frame of a line is delayed. The fields are the line and the delay in ms.
     Delay(u8, u16),
-    /// The next frame of a line arrives damaged: line, and for each byte its position and the flipped bits.
+    /// Operation: the next frame of a line arrives damaged. The fields are the line and, for each damaged byte, its
+    /// position and the flipped bits.
     Damage(u8, Vec<(u8, u8)>),
-    /// The clock advances to the next timer of any relay.
+    /// Operation: the clock advances to the next timer of any relay.
     Tick,
-    /// The clock advances by this many ms: every timer is served in time, and no frames arrive.
+    /// Operation: the clock advances by this many ms. Every timer is served in time, but no frames arrive.
     Wait(u16),
-    /// The clock advances by this many ms while all main loops are suspended: timers are served late.
+    /// Operation: the clock advances by this many ms while no main loop runs. Timers are served late.
     Sleep(u16),
-    /// The clock advances by this many ms without faults: frames arrive in order.
+    /// Operation: the clock advances by this many ms without faults. Frames arrive in order.
     Flow(u16),
-    /// A relay reboots with another seed.
+    /// Operation: a relay reboots. The fields are the relay and its new seed.
     Reboot(u8, u32),
-    /// A link is cut after this many bytes of the next frames: link, bytes.
+    /// Operation: a link is cut. The fields are the link, and the number of bytes of the next frames that still
+    /// arrive.
     Cut(u8, u8),
-    /// A link is restored.
+    /// Operation: a link that was cut is restored.
     Join(u8),
-    /// The leader is commanded to restart the agreement.
+    /// Operation: the leader is commanded to restart the agreement.
     Restart,
-    /// A recorded frame of a line arrives again, if the chain signs its frames, which must withstand that.
+    /// Operation: a recorded frame of a line arrives again, if the chain signs its frames. The fields are the line
+    /// and the frame.
     Replay(u8, u8),
-    /// A relay measures this percentage of the agreed interference: relay, per cent.
+    /// Operation: a relay measures interference. The fields are the relay, and the power in per cent of the agreed
+    /// one.
     Measure(u8, u8),
 }
 
-/// Seed increment that raises the number of a leader's first pass by 64, the smallest distance.
+/// Difference of seeds that raises the number of a leader's first pass by 64, the least possible.
 const NEXT_LIFE: u32 = 54_336;
 
-/// Draws a relay's seed. Any, or one that makes a leader's pass numbers close to those of an earlier life.
+/// Draws a relay's seed: any, or one with pass numbers close to those before a leader's reboot.
 pub(crate) fn seeds() -> impl Strategy<Value = u32> {
     prop_oneof![any::<u32>(), (0..4_u32).prop_map(|life| life * NEXT_LIFE)]
 }
 
-/// Draws an operation: most let the chain proceed, each fault comes every few dozen operations.
+/// Draws an operation. Most operations let the chain proceed; each fault comes every few dozen operations.
 pub(crate) fn operations() -> impl Strategy<Value = Operation> {
     let pick = any::<u8>;
     prop_oneof![

@@ -14,13 +14,15 @@ use super::ledger::Ledger;
 use super::scenario::Scenario;
 use super::wires::Pass;
 
-/// Divisor of the number of the first pass of a leader's life or view, and of no other number.
+/// Divisor of the number of a leader's first pass after its start or in a new membership view. A pass is a message
+/// that travels along the chain. No other pass has a multiple of this number.
 const FIRST: u16 = 64;
 
-/// Window of numbers behind a pass that count as over; a restarted leader may also skip that many.
+/// Number of passes before the last one that count as over. A restarted leader may also skip so many.
 const NEAR: u16 = 32;
 
-/// Returns a view's contribution to the mission digest. Its lower half plus its byte-swapped upper half.
+/// Returns what a membership view adds to the digest in its passes. It is the lower half plus the byte-swapped upper
+/// half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
@@ -32,19 +34,19 @@ const fn next(last: u16) -> u16 {
     next.wrapping_add(next.is_multiple_of(FIRST) as u16)
 }
 
-/// Classification of a received pass.
+/// Classification of a received pass, a message that travels along the chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Met {
     TakenUp,
     Again,
-    /// The pass is over: late.
+    /// Classification: a late pass, which is over already.
     Late,
-    /// The pass is of another view or another life of the leader, or follows one that was missed.
+    /// Classification: a pass of another view, from before the leader's reboot, or after a missed pass.
     Foreign,
 }
 
 impl Ledger {
-    /// Checks that a relay's view never goes back; a new view begins without a pass.
+    /// Checks that a relay's membership view never goes back. A new view begins without a pass.
     pub(crate) fn look_up(&mut self, relay: &Relay) -> Checked {
         let view = relay.view();
         prop_assert!(view >= self.view, "{view:?} after {:?}", self.view);
@@ -55,7 +57,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks the counters of a relay that received a pass.
+    /// Checks how a relay counts a received pass. Returns the pass's classification.
     ///
     /// `stands`: the relay has a position. `suspended`: it may be in a view change.
     pub(crate) fn meets(
@@ -103,7 +105,7 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay repeats the first pass of its view after a reboot.
+    /// Returns true if the relay takes part in the first pass of its membership view again, after a reboot.
     pub(crate) fn begins_anew(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))
@@ -123,7 +125,7 @@ impl Ledger {
         }
     }
 
-    /// Checks a pass that the relay sends: the accepted one, or at the leader a new one.
+    /// Checks a pass that the relay sends. It must be the accepted one or, at the leader, a new one.
     pub(crate) fn says(&mut self, scenario: &Scenario, leads: bool, pass: Pass) -> Checked {
         let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         prop_assert_eq!(pass.digest, view, "a pass of another view is said");

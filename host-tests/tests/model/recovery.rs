@@ -7,17 +7,17 @@ use super::Checked;
 use super::chain::{MISS, World};
 use super::scenario::{Calm, Kind};
 
-/// Longest time to agreement of an undisturbed chain, ms of virtual time.
+/// Longest time to an agreement of a chain without faults, ms of virtual time.
 const LONGEST_MS: u64 = 20_000;
 
-/// Largest number of views after the agreement.
+/// Largest number of further membership views after an agreement.
 const MOST_VIEWS: u32 = 2;
 
 /// Time of observation after the agreement, ms, in which no relay may be lost or move.
 const WATCH_MS: u64 = 16_000;
 
 impl World<'_> {
-    /// Returns the agreement of an undisturbed chain.
+    /// Runs a chain without faults until it agrees. Returns its agreement.
     pub(crate) fn calm(&mut self) -> Checked<Calm> {
         let took = self.agree(Duration::from_millis(LONGEST_MS))?;
         let target = self.ledgers[0].target.unwrap_or_default();
@@ -35,7 +35,7 @@ impl World<'_> {
             .collect()
     }
 
-    /// Runs the chain until every relay holds a position for the same target. Returns the time taken.
+    /// Runs the chain until every relay holds a position for the same target SIR. Returns the time taken.
     fn agree(&mut self, at_most: Duration) -> Checked<Duration> {
         let begun = self.now;
         while !self.agrees() {
@@ -50,10 +50,10 @@ impl World<'_> {
         Ok(self.now.since(begun))
     }
 
-    /// Returns the longest time that this mission's chain may take after a restart in any state.
+    /// Returns the longest permitted time to an agreement after a restart in any state of the chain.
     ///
-    /// It adds one retransmission per line to an undisturbed chain's time: a relay that waits for the result over `h` hops
-    /// retransmits after (2 h + 2) `hop_time` and an eighth.
+    /// It is the time of a chain without faults and one retransmission per line: a relay that waits for the result
+    /// over `h` hops retransmits after (2 h + 2) `hop_time` and an eighth.
     fn patience(&self) -> Duration {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;
@@ -67,14 +67,15 @@ impl World<'_> {
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }
 
-    /// Returns the longest time of a view request to the leader: each relay may wait for `quiet` first.
+    /// Returns the longest time that a request for a new view takes to the leader. Each relay may wait for
+    /// `probe_after` before it forwards the request.
     fn a_call(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
         Duration::from_micros(calls * probe_after_us)
     }
 
-    /// Checks that the target of Algorithm 2 equals the SIR of its worst hop. Other methods may leave a margin.
+    /// Checks that Algorithm 2's agreed target equals the SIR of its worst hop. Other methods may leave a margin.
     fn is_as_good_as_it_says(&self) -> Checked {
         if self.scenario.kind == Kind::Adjust
             && let Some(target) = self.ledgers[0].target
@@ -90,7 +91,7 @@ impl World<'_> {
         Ok(())
     }
 
-    /// Waits for a view requested before the agreement, after which the chain agrees again.
+    /// Waits for membership views that were requested before the agreement. The chain agrees again after each.
     fn settle(&mut self, at_most: Duration) -> Checked {
         for _ in 0..MOST_VIEWS {
             let views: Vec<ViewId> = self.relays.iter().map(Relay::view).collect();
@@ -106,7 +107,7 @@ impl World<'_> {
         Ok(())
     }
 
-    /// Ends a sequence: repairs the chain and returns the time to agreement.
+    /// Ends a sequence of operations: repairs the chain, and checks that it agrees. Returns the time taken.
     pub(crate) fn recover(&mut self) -> Checked<Duration> {
         (0..self.wires.links()).for_each(|link| self.wires.join(link));
         self.wires.hurry_all(self.now);

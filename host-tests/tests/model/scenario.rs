@@ -18,28 +18,29 @@ use uav_relay_oracle::reference::{Link, Station};
 use super::chain::World;
 use super::judge::Judge;
 
-/// Number of samples that a relay averages at a position.
+/// Number of samples that a relay averages at one position.
 pub(crate) const SAMPLES: u32 = 100;
 
-/// Range of the separation, as a fraction of D / (N + 1), in half of the chains with free altitudes.
+/// Range of the least separation in half of the chains with free altitudes, in units of D / (N + 1).
 const TIGHT: (f64, f64) = (0.05, 0.95);
 
 /// Number of scenes with free altitudes whose optima are recorded.
 const SCENES: u64 = 400;
 
-/// Optimisation method of the leader.
+/// Kind of mission: the leader's optimisation method and its data.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
-    /// Algorithm 1, predicted by the leader.
+    /// Kind of mission: Algorithm 1, where the leader predicts the target SIR.
     Predicted,
-    /// Algorithm 1 without prediction: the leader tries targets by sweeps. Relays may have their own altitudes and powers.
+    /// Kind of mission: Algorithm 1 without prediction, where the leader tries target SIRs by messages. Relays may
+    /// have their own altitudes and powers.
     Tried,
-    /// Algorithm 1 with free altitudes.
+    /// Kind of mission: Algorithm 1 with free altitudes.
     Altitude,
     Adjust,
-    /// Algorithm 4 in the configured field.
+    /// Kind of mission: Algorithm 4 in a configured field of interference.
     Field,
-    /// Algorithm 4 in the measured field.
+    /// Kind of mission: Algorithm 4 in a field of interference that the relays measure.
     Measured,
 }
 
@@ -54,18 +55,18 @@ impl Kind {
     ];
 }
 
-/// Agreement of an undisturbed chain.
+/// Agreement of a chain without faults.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Calm {
-    /// Bits of x, y and altitude of every relay.
+    /// Bits of the agreed x, y and altitude of every relay.
     pub(crate) places: Vec<[u32; 3]>,
-    /// Bits of the target.
+    /// Bits of the agreed target SIR.
     pub(crate) target: u32,
-    /// Virtual time to the agreement, µs.
+    /// Virtual time until the agreement, µs.
     pub(crate) took_us: u64,
 }
 
-/// Mission with its reference model and its undisturbed agreement.
+/// Mission for the model test, with its reference model and the agreement of a chain without faults.
 #[derive(Debug)]
 pub(crate) struct Scenario {
     pub(crate) kind: Kind,
@@ -76,7 +77,7 @@ pub(crate) struct Scenario {
 }
 
 impl Scenario {
-    /// Returns relay `at`, counted from 0, just switched on.
+    /// Creates relay `at` (from 0), which has just been switched on.
     pub(crate) fn relay(&self, at: usize, seed: u32, epoch: u32, now: Instant) -> Relay {
         let mut settings = self.settings[at];
         if let Some(auth) = &mut settings.auth {
@@ -89,12 +90,12 @@ impl Scenario {
         Relay::new(self.mission, identity, settings, seed, now).unwrap()
     }
 
-    /// Returns true if frames are signed.
+    /// Returns true if the relays sign their frames.
     pub(crate) fn signs(&self) -> bool {
         self.settings.iter().all(|one| one.auth.is_some())
     }
 
-    /// Returns the mission with signed frames, whose undisturbed chain must reach the unsigned agreement.
+    /// Returns the same mission with signed frames. Without faults, its agreement must equal the unsigned one.
     fn signed(mut self) -> Self {
         for one in &mut self.settings {
             one.auth = Some(Auth {
@@ -135,7 +136,7 @@ pub(crate) fn pool(seed: u64, count: u32) -> Vec<Scenario> {
         .collect()
 }
 
-/// Draws a mission; `None` if the draw is infeasible.
+/// Draws a mission of a kind; `None` if no chain can fly it.
 fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
     let (mission, settings, judge) = match kind {
         Kind::Predicted | Kind::Tried => aligned(rng, kind)?,
@@ -162,7 +163,7 @@ fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
 
 type Parts = (Mission, Vec<Settings>, Judge);
 
-/// Returns the settings of every relay, with individual profiles where given.
+/// Returns the settings of each relay, with its own profile if `own` has one.
 fn settings(relays: usize, common: Settings, own: &[(u16, Profile)]) -> Vec<Settings> {
     let mut all = vec![common; relays];
     for (index, profile) in own {
@@ -196,7 +197,7 @@ fn aligned(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     Some((mission, settings, Judge::Source { link, optimum }))
 }
 
-/// Returns the link and corridor of a scene below [`SCENES`], whose optimum is recorded.
+/// Returns the link and altitude limits of random scene `number`, below [`SCENES`]. Its optimum is recorded.
 fn numbered(number: u64) -> (Link, Corridor) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     rng.set_stream(number);
@@ -259,7 +260,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     Some((mission, settings, Judge::Source { link, optimum }))
 }
 
-/// Draws the steps of Algorithm 2, up to some fraction of the highest altitude at a time.
+/// Draws the parameters of Algorithm 2. Moves are up to a fraction of the highest altitude, `most_m`.
 fn turns(rng: &mut ChaCha8Rng, most_m: f32) -> Adjust {
     Adjust {
         rounds: rng.random_range(1..=6),

@@ -16,20 +16,20 @@ pub(crate) struct Seal {
     pub(crate) to: u32,
 }
 
-/// Frames accepted by a relay since it was switched on, from its upstream and downstream neighbours.
+/// Signed frames that a relay has accepted since it was switched on. The sides are upstream and downstream.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Taken {
     frames: [BTreeSet<(u32, Vec<u8>)>; 2],
-    /// Largest accepted epoch by side.
+    /// Largest epoch in an accepted frame of each neighbour.
     newest: [u32; 2],
 }
 
-/// Returns the number of accepted frames.
+/// Returns the number of frames that a relay has accepted.
 pub(crate) fn taken(stats: &Stats) -> u32 {
     stats.received + stats.handshakes
 }
 
-/// Returns the number of frames refused as forged or replayed.
+/// Returns the number of frames that a relay has refused as forged or replayed.
 pub(crate) fn refused(stats: &Stats) -> u32 {
     stats.forged + stats.replayed
 }
@@ -47,7 +47,8 @@ fn handshake(wire: &[u8]) -> Option<Vec<u8>> {
 }
 
 impl Taken {
-    /// Checks that a relay may accept a frame from `side`. Returns true if it is a sign of life.
+    /// Checks that a relay was right to accept a frame from `side`. Returns true if the frame proves that the sender
+    /// is alive.
     pub(crate) fn take(
         &mut self,
         side: usize,

@@ -3,25 +3,28 @@
 use uav_relay::wire::message::Message;
 use uav_relay::{Duration, Instant};
 
-/// Unanswered questions required before a loss, and how many of them may still be answered.
+/// Number of unanswered heartbeat requests before a neighbour is lost. `OPEN` is the number that may still be
+/// answered.
 pub(crate) const QUESTIONS: usize = 16;
 const OPEN: u32 = 4;
 
-/// Multiples of the questions open before an answer, and of `dead_after`, that always suffice.
+/// Factor on the most requests ever open before a reply: after so many, a loss is certain. `LONGEST` is the factor on
+/// `dead_after`.
 const MARGIN: usize = 3;
 pub(crate) const LONGEST: u32 = 8;
 
-/// Evidence that a neighbour is alive.
+/// Model of what a relay knows about the life of a neighbour.
 #[derive(Debug)]
 pub(crate) struct Signs {
-    /// Number and time of every question.
+    /// Number and time of every heartbeat request to the neighbour.
     pub(crate) asked: Vec<(u16, Instant)>,
-    /// Last time when the neighbour was certainly alive, and when it may have been.
+    /// Last time when the neighbour was certainly alive. `perhaps` is the last time when it may have been.
     pub(crate) surely: Instant,
     pub(crate) perhaps: Instant,
-    /// Reception time of the last possible sign of life.
+    /// Time at which the last possible sign of life was received.
     pub(crate) last: Instant,
-    /// Questions since the last certain sign and since the last possible one. The third number is the most before a certain one.
+    /// Number of requests since the last certain sign of life. The next fields are the number since the last possible
+    /// sign, and the most before a certain one.
     pub(crate) open: usize,
     pub(crate) perhaps_open: usize,
     pub(crate) most_open: usize,
@@ -52,7 +55,8 @@ impl Signs {
         }
     }
 
-    /// Records signs of life: an answer counts from its question, a completion from the forwarding.
+    /// Records signs of life of the neighbour. A reply proves life at the time of its request; a pass or a lease
+    /// renewal may prove it on reception.
     pub(crate) fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
             Message::Heartbeat { reply: answer, .. } => {
@@ -84,7 +88,8 @@ impl Signs {
         }
     }
 
-    /// Returns true if the neighbour was lost after `most` of silence and enough questions, or `longest`.
+    /// Returns true if the relay must report the neighbour as lost. The silence is `most` with enough unanswered
+    /// requests, or `longest`.
     pub(crate) fn is_to_be_missed(&self, most: Duration, longest: Duration) -> bool {
         let Some((_, asked)) = self.asked.last() else {
             return false;

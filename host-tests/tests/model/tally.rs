@@ -6,17 +6,17 @@ use uav_relay::Duration;
 
 use super::scenario::{Kind, Scenario};
 
-/// Event counts and maxima of measured values.
+/// Counters of events in the model test, and the largest values of some measurements.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     counts: BTreeMap<&'static str, u64>,
     most: BTreeMap<&'static str, u64>,
-    /// Longest time to agreement, µs, by kind and by whether frames are signed.
+    /// Longest time to an agreement, µs, by kind of mission and by signed or unsigned frames.
     took_us: BTreeMap<(Kind, bool), u64>,
     sequences: BTreeMap<(Kind, bool), u64>,
 }
 
-/// Events with the number of sequences in which each must happen at least once.
+/// Events, each with the number of sequences among which it must occur at least once.
 const EXPECTED: [(&str, u64); 18] = [
     ("frames in bursts", 1),
     ("frames delayed", 1),
@@ -48,7 +48,7 @@ impl Tally {
         *most = value.max(*most);
     }
 
-    /// Adds the counts of one sequence, which ended with an agreement after `took`.
+    /// Adds the counters of one sequence of operations, which ended with an agreement after `took`.
     pub(crate) fn sequence(&mut self, scenario: &Scenario, other: &Self, took: Duration) {
         let kind = (scenario.kind, scenario.signs());
         for (what, count) in &other.counts {
@@ -62,7 +62,7 @@ impl Tally {
         *longest = took.as_micros().max(*longest);
     }
 
-    /// Prints the counts; panics if an expected event is too rare in `sequences` sequences.
+    /// Prints the counters. Panics if an expected event is too rare in `sequences` sequences.
     pub(crate) fn judge(&self, sequences: u32) {
         println!("{sequences} sequences: {:?}", self.counts);
         println!("at most: {:?}", self.most);

@@ -9,13 +9,13 @@ use uav_relay::{Duration, Instant, Port};
 
 use super::seal::Seal;
 
-/// Time of flight of an undisturbed frame.
+/// Time that a frame takes to a neighbour without faults.
 pub(crate) const FLIGHT: Duration = Duration::from_millis(5);
 
-/// Maximum number of frames in flight on one line: further ones are lost.
+/// Maximum number of frames in transit on one line; further frames are lost.
 const ROOM: usize = 12;
 
-/// Number of frames of a line that an attacker records.
+/// Number of frames of each line that a simulated attacker has recorded.
 const RECORDED: usize = 64;
 
 #[derive(Clone, Debug)]
@@ -28,24 +28,24 @@ pub(crate) struct Flying {
 #[derive(Debug, Default)]
 struct Line {
     flying: VecDeque<Flying>,
-    /// Delayed frames; frames sent later arrive before them.
+    /// Delayed frames, which frames sent later overtake.
     late: Vec<Flying>,
-    /// Bytes received since the last delimiter.
+    /// Bytes that the receiver got since the last delimiter.
     begun: Vec<u8>,
-    /// Sent frames, newest last.
+    /// Frames that the attacker has recorded, newest last.
     recorded: VecDeque<Flying>,
 }
 
-/// Numbers of frames completely received.
+/// Numbers of complete frames that a receiver got.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ended {
-    /// Frames that arrived as sent.
+    /// Number of frames that arrived as they were sent.
     pub(crate) intact: u32,
-    /// Other frames that are not empty.
+    /// Number of other frames that are not empty.
     pub(crate) broken: u32,
 }
 
-/// Links of a chain: link `k` connects relays `k` and `k + 1`, from 0; its line `2 k` goes downstream.
+/// Links of a chain. Link k connects relays k and k + 1 (from 0); its lines are 2 k downstream and 2 k + 1 upstream.
 #[derive(Debug)]
 pub(crate) struct Wires {
     lines: Vec<Line>,
@@ -55,15 +55,15 @@ pub(crate) struct Wires {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pass {
     pub(crate) number: u16,
-    /// Digest of the mission plus the mark of the view.
+    /// Digest of the mission, plus what the membership view adds to it.
     pub(crate) digest: u16,
-    /// True for a pass of Algorithm 2.
+    /// True if Algorithm 2 moves relays by this pass.
     pub(crate) moves: bool,
-    /// True if the pass builds on data that earlier passes collected from relays.
+    /// True if the pass builds on data that earlier passes collected from the relays.
     pub(crate) follows: bool,
 }
 
-/// Returns the message in a frame; `None` for a handshake.
+/// Returns the message in a frame; `None` for a handshake or a damaged frame.
 pub(crate) fn message(frame: &[u8]) -> Option<Message> {
     let mut deframer = Deframer::new();
     for &byte in frame {
@@ -111,7 +111,7 @@ impl Wires {
         }
     }
 
-    /// Queues a frame sent by relay `from`.
+    /// Puts a frame that relay `from` sent at `port` in transit.
     pub(crate) fn send(&mut self, from: usize, port: Port, frame: Flying) {
         let line = match port {
             Port::Upstream => 2 * from - 1,
@@ -129,14 +129,14 @@ impl Wires {
         }
     }
 
-    /// Returns a recorded frame of a line.
+    /// Returns one of the recorded frames of a line, chosen by `which`; `None` if there is none.
     pub(crate) fn recorded(&self, line: usize, which: u8) -> Option<Flying> {
         let recorded = &self.lines[line].recorded;
         let at = usize::from(which) % recorded.len().max(1);
         recorded.get(at).cloned()
     }
 
-    /// Selects one of the lines with a frame in flight.
+    /// Returns the number of one of the lines with a frame in transit, chosen by `pick`.
     pub(crate) fn pick(&self, pick: u8) -> Option<usize> {
         let busy: Vec<usize> = (0..self.lines.len())
             .filter(|&line| !self.lines[line].flying.is_empty())
@@ -144,14 +144,15 @@ impl Wires {
         busy.get(usize::from(pick) % busy.len().max(1)).copied()
     }
 
-    /// Removes the frame that is `behind` places after the next one of a line, or else its last frame.
+    /// Removes the frame that is `behind` frames after the next one of a line, or else its last frame.
     pub(crate) fn take(&mut self, line: usize, behind: u8) -> Option<Flying> {
         let flying = &mut self.lines[line].flying;
         let last = flying.len().checked_sub(1)?;
         flying.remove(usize::from(behind).min(last))
     }
 
-    /// Receives bytes of a frame that was sent as `whole` at the end of a line.
+    /// Receives bytes at the end of a line. Returns the numbers of frames that they complete. `whole` is the frame as
+    /// it was sent.
     pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], whole: &[u8]) -> Ended {
         let begun = &mut self.lines[line].begun;
         let mut ended = Ended::default();
@@ -166,7 +167,7 @@ impl Wires {
         ended
     }
 
-    /// Discards the partial frames at relay `at`, which has just been switched on.
+    /// Discards the incomplete frames at relay `at`, which has just been switched on.
     pub(crate) fn forget(&mut self, at: usize) {
         for (number, line) in self.lines.iter_mut().enumerate() {
             if end(number).0 == at {
@@ -175,7 +176,7 @@ impl Wires {
         }
     }
 
-    /// Cuts a link; frames in flight are lost, and the next one of each of its lines is returned.
+    /// Cuts a link. Frames in transit are lost; the next frame of each of its two lines is returned.
     pub(crate) fn cut(&mut self, link: usize) -> [(usize, Option<Flying>); 2] {
         self.cut[link] = true;
         [2 * link, 2 * link + 1].map(|line| {
@@ -195,13 +196,13 @@ impl Wires {
         self.cut.len()
     }
 
-    /// Delays the next frame of a line until `due` while the others pass.
+    /// Delays the next frame of a line until `due`, while later frames pass it.
     pub(crate) fn delay(&mut self, line: usize, due: Instant) {
         let Line { flying, late, .. } = &mut self.lines[line];
         late.extend(flying.pop_front().map(|frame| Flying { due, ..frame }));
     }
 
-    /// Releases the delayed frames that are due by `now`. They arrive before the frames in transit.
+    /// Releases the delayed frames that are due by `now`. They arrive before the other frames in transit.
     pub(crate) fn hurry(&mut self, now: Instant) {
         for Line { flying, late, .. } in &mut self.lines {
             let due = late.extract_if(.., |frame| frame.due <= now);
@@ -209,14 +210,14 @@ impl Wires {
         }
     }
 
-    /// Releases all delayed frames.
+    /// Releases all delayed frames at once.
     pub(crate) fn hurry_all(&mut self, now: Instant) {
         let late = self.lines.iter_mut().flat_map(|line| &mut line.late);
         late.for_each(|frame| frame.due = now);
         self.hurry(now);
     }
 
-    /// Returns the arrival time and line of the next undisturbed frame.
+    /// Returns the arrival time and the line of the frame that arrives next; `None` without frames.
     pub(crate) fn next(&self) -> Option<(Instant, usize)> {
         let lines = self.lines.iter().zip(0..);
         let coming = lines.flat_map(|(line, number)| {

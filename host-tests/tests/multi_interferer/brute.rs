@@ -2,25 +2,25 @@
 
 use uav_relay_scenario::scene::Scene;
 
-/// Number of cells of the first grid.
+/// Number of cells of the grid in the first search.
 const CELLS: u32 = 600;
 
-/// Number of segments of the line; the best chain with its first relay in each is a candidate.
+/// Number of segments of the line. The best chain whose first relay is in a segment is a candidate.
 const PARTS: f64 = 16.0;
 
-/// Number of best candidates, which are refined.
+/// Number of the best candidates that are refined.
 const CANDIDATES: usize = 4;
 
-/// Number of positions of each relay in a refinement, on either side of the best one so far.
+/// Number of grid positions of each relay in a refinement, on either side of its present position.
 const BESIDE: i32 = 40;
 
 /// Half width of the first refinement, as a fraction of D.
 const WINDOW: f64 = 0.06;
 
-/// Number of refinements, each with a narrower window.
+/// Number of refinements of a candidate, each with a narrower window.
 const REFINEMENTS: u32 = 32;
 
-/// Ratio of successive window widths.
+/// Ratio of the window widths of two successive refinements.
 const SHRINK: f64 = 0.6;
 
 /// SIR and positions of a chain.
@@ -60,7 +60,8 @@ pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
     refined.fold(0.0, f64::max)
 }
 
-/// Returns the best chains with relay k on `grids[k - 1]`. There is one for each of `parts` segments for relay 1.
+/// Returns the best chains with relay k at a point of `grids[k - 1]`, best first. There is one chain for each of
+/// `parts` segments that relay 1 can be in.
 fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<Found> {
     let d = scene.distance_m;
     let (mut worth, mut ways) = (at_last(scene, h, &grids[grids.len() - 1]), Vec::new());
@@ -113,7 +114,7 @@ fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<Found> {
     firsts.iter().map(chain).collect()
 }
 
-/// Returns the SIR at Rx from each position of the last relay.
+/// Returns the SIR at Rx for each position of the last relay.
 fn at_last(scene: &Scene, h: f64, places: &[f64]) -> Vec<f64> {
     let d = scene.distance_m;
     let power = scene.relays[scene.relays.len() - 1].power_w / scene.eta;
@@ -122,7 +123,7 @@ fn at_last(scene: &Scene, h: f64, places: &[f64]) -> Vec<f64> {
     places.iter().map(sir).collect()
 }
 
-/// Returns the interference power at (x, h) through a path-loss factor.
+/// Returns the interference power at (x, h), W, received with the path-loss factor `factor`.
 fn noise(scene: &Scene, x: f64, h: f64, factor: f64) -> f64 {
     let each = scene.sources.iter().map(|s| {
         let square = (x - s.x_m).powi(2) + s.y_m.powi(2) + h.powi(2);

@@ -35,7 +35,8 @@ fn count(case: &Case, name: &str) -> u32 {
     case.args[name].as_u64().unwrap().try_into().unwrap()
 }
 
-/// Compares with the file, whose errors are those of the midpoint rule on nx x nh cells.
+/// Compares the single interferer fitted to several ones with values of a separate program. That program integrates
+/// errors by the midpoint rule on nx x nh cells.
 #[test]
 fn the_cases_of_a_separate_program_are_met() {
     let cases = cases::of("hyp_msi").unwrap();
@@ -99,7 +100,7 @@ fn equal_sources_at_one_place_are_one_of_their_common_power() {
     }
 }
 
-/// Compares the rasters of the fit and its report with ten times as many points; prints the time.
+/// Checks that a fitted interferer and its stated error change little with many more points. Prints the time.
 #[test]
 fn the_rasters_are_fine_enough() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(74));
@@ -124,7 +125,7 @@ fn the_rasters_are_fine_enough() {
     assert!(search < 1e-3 && report < 3e-5);
 }
 
-/// Checks the widest permitted ranges of a scenario.
+/// Checks that an interferer can be fitted in scenarios at the limits of the permitted ranges.
 #[test]
 fn extreme_scenes_have_a_finite_fit() {
     let of = |d: f64, h: (f64, f64), sources: &[(f64, f64, f64)]| {
@@ -178,7 +179,8 @@ fn extreme_scenes_have_a_finite_fit() {
     assert_eq!(hypothetical(&nobody), None);
 }
 
-/// Checks that the interferers' side matters with lateral room and not without.
+/// Checks that the fitted interferer is on the true ones' side if lateral offsets are permitted. Without lateral
+/// offsets, its side is always positive.
 #[test]
 fn with_room_beside_the_line_the_side_is_known() {
     let source = |x_m: f64, y_m: f64| Source {

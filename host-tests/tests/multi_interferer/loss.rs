@@ -14,19 +14,19 @@ use uav_relay_tools::multi_interferer::optimum;
 
 use super::scenes::{Sources, scenario};
 
-/// Relative SIR tolerance of the relays.
+/// Relative tolerance of the target SIR on which the relays agree.
 const TOLERANCE: f64 = 1e-5;
 
-/// Upper bounds of the classes into which the relative error of the fit is divided.
+/// Upper limits of the classes by which the relative error of a fitted interferer is reported.
 const CLASSES: [f64; 6] = [0.001, 0.01, 0.03, 0.1, 0.3, 1.0];
 
-/// Relative error of the fit, and fraction of the best SIR that is lost.
+/// Error of a fitted interferer, and the fraction of the best SIR that a chain loses by it.
 struct Outcome {
     error: f64,
     lost: f64,
 }
 
-/// Returns the relays' positions in a scenario of one interferer.
+/// Returns x and altitude of each relay in a scenario with one interferer, m; `None` without a chain.
 fn placed(scenario: &Scenario, n: u16) -> Option<Vec<(f64, f64)>> {
     let (mission, own) = mission::mission(scenario, n, TOLERANCE).ok()?;
     let of = |index: u16| profile_of(&mission, &own, index);

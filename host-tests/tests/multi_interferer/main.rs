@@ -11,7 +11,7 @@ mod random_fit;
 mod scenes;
 mod sum;
 
-/// Returns the relative excess of `got` over `want`.
+/// Returns the relative excess of `got` over `want`: 0 if both are equal.
 fn above(got: f64, want: f64) -> f64 {
     got / want - 1.0
 }

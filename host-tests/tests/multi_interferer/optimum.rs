@@ -13,7 +13,7 @@ use uav_relay_tools::multi_interferer::{self, best_common_altitude, optimum};
 use super::scenes::{level, of_link, scene};
 use super::{above, brute};
 
-/// Returns the chain after a check of its order, band, separation and SIR.
+/// Checks a chain's order, altitudes, separation and SIR, and returns the chain.
 pub(crate) fn checked(scene: &Scene, chain: multi_interferer::Chain) -> multi_interferer::Chain {
     let places = &chain.places;
     assert_eq!(places.len(), scene.relays.len());
@@ -60,7 +60,8 @@ fn of_one_source_it_is_the_optimum_of_the_reference() {
     assert!(worst < 1e-9, "{worst}");
 }
 
-/// Compares one to four relays with brute force; a third have own powers, half a separation.
+/// Compares the optimum of one to four relays with brute force. In a third of the scenes the relays have different
+/// powers; half of the scenes have a least separation.
 #[test]
 fn brute_force_finds_the_same() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(77));
@@ -118,7 +119,8 @@ fn what_has_no_best_chain_has_none() {
     assert!(held(false) && !held(true));
 }
 
-/// Checks as many relays as fit, one more, and a thousand with different powers.
+/// Checks chains of as many relays as the separation permits, of one more, and of a thousand. The thousand relays
+/// have different powers.
 #[test]
 fn crowded_and_long_chains_are_placed() {
     let crowd = |n, apart| Scene {
@@ -143,7 +145,8 @@ fn crowded_and_long_chains_are_placed() {
     assert!(found.sir > 40.0, "more than a hundred relays reach");
 }
 
-/// Checks the best common altitudes of the paper's scenario. Interferer at 150 m, 20 m to 300 m, 4 m apart.
+/// Checks the best common altitudes of the paper's scenario against known values. The interferer is at y = 150 m,
+/// altitudes are 20 m to 300 m, and the separation is 4 m.
 #[test]
 fn known_best_common_altitudes_are_found() {
     for (n, sir, altitude_m) in [

@@ -8,10 +8,10 @@ use uav_relay_scenario::hypothetical::{Raster, fit};
 use super::above;
 use super::scenes::scene;
 
-/// Number of random positions in each scene.
+/// Number of random positions of a fitted interferer in each scene.
 const DRAWN: usize = 20_000;
 
-/// Number of positions compared on the fit's raster: the best by a coarse one.
+/// Number of best random positions by a coarse raster that are compared on the raster of the fit.
 const WEIGHED: usize = 100;
 
 #[test]

@@ -31,9 +31,9 @@ use uav_relay_scenario::{
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sources {
-    /// Sources at any position, also on the line.
+    /// Kind of scene: interferers at any position, also on the line.
     Any,
-    /// Sources far to the side of the line between Tx and Rx.
+    /// Kind of scene: interferers far to the side of the line between Tx and Rx.
     Aloof,
 }
 
@@ -105,12 +105,12 @@ pub(crate) fn scene(
     Scene::new(&scenario, n).unwrap()
 }
 
-/// Returns the scene of a reference link at the first relay's altitude.
+/// Returns the scene of a reference link, with the first relay's altitude as the only one.
 pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }
 
-/// Returns the scene with the lowest altitude of its band as the only allowed altitude.
+/// Returns the scene with its lowest permitted altitude as the only one.
 pub(crate) fn level(mut scene: Scene) -> Scene {
     scene.band.most_m = scene.band.least_m;
     scene

@@ -10,7 +10,7 @@ use uav_relay_oracle::reference::Link;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Draws a link in the relays' precision, in one of ten cases without noise.
+/// Draws a link with receiver noise, or in one of ten cases without. Numbers are rounded to f32.
 fn drawn(rng: &mut impl Rng, style: &Style) -> Link {
     let link = random::link(rng, style);
     as_relays_know_it(&if rng.random_bool(0.1) {
@@ -20,7 +20,7 @@ fn drawn(rng: &mut impl Rng, style: &Style) -> Link {
     })
 }
 
-/// Returns the fraction of noise in the worst hop's noise and interference.
+/// Returns the fraction of noise in the sum of noise and interference at the worst hop.
 fn share(link: &Link, x: &[f64]) -> f64 {
     let silent = Link {
         noise_w: 0.0,
@@ -34,7 +34,8 @@ fn hop_sinrs_agree_with_the_reference() {
     hop_sirs_agree(&mut generator(1101), |rng| drawn(rng, &Style::ANY));
 }
 
-/// Compares chains of 1 to 50 identical relays in noise with the optimum: within 1e-4, never above.
+/// Compares chains of 1 to 50 identical relays in noise with the optimum. They are within 1e-4 of it, and never
+/// above.
 #[test]
 fn the_optimum_is_found_in_noise() {
     let mut rng = generator(1102);
@@ -66,7 +67,7 @@ fn the_optimum_is_found_in_noise() {
     );
 }
 
-/// Checks that unlike relays meet their agreed target, which is not above the optimum.
+/// Checks that different relays in noise meet their agreed target SIR. It is never above the optimum.
 #[test]
 fn mixed_chains_in_noise_meet_what_they_agree_on() {
     let mut rng = generator(1103);
@@ -82,7 +83,7 @@ fn mixed_chains_in_noise_meet_what_they_agree_on() {
     assert!(all.best * 10 > all.solved * 8, "{all:?}");
 }
 
-/// Checks faults on chains with noise, and that zero noise changes no bit of a position.
+/// Checks that message faults do not change a bit of the positions of chains with receiver noise.
 #[test]
 fn chains_in_noise_settle_to_the_bit_despite_faults() {
     let mut rng = generator(1104);

@@ -7,7 +7,7 @@ use uav_relay::optimiser::plan;
 use uav_relay::{Field, FieldPoint, Interference, Mission, MissionConfig, Schedule, sir};
 use uav_relay_oracle::random::{self, log_uniform};
 
-/// Returns E[f(u)] for u = I / I_max of a Beta distribution, by its density on a grid.
+/// Returns E[f(u)], where u = I / I_max has a Beta distribution, by its density on a grid.
 fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
     // u = 1 / (1 + e^-z): the density in z is proportional to u^alpha (1 - u)^beta.
     let (mut sum, mut weight) = (0.0, 0.0);
@@ -22,7 +22,7 @@ fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
     sum / weight
 }
 
-/// Compares the mean with the upper bound and with the lower bound 1 / (E[I] + N).
+/// Checks that E[1 / (I + N)] is at most the crate's bound and at least 1 / (E[I] + N).
 #[test]
 fn noise_in_a_field_is_bounded_from_above() {
     let mut worst = Vec::new();
@@ -68,7 +68,7 @@ fn mission(points: &[(f32, f32)], noise_w: f32, relays: u16) -> Result<Mission, 
     })
 }
 
-/// Checks that noise is equivalent to a table of Upsilon / (1 + N Upsilon).
+/// Checks that noise power N acts as if each Upsilon = E[1/I] were Upsilon / (1 + N Upsilon).
 #[test]
 fn a_chain_in_a_noisy_field_is_that_of_its_table() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(1131));

@@ -4,7 +4,7 @@ use host_tests::placing::{DrawnHop, SINGLE, drawn_hop, generator, reaches_agree}
 use rand::{Rng, RngExt};
 use uav_relay_oracle::random::{count, log_uniform};
 
-/// Draws a target that some positions meet: the SINR along the hop, or a value near the gain.
+/// Draws a target SIR that some positions of the hop meet, or one near its gain.
 fn target(rng: &mut impl Rng, of: &DrawnHop) -> f32 {
     if rng.random_bool(0.2) {
         let by = f64::from(rng.random_range(-3..=3)) * log_uniform(rng, 1e-9, 1e-3);
@@ -29,7 +29,8 @@ fn reaches_in_noise_agree_with_the_reference() {
     );
 }
 
-/// Checks that the reach falls with the target and rises with the start, within two f32 steps.
+/// Checks that the reach of a hop falls with the target SIR, and rises with the hop's start. The reach is the
+/// farthest position that meets the target; the tolerance is two f32 steps.
 #[test]
 fn the_reach_in_noise_is_monotonic() {
     let mut rng = generator(1112);

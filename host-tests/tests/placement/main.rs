@@ -29,7 +29,8 @@ fn hop_sirs_agree_with_the_reference() {
     });
 }
 
-/// Draws a third of the targets near the hop's gain, where the printed formulas lose their digits.
+/// Compares the reach of a hop, the farthest position that meets a target SIR, with the reference. A third of the
+/// targets are near the hop's gain, where the printed formulas lose their digits.
 #[test]
 fn reaches_agree_with_the_reference() {
     let seen = reaches_agree(&mut generator(12), 20_000, false, |rng, of| {
@@ -82,7 +83,8 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
     assert!(met > 5_000, "{met}");
 }
 
-/// Compares 1 to 50 relays with the optimum, D 10 m to 100 km, the interferer anywhere. Identical, or with own powers.
+/// Compares chains of 1 to 50 relays with the optimum, identical or with their own powers. D is 10 m to 100 km, and
+/// the interferer is anywhere.
 #[test]
 fn the_optimum_is_found_on_random_links() {
     let own_power = Style {
@@ -111,7 +113,8 @@ fn the_optimum_is_found_on_random_links() {
     }
 }
 
-/// Checks that unlike relays meet their agreed target, which is not always the optimum but never above.
+/// Checks that relays of different altitudes and powers meet their agreed target SIR. It may be below the optimum,
+/// but not above.
 #[test]
 fn mixed_chains_meet_what_they_agree_on() {
     let mut all = Mixed::default();
@@ -129,7 +132,8 @@ fn mixed_chains_meet_what_they_agree_on() {
     );
 }
 
-/// Checks a chain that meets 37 743 but misses 31 292, where the search once oscillated for ever.
+/// Checks a chain that can meet an SIR of 37 743 but not one of 31 292. A search must not oscillate between them for
+/// ever.
 #[test]
 fn a_target_that_is_met_counts_though_a_lower_one_is_missed() {
     let mut rng = ChaCha8Rng::seed_from_u64(124);

@@ -18,7 +18,8 @@ fn round(value: f64) -> f64 {
     f64::from(value as f32)
 }
 
-/// Draws a scenario: interferers or a field, a band, lateral room, a separation, own relay profiles.
+/// Draws a scenario with interferers or a field of interference. It may have ranges of altitude and lateral offset, a
+/// separation, and own relay profiles.
 fn scenario(rng: &mut impl Rng) -> Scenario {
     let style = Style {
         relays: 1..=1,
@@ -119,7 +120,7 @@ fn ask(rng: &mut impl Rng) -> PlanRequest {
     }
 }
 
-/// Returns the reference link of `n` relays at the plan's altitude, for a scenario with one interferer.
+/// Returns the reference link of `n` relays at the plan's altitude; `None` without a single interferer.
 fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
     let Interference::Sources(sources) = &scenario.interference else {
         return None;
@@ -253,7 +254,7 @@ fn places(plan: &Plan) -> impl Iterator<Item = Place> + '_ {
     plan.places.iter().map(|(place, _)| reference(*place))
 }
 
-/// Checks that plans with lateral room have the stated SIR and come near the reference's optimum.
+/// Checks that plans with lateral offsets have the stated SIR, and come near the recorded optimum.
 #[test]
 fn plans_beside_the_line_are_worth_what_they_say() {
     let mut rng = ChaCha8Rng::seed_from_u64(702);

@@ -117,7 +117,7 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
     }
 }
 
-/// Change that makes settings invalid.
+/// Function that makes relay settings invalid.
 type Change = fn(&mut Settings);
 
 #[test]

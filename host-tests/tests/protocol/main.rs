@@ -18,7 +18,7 @@ fn relay(mission: Mission, index: u16) -> Relay {
     fixtures::relay(mission, index, Settings::default())
 }
 
-/// Returns the port, message and bytes of each pending frame.
+/// Returns the port, message and bytes of each frame that the relay wants to send.
 fn drain(relay: &mut Relay, now: Instant) -> Vec<(Port, Message, Vec<u8>)> {
     let sent = bench::sent(relay, now).into_iter();
     let sent: Vec<_> = sent
@@ -46,7 +46,7 @@ fn events(relay: &mut Relay) -> Vec<Event> {
     bench::events(relay).collect()
 }
 
-/// Runs the leader's prediction until it sends its sweep.
+/// Runs the leader until its prediction ends and it sends its first sweep message. Returns time and frame.
 fn first_sweep(head: &mut Relay) -> (Instant, Vec<u8>) {
     for _ in 0..10_000 {
         let now = head.poll_timeout().unwrap();

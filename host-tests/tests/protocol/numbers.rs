@@ -12,7 +12,7 @@ fn sweep_in(bytes: &[u8]) -> Sweep {
     }
 }
 
-/// Returns the last relay after it received `sweep`, and again with its number changed by `off`.
+/// Returns the last relay after it received a sweep message twice. The second copy has its number raised by `off`.
 fn after_two(sweep: &[u8], now: Instant, off: u16) -> Relay {
     let mut tail = relay(mission(2), 2);
     tail.handle_bytes(now, Port::Upstream, sweep);
@@ -27,7 +27,7 @@ fn again(tail: &mut Relay, sweep: &[u8], now: Instant, off: u16) {
     tail.handle_bytes(now, Port::Upstream, &encode(1, 2, &Message::Sweep(sweep)));
 }
 
-/// Returns true if the relay requests a view, at once or a millisecond later.
+/// Returns true if the relay requests a new membership view, at once or a millisecond later.
 fn calls(relay: &mut Relay, now: Instant) -> bool {
     let mut said = drain(relay, now);
     let later = now + Duration::from_millis(1);
@@ -95,7 +95,8 @@ fn the_first_pass_of_another_life_is_never_the_next_one() {
     }
 }
 
-/// Checks that a delayed first pass does not admit a rebooted relay to a later pass.
+/// Checks that a rebooted relay takes no part in a later pass. Before, it has received a delayed copy of the first
+/// pass.
 #[test]
 fn a_pass_that_was_held_up_lets_nobody_into_a_later_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(3), 1));
@@ -108,7 +109,8 @@ fn a_pass_that_was_held_up_lets_nobody_into_a_later_one() {
     assert_eq!(rebooted.setpoint(), None);
 }
 
-/// Checks other content with the same number, as from a relay that rebooted.
+/// Checks that a pass with the same number and other content counts as another pass. A relay before this one that
+/// rebooted sends such a pass.
 #[test]
 fn the_same_number_with_other_content_is_another_pass() {
     let changes: [fn(&mut Sweep); 4] = [

@@ -10,7 +10,7 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::fleet::{Fleet, Image};
 
-/// Combination of all faults.
+/// Random faults of the frames between drones: loss, corruption, duplication and reordering.
 pub(crate) const BAD_DAY: Faults = Faults {
     loss: 0.3,
     corrupt: 0.15,
@@ -22,7 +22,7 @@ pub(crate) fn paper(uavs: u16) -> Flight {
     Flight::new(&Scenario::default(), uavs, 1e-4, 7).unwrap()
 }
 
-/// Returns the bits of the simulated chain's positions.
+/// Returns the f32 bits of the positions on which the simulated chain agrees.
 pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
     let mut setup = Setup::new(*flight.mission());
     setup.profiles = flight.profiles().to_vec();
@@ -42,8 +42,8 @@ pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
 
 /// Maximum number of flights until one has no damaged frame.
 ///
-/// The emulator is not real time, so on a busy host it loses a byte now and then. A fault of the port driver shows in every
-/// flight.
+/// The emulator is not real time, so on a busy host it loses a byte now and then. A fault of the port driver would
+/// show in every flight.
 const FLIGHTS: usize = 3;
 
 #[test]
@@ -102,7 +102,7 @@ fn five_settle_there_through_a_bad_day() {
     }
 }
 
-/// Checks the image built with no feature but the log.
+/// Checks that the smallest firmware image agrees as the simulated chain does. It has no feature but the log.
 #[test]
 fn five_of_the_smallest_image_settle_there_too() {
     let flight = paper(5);
@@ -118,7 +118,7 @@ fn five_of_the_smallest_image_settle_there_too() {
     }
 }
 
-/// Checks the runner of `uav_relay::asynch` on its own executor.
+/// Checks that the image with the runner of `uav_relay::asynch` agrees as the simulated chain does.
 #[test]
 fn five_on_asynchronous_ports_settle_there_too() {
     let flight = paper(5);
@@ -135,7 +135,7 @@ fn five_on_asynchronous_ports_settle_there_too() {
     }
 }
 
-/// Checks that an image without a method reports it and does not fly.
+/// Checks that an image without the configured method reports this and has no setpoint.
 #[test]
 fn the_smallest_image_refuses_what_it_cannot_do() {
     let flight = paper(2).by(Method::Joint);

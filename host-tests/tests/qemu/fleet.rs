@@ -20,16 +20,16 @@ use crate::log::{self, Line};
 /// First log lines of every image: the emulator has no reset cause and no PLL.
 pub(crate) const OF_THE_CHIP: [&str; 2] = ["started: unknown", "clock 16 MHz, no PLL"];
 
-/// Timeout of any step of a test.
+/// Timeout of any step of a test. A fleet has `PATIENCE_A_DRONE` more for each drone.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
-/// Maximum time until a drone has logged its first lines.
+/// Longest time until a drone has logged its first lines.
 const START: Duration = Duration::from_secs(30);
 
-/// Additional timeout for each drone, since all share this machine.
+/// Time added to the timeout for each drone, since all drones share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
 
-/// Flashed image: both variants, the smallest with Algorithm 1 alone, and asynchronous ports.
+/// Firmware image: for wires, for a radio, the smallest (Algorithm 1 only), or with asynchronous ports.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Image {
     Wires,
@@ -66,7 +66,7 @@ pub(crate) fn image(example: &str) -> PathBuf {
     folder.join(example)
 }
 
-/// Returns the log strings of an image.
+/// Returns the table of log strings of an image, by which its log is decoded.
 fn table(which: Image) -> &'static Table {
     static TABLES: [OnceLock<Table>; 4] = [const { OnceLock::new() }; 4];
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
@@ -82,16 +82,16 @@ fn lines_of(lines: &[Line], drone: u16) -> usize {
     lines.iter().filter(|line| line.drone == drone).count()
 }
 
-/// Lock for one fleet at a time, so that the drones' clocks keep up with the wall clock.
+/// Lock that permits one fleet at a time, so that the drones' clocks keep up with real time.
 static AIR: Mutex<()> = Mutex::new(());
 
-/// Running drones of a flight.
+/// Running emulated drones of one flight.
 pub(crate) struct Fleet {
     // The drop order matters: without drones the network and log threads end.
     drones: Vec<Emulator>,
     network: Network,
     consoles: Vec<UnixStream>,
-    /// Sockets at the drones' autopilot ports.
+    /// Sockets at the serial ports to which the drones' autopilots are connected.
     pub(crate) autopilots: Vec<UnixStream>,
     new: Receiver<Line>,
     pub(crate) lines: Vec<Line>,
@@ -100,12 +100,12 @@ pub(crate) struct Fleet {
 }
 
 impl Fleet {
-    /// Starts one drone for each block, on `image`, with a medium of `faults` and `seed`.
+    /// Starts one drone with `image` for each configuration block. `faults` and `seed` are those of the medium.
     pub(crate) fn start(which: Image, blocks: &[Vec<u8>], faults: Faults, seed: u64) -> Self {
         Self::begin(which, blocks, &[], None, faults, seed, Life::Fast)
     }
 
-    /// Starts drones with given flash contents, besides their blocks.
+    /// Starts drones with the given flash contents beside their configuration blocks.
     pub(crate) fn with_flash(
         which: Image,
         blocks: &[Vec<u8>],
@@ -116,7 +116,7 @@ impl Fleet {
         Self::begin(which, blocks, kept, None, faults, seed, Life::Fast)
     }
 
-    /// Starts drones with a transmitter at the other end of `socket`.
+    /// Starts drones, with a ground station at the transmitter on the other end of `socket`.
     pub(crate) fn with_transmitter(
         which: Image,
         blocks: &[Vec<u8>],
@@ -203,24 +203,24 @@ impl Fleet {
         }
     }
 
-    /// Starts every drone of `flight`.
+    /// Starts every drone of `flight`, with clocks 10.5 times as fast as real time.
     pub(crate) fn of(which: Image, flight: &Flight, faults: Faults, seed: u64) -> Self {
         Self::start(which, &blocks(flight), faults, seed)
     }
 
-    /// Starts every drone of `flight` on perfect wires in real time.
+    /// Starts every drone of `flight` in real time, on wires without faults.
     pub(crate) fn in_real_time(flight: &Flight) -> Self {
         let blocks = blocks(flight);
         let (which, faults) = (Image::Wires, Faults::default());
         Self::begin(which, &blocks, &[], None, faults, 1, Life::Real)
     }
 
-    /// Collects the log lines so far.
+    /// Collects the log lines that have arrived.
     pub(crate) fn listen(&mut self) {
         self.lines.extend(self.new.try_iter());
     }
 
-    /// Collects log lines until `done` holds for them; on a timeout the test fails with all lines.
+    /// Collects log lines until `done` is true for them. On a timeout the test fails with all lines.
     pub(crate) fn wait(&mut self, what: &str, mut done: impl FnMut(&[Line]) -> bool) {
         let started = Instant::now();
         let drones = u32::try_from(self.drones.len()).unwrap();
@@ -253,12 +253,12 @@ impl Fleet {
         self.lines.iter().filter(move |line| line.drone == drone)
     }
 
-    /// Returns the lines of one drone after those about its chip.
+    /// Returns the log lines of one drone without the first ones about its chip.
     pub(crate) fn after_start(&self, drone: u16) -> impl Iterator<Item = &Line> {
         self.of_drone(drone).skip(OF_THE_CHIP.len())
     }
 
-    /// Waits until every drone has a setpoint. Returns their bits.
+    /// Waits until every drone has a setpoint. Returns the f32 bits of the setpoints.
     pub(crate) fn places(&mut self) -> Vec<[u32; 3]> {
         let drones = u16::try_from(self.drones.len()).unwrap();
         let last = |lines: &[Line], drone| {
@@ -273,7 +273,7 @@ impl Fleet {
             .collect()
     }
 
-    /// Waits until the chain has agreed on `places`, to the bit, possibly after others.
+    /// Waits until the chain has agreed on exactly `places`. Other agreements may come first.
     pub(crate) fn settle_at(&mut self, places: &[[u32; 3]]) {
         assert_eq!(self.drones.len(), places.len());
         self.wait("agreement on these places", |lines| {
@@ -289,7 +289,7 @@ impl Fleet {
         });
     }
 
-    /// Requests a drone's counters and waits for them.
+    /// Requests the statistics counters of a drone, and waits for the log line with them.
     pub(crate) fn counters(&mut self, drone: u16) -> Line {
         let before = self.lines.len();
         self.consoles[usize::from(drone) - 1]
@@ -308,7 +308,7 @@ impl Fleet {
         self.drones[usize::from(drone) - 1].kill();
     }
 
-    /// Returns the medium's fault counters.
+    /// Returns the numbers of faults that the medium has injected.
     pub(crate) fn injected(&self) -> Injected {
         self.network.injected()
     }

@@ -45,7 +45,7 @@ fn said(fleet: &mut Fleet, text: &str) {
     fleet.wait(text, |lines| lines.iter().any(|line| line.text == text));
 }
 
-/// Flies from the start until the pilot takes control again.
+/// Checks a flight from the start, through setpoint control, until the pilot takes control again.
 fn flies_to_its_place(image: Image, kind: Kind) {
     let to = agreed();
     // A PX4's mode choice expires after 0.8 s of silence, and at ten times the speed this process may be delayed for as long.
@@ -158,7 +158,7 @@ fn an_arducopter_flies_to_the_agreed_place() {
     flies_to_its_place(Image::Radio, Kind::ArduCopter);
 }
 
-/// Checks a drone without sites, which sends no targets.
+/// Checks that a drone without configured sites sends no targets to its autopilot.
 #[test]
 fn a_drone_without_sites_tells_nobody() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);

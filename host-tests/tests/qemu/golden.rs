@@ -14,7 +14,7 @@ use crate::fleet::{PATIENCE, image};
 #[expect(unreachable_pub, reason = "as in the image")]
 mod answer;
 
-/// Returns the host's answer to each frame of `heard`.
+/// Returns the answers that the firmware's code on the host gives to each frame of `heard`.
 fn here(heard: &[u8]) -> Vec<Vec<u8>> {
     let mut answerer = answer::Answerer::new();
     let mut answers = vec![Vec::new()];

@@ -18,13 +18,13 @@ use crate::fleet::Fleet;
 use crate::log::Line;
 use crate::vehicle::{Vehicle, apart};
 
-/// Settings with a late first query and no fading, so that the clock's difference has no effect.
+/// Scenario with a late first query and no fading, so that the emulated clocks' speed has no effect.
 const LISTENING: &str = "[geometry]\naltitude_m = 30\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n\
     [site]\ntx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
     rx = { lat_deg = 47.41, lon_deg = 8.55, amsl_m = 431.0 }\n\
     [listen]\nevery_s = 60\nhalf_life_s = 1e12\nrelative_error = 0.1\n";
 
-/// Interferer, for the radios alone.
+/// Interferer of the scenario, which only the radios' noise values contain.
 const SOURCE: &str = "[[interferer]]\npower_w = 80\nx_m = 900\ny_m = 350\n";
 
 const RELAYS: u16 = 3;
@@ -38,7 +38,7 @@ fn scene() -> Scene {
     Scene::new(&known, RELAYS).unwrap()
 }
 
-/// Returns three positions to which the pilot flies a drone.
+/// Returns three positions to which the pilot of a drone flies it, to measure there.
 fn places(drone: u16) -> [Placement; 3] {
     let x_m = 336.0 * f32::from(drone);
     [[-60.0, 70.0, 30.0], [20.0, -50.0, 45.0], [90.0, 10.0, 60.0]].map(|[x, y_m, altitude_m]| {
@@ -50,13 +50,13 @@ fn places(drone: u16) -> [Placement; 3] {
     })
 }
 
-/// Returns a radio's noise value at a position.
+/// Returns the noise value in a SiK radio's unit that a radio reports at a position.
 fn noise(at: Placement) -> u8 {
     let dbm = 10.0 * scene().interference_w(at).log10() + 30.0;
     ((dbm + 127.0) * 1.9).round() as u8
 }
 
-/// Runs the simulated chain with the radios' measurements at the autopilots' positions.
+/// Runs the simulated chain with the measurements that the radios make at the drones' positions.
 fn simulated(flight: &Flight) -> Outcome {
     let axis = unknown().line.unwrap().axis;
     let mut setup = Setup::new(*flight.mission());
@@ -179,7 +179,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
     }
 }
 
-/// Runs all vehicles until the logs satisfy `done`.
+/// Runs all vehicles until `done` is true for the log lines.
 fn together(
     fleet: &mut Fleet,
     vehicles: &mut [Vehicle],

@@ -9,28 +9,28 @@ use defmt_decoder::{DecodeError, Table};
 
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Line {
-    /// Number of the drone, 1 to N.
+    /// Number of the drone that logged the line, 1 to N.
     pub(crate) drone: u16,
-    /// Time by the drone's clock, µs.
+    /// Time in the drone's clock, µs.
     pub(crate) at: u64,
     pub(crate) text: String,
 }
 
 impl Line {
-    /// Returns the text behind `label`.
+    /// Returns the text behind `label` in the line; `None` if it has no such label.
     pub(crate) fn after(&self, label: &str) -> Option<&str> {
         self.text
             .split_once(label)
             .map(|(_, rest)| rest.trim_start())
     }
 
-    /// Returns the bits that the line gives in parentheses behind `label`.
+    /// Returns the f32 bits that the line has in parentheses behind `label`.
     fn bits(&self, label: &str) -> Option<u32> {
         let (_, rest) = self.after(label)?.split_once("(0x")?;
         u32::from_str_radix(rest.split_once(')')?.0, 16).ok()
     }
 
-    /// Returns the bits of x, y and altitude of a setpoint line.
+    /// Returns the f32 bits of x, y and altitude in a line about a setpoint; `None` for other lines.
     pub(crate) fn setpoint(&self) -> Option<[u32; 3]> {
         self.text
             .starts_with("setpoint")
@@ -51,7 +51,7 @@ pub(crate) fn table(image: &Path) -> Table {
         .expect("an image with a defmt table")
 }
 
-/// Decodes lines until the drone is switched off; undecodable data becomes a line too.
+/// Decodes log lines until the drone is switched off. Data that cannot be decoded becomes a line, too.
 pub(crate) fn listen(
     mut port: UnixStream,
     drone: u16,

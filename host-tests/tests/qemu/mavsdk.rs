@@ -13,7 +13,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde_json::Value;
 use uav_relay::Geodetic;
 
-/// MAVSDK process and the messages it received.
+/// Process with MAVSDK as the autopilot, and the messages that it has received.
 pub(crate) struct Mavsdk {
     child: Child,
     orders: ChildStdin,
@@ -22,7 +22,7 @@ pub(crate) struct Mavsdk {
 }
 
 impl Mavsdk {
-    /// Starts MAVSDK at the end of `socket`, for a drone at `at`.
+    /// Starts MAVSDK as the autopilot at the end of `socket`, for a drone at `at`.
     pub(crate) fn start(socket: UnixStream, at: Geodetic) -> Self {
         let tty = wired(socket);
         let script =
@@ -58,7 +58,7 @@ impl Mavsdk {
         writeln!(self.orders, "{order}").unwrap();
     }
 
-    /// Collects the messages received so far.
+    /// Collects the messages that MAVSDK has received.
     pub(crate) fn listen(&mut self) {
         self.heard.extend(self.new.try_iter());
     }
@@ -69,12 +69,12 @@ impl Mavsdk {
             .any(|heard| heard["mavpackettype"] == name)
     }
 
-    /// Returns true if the operator received the text.
+    /// Returns true if the operator has received the status text `text`.
     pub(crate) fn reads(&self, text: &str) -> bool {
         self.heard.iter().any(|heard| heard["text"] == text)
     }
 
-    /// Returns true if the message was requested.
+    /// Returns true if the companion has requested message `id`.
     pub(crate) fn is_asked_for(&self, id: u32) -> bool {
         let asks = |heard: &&Value| heard["command"] == 511;
         let mut asked = self.heard.iter().filter(asks);
@@ -100,7 +100,7 @@ impl Drop for Mavsdk {
     }
 }
 
-/// Creates a tty whose other side is `socket`.
+/// Creates a tty whose other side is connected to `socket`. Returns its path.
 fn wired(socket: UnixStream) -> PathBuf {
     let side = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
     grantpt(&side).unwrap();
@@ -123,7 +123,7 @@ fn wired(socket: UnixStream) -> PathBuf {
     PathBuf::from(path)
 }
 
-/// Copies bytes until either end closes.
+/// Copies bytes from one end to the other until either is closed.
 fn carry(mut from: impl Read, mut to: impl Write) {
     let mut bytes = [0; 512];
     while let Ok(count @ 1..) = from.read(&mut bytes) {

@@ -10,7 +10,8 @@ use uav_relay_tools::provision::block::Flight;
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
 
-/// Returns a flight past an interferer at `y_m` with lateral room `aside_m` and one `held` altitude.
+/// Returns a flight of five relays past an interferer at (500, `y_m`) m. Lateral offsets are up to `aside_m`; `held`
+/// is a relay and the altitude that it keeps.
 fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
         let own = RelayOverride {
@@ -34,7 +35,7 @@ fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Fli
     Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
 }
 
-/// Returns a flight in a field that is worst at two thirds of the line.
+/// Returns a flight in a field of interference that is strongest at two thirds of the line.
 pub(crate) fn field() -> Flight {
     let beta = [
         (0.0, 2.0, 3.0),
@@ -53,7 +54,7 @@ pub(crate) fn field() -> Flight {
     Flight::new(&scenario, 5, 1e-4, 7).unwrap()
 }
 
-/// Returns the paper's scenario with receivers of 20 MHz and a noise figure of 60 dB.
+/// Returns a flight of the paper's scenario with receiver noise: 20 MHz and a noise figure of 60 dB.
 fn noisy(method: Method, most_m: f64) -> Flight {
     let scenario = Scenario {
         altitude_max_m: most_m,
@@ -67,7 +68,7 @@ fn noisy(method: Method, most_m: f64) -> Flight {
     Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
 }
 
-/// Checks that iterative searches give the same bits on the target.
+/// Checks that the iterative searches with noise give the same bits on the target as on the host.
 #[test]
 fn five_in_noise_settle_at_the_places_of_the_simulated_chain() {
     let silent = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
@@ -114,7 +115,7 @@ fn five_choose_the_altitudes_of_the_simulated_chain() {
     settles(&flight);
 }
 
-/// Checks that with lateral room the drones move to the side away from the interferer, and stay low.
+/// Checks that drones that may have lateral offsets move to the side away from the interferer.
 #[test]
 fn five_go_to_the_side_as_the_simulated_chain_does() {
     let flight = past(150.0, 280.0, None, Method::Joint);
@@ -123,7 +124,7 @@ fn five_go_to_the_side_as_the_simulated_chain_does() {
     settles(&flight);
 }
 
-/// Checks that a relay with a held altitude stays up and moves to the side with the others.
+/// Checks that a relay that holds its altitude moves to the side with the others.
 #[test]
 fn five_go_to_the_side_around_one_that_holds_its_altitude() {
     let flight = past(150.0, 280.0, Some((3, 100.0)), Method::Joint);

@@ -22,7 +22,7 @@ fn five_on_one_radio_settle_where_the_simulated_chain_does() {
     }
 }
 
-/// Checks that after drone 3 is killed the others take the positions of a chain of four, to the bit.
+/// Checks that the others take exactly the positions of a chain of four after drone 3 was switched off.
 #[test]
 fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
     let flight = paper(5);

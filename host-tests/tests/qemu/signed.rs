@@ -42,7 +42,7 @@ fn five_that_sign_settle_where_the_simulated_chain_does() {
     }
 }
 
-/// Checks one drone with another key and one without a key.
+/// Checks that a drone with another key and one without a key take no part in the chain.
 #[test]
 fn a_drone_without_the_key_takes_no_part() {
     let flight = paper(4);

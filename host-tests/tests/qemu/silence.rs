@@ -12,12 +12,12 @@ use crate::fleet::{Fleet, Image, OF_THE_CHIP};
 use crate::log::Line;
 use crate::methods::field;
 
-/// Tolerance for delays of this machine, µs of the drones' clock. That clock runs 10.5 times too fast.
+/// Tolerance for delays of this machine, µs of the drones' clocks. They run 10.5 times too fast.
 ///
 /// `a_silent_relay_is_noticed_by_both_neighbours_...` tests the exact time in simulation.
 const SLACK: u64 = 525_000;
 
-/// Checks the time of detection by the drones' clocks, read just before the drone is killed.
+/// Checks that both neighbours of a drone that was switched off report this in time, by their clocks.
 #[test]
 fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let flight = paper(5);
@@ -155,7 +155,7 @@ fn a_drone_with_half_a_secret_takes_no_part_and_says_why() {
     }
 }
 
-/// Returns `block` with `bytes` at `at` and an updated CRC.
+/// Returns the configuration block with `bytes` at offset `at`, and its CRC updated.
 fn with(block: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut block = block.to_vec();
     block[at..at + bytes.len()].copy_from_slice(bytes);

@@ -14,12 +14,13 @@ use crate::flight::{axis, scenario};
 use crate::mavsdk::Mavsdk;
 use crate::vehicle::{Vehicle, apart};
 
-/// Drones 1, 2 and 3; the autopilot of the first is MAVSDK.
+/// Flight of three drones. The autopilot of the first is MAVSDK.
 struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of late-link releases handled by MAVSDK's pilot, and whether OFFBOARD is due again.
+    /// Number of times that MAVSDK's pilot has reacted to refused setpoint control. `chooses` is true while OFFBOARD
+    /// is due again.
     found: usize,
     chooses: bool,
 }
@@ -46,7 +47,8 @@ impl Three {
         }
     }
 
-    /// Chooses another mode after a late link released the first drone, and then OFFBOARD again.
+    /// Chooses another mode, and then OFFBOARD again, if the first drone's relay refused setpoint control. The relay
+    /// refuses a mode that was chosen before it started.
     fn choose_again(&mut self) {
         let count = |text: &str| {
             self.fleet
@@ -75,7 +77,7 @@ impl Three {
         self.fleet.of_drone(drone).any(|line| line.text == text)
     }
 
-    /// Returns the target of the first drone as its position, and the positions of the other drones.
+    /// Returns the last target of the first drone, and the positions of the other two drones.
     fn places(&self) -> Option<[Placement; 3]> {
         let first = axis().place(self.mavsdk.target()?)?;
         let [second, third] = self.others.each_ref().map(|vehicle| vehicle.place);

@@ -18,12 +18,12 @@ use uav_relay_tools::provision::config::Secret;
 use crate::chain::{BAD_DAY, paper, simulated};
 use crate::fleet::{Fleet, Image, PATIENCE};
 
-/// Words of a sector of 128 KiB.
+/// Number of 32-bit words in a flash sector of 128 KiB.
 const LARGE: usize = 32 * 1024;
 
 const KEY: [u8; 32] = *b"three drones and one transmitter";
 
-/// Returns the uploaded flight: another interferer position, altitude and power.
+/// Returns the flight to upload: interferer, altitude and power differ from the loaded one.
 fn moved(uavs: u16) -> Flight {
     let scenario = Scenario {
         interference: Interference::Sources(vec![Source {
@@ -55,7 +55,7 @@ fn blocks(loaded: &Flight) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Transmitter at the end of a socket; its clock is as fast as the drones'.
+/// Ground station at the transmitter, on a socket. Its clock is as fast as the drones' clocks.
 struct Station {
     socket: UnixStream,
     ground: Ground,
@@ -82,7 +82,7 @@ impl Station {
         uav_relay::Instant::from_micros(u64::try_from(micros).unwrap())
     }
 
-    /// Uploads a mission. Returns the relay that reports its adoption.
+    /// Uploads a mission. Returns the index of the relay that first reports that it flies the mission.
     fn upload(&mut self, upload: Upload) -> u16 {
         self.ground.upload(self.now(), upload).unwrap();
         let end = Instant::now() + PATIENCE;
@@ -131,7 +131,8 @@ fn three_fly_what_the_transmitter_uploads() {
     }
 }
 
-/// Checks flash logs with version 2, version 3, and a record truncated by a power failure.
+/// Checks that drones fly the newest mission stored in their flash. It has versions 2 and 3, and a version 4
+/// truncated by a power failure.
 #[test]
 fn three_fly_what_they_were_handed_before_they_were_switched_on() {
     let loaded = paper(3);

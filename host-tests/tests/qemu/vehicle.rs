@@ -23,10 +23,11 @@ const SYSTEM: u8 = 7;
 
 const FASTEST_M_S: f32 = 8.0;
 
-/// Time for which the pilot chooses another mode, ms: six heartbeats.
+/// Time for which the pilot chooses another mode, ms: that of six heartbeats.
 const ELSEWHERE: u64 = 1_500;
 
-/// Messages and their intervals, ms; heartbeats are frequent because this process may be delayed.
+/// Message id of the heartbeat. `PERIODS` has the intervals of all messages in ms; heartbeats are frequent because
+/// this process may be delayed.
 const HEARTBEAT: u32 = 0;
 const POSITION: u32 = 33;
 const TARGET: u32 = 87;
@@ -38,7 +39,7 @@ const PERIODS: [(u32, u64); 4] = [
     (SYS_STATE, 500),
 ];
 
-/// Received target, with its time, ms.
+/// Position target that the vehicle has received, with the time in ms.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct SentTarget {
     pub(crate) at: u64,
@@ -50,7 +51,7 @@ pub(crate) struct Vehicle {
     socket: UnixStream,
     axis: Axis,
     began: Instant,
-    /// Speed of the drone's clock.
+    /// Speed of the drone's clock: real time, or 10.5 times as fast.
     life: Life,
     moved_at: u64,
     said_at: [u64; PERIODS.len()],
@@ -59,12 +60,12 @@ pub(crate) struct Vehicle {
     goal: Option<(Placement, Geodetic)>,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
-    /// True if the pilot chooses OFFBOARD or GUIDED, and again on request; false in manual flight.
+    /// True if the pilot chooses OFFBOARD or GUIDED, and again when asked; false in manual flight.
     pub(crate) granted: bool,
-    /// Time until which the pilot chooses another mode, ms.
+    /// Time until which the pilot chooses another mode than OFFBOARD or GUIDED, ms.
     elsewhere_until: u64,
     pub(crate) place: Placement,
-    /// Requested messages.
+    /// Ids of the messages that the companion has requested.
     pub(crate) asked: BTreeSet<u32>,
     pub(crate) told: Vec<SentTarget>,
     pub(crate) texts: Vec<String>,
@@ -78,7 +79,7 @@ pub(crate) fn apart(a: Placement, b: Placement) -> f32 {
 }
 
 impl Vehicle {
-    /// Creates a vehicle on the ground.
+    /// Creates a vehicle on the ground at `place`, whose autopilot is at the end of `socket`.
     pub(crate) fn new(
         kind: Kind,
         socket: UnixStream,
@@ -110,7 +111,7 @@ impl Vehicle {
         }
     }
 
-    /// Returns the time since the start, ms.
+    /// Returns the time since the vehicle was created, ms of the drone's clock.
     pub(crate) fn now(&self) -> u64 {
         let ms = self.began.elapsed().mul_f64(self.life.speed()).as_millis();
         u64::try_from(ms).unwrap()
@@ -123,7 +124,7 @@ impl Vehicle {
         }
     }
 
-    /// Runs until `done`; on a timeout the test fails.
+    /// Runs the vehicle until `done` is true. On a timeout the test fails.
     pub(crate) fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
         let end = Instant::now() + PATIENCE;
         while !done(self) {
@@ -139,7 +140,7 @@ impl Vehicle {
         }
     }
 
-    /// Sends the position and a SiK radio's noise value.
+    /// Sends the vehicle's position and a SiK radio's noise value.
     pub(crate) fn hears(&mut self, noise: u8) {
         self.say(POSITION, self.now());
         let radio = MavHeader {
@@ -173,12 +174,12 @@ impl Vehicle {
         std::thread::sleep(Duration::from_millis(1));
     }
 
-    /// Returns true if the mode is OFFBOARD or GUIDED.
+    /// Returns true if the vehicle is in OFFBOARD or GUIDED at time `now`.
     fn is_handed_over(&self, now: u64) -> bool {
         self.granted && now >= self.elsewhere_until
     }
 
-    /// Reads an operator text. When the relay asks for another mode first, the pilot chooses one for a while.
+    /// Reads a status text for the operator. The pilot chooses another mode for a while if it asks for that.
     fn reads(&mut self, text: String) {
         if self.granted && text == "relay: waits, change the mode first" {
             self.elsewhere_until = self.now() + ELSEWHERE;

@@ -13,7 +13,7 @@ use uav_relay_tools::provision::block::Flight;
 use crate::chain::{paper, simulated};
 use crate::fleet::{Fleet, Image};
 
-/// Words of a sector of 16 KiB.
+/// Number of 32-bit words in a flash sector of 16 KiB.
 const SMALL: usize = 4 * 1024;
 
 fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
@@ -22,7 +22,7 @@ fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Returns a flash with the votes of `said`, the last record truncated by a power failure.
+/// Returns a flash with the voting records `said`, the last of which a power failure has truncated.
 fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
     let check = u32::from_le_bytes(*block.last_chunk().unwrap());
     let mut flash = Ram::blank(SMALL, 1);
@@ -37,7 +37,7 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
 
 const HOLDS: &str = "votes on views restored from flash";
 
-/// Checks drones that agreed on view 40: they fly in a later view.
+/// Checks that drones with stored votes up to membership view 40 fly in a later view.
 #[test]
 fn three_that_were_switched_off_stand_by_what_they_said() {
     let flight = paper(3);
@@ -53,7 +53,8 @@ fn three_that_were_switched_off_stand_by_what_they_said() {
     }
 }
 
-/// Checks two of three drones, a quorum of the loaded chain, but not of a stored view without them.
+/// Checks that two of three drones do not fly if their stored membership view does not include them. Without that
+/// view they would have a quorum.
 #[test]
 fn two_that_remember_a_view_without_them_do_not_fly_it() {
     let flight = paper(3);

@@ -9,7 +9,7 @@ use uav_relay::{
     Measure, Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring, WithoutQuorum,
 };
 
-/// Draws the usual number, a limit, or a log-uniform number between positive limits.
+/// Draws a positive number: the usual one, a limit, or a log-uniform one between the limits.
 pub(crate) fn scaled(rng: &mut impl Rng, usual: f32, least: f32, most: f32) -> f32 {
     match rng.random_range(0..8) {
         0..4 => usual.clamp(least, most),
@@ -22,7 +22,7 @@ pub(crate) fn scaled(rng: &mut impl Rng, usual: f32, least: f32, most: f32) -> f
     }
 }
 
-/// Draws the usual number, a limit, or a number between, of either sign.
+/// Draws a number of either sign, up to `most`: 0, the usual one, the limit, or another.
 pub(crate) fn signed(rng: &mut impl Rng, usual: f32, most: f32) -> f32 {
     let size = scaled(rng, usual.abs(), 1e-3, most);
     match rng.random_range(0..8) {
@@ -53,7 +53,7 @@ const FIELDS: [Field; 6] = [
     ]),
 ];
 
-/// Draws a mission of at most `most` relays; `None` where the numbers contradict each other.
+/// Draws a mission of at most `most` relays; `None` if its numbers contradict each other.
 pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
     let distance_m = scaled(rng, 1_000.0, 1.0, 1e6);
     let relays = rng.random_range(1..=most);
@@ -131,7 +131,7 @@ fn channel(rng: &mut impl Rng) -> Option<Channel> {
     Channel::new(carrier_hz, one.min(other), one.max(other), air_ground).ok()
 }
 
-/// Draws the common settings of a chain of `mission`.
+/// Draws the settings that all relays of a chain share.
 pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let one_way = mission.config().reverse == 0.0;
     let sourced = mission.field().is_none();
@@ -194,7 +194,7 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the common settings of a chain of `mission`, in which an agreement may take any time.
+/// Draws the shared settings of a chain in which an agreement may take any time.
 pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let usual = settings(rng, mission);
     let micros = |most: f64, rng: &mut _| f64::from(scaled(rng, 3e4, 1e3, 1e13)).min(most) as u64;
@@ -228,7 +228,7 @@ pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the settings of one relay.
+/// Draws the settings of one relay, from the shared ones. `guarded` gives it a motion guard.
 pub(crate) fn own(
     rng: &mut impl Rng,
     mission: &Mission,
@@ -265,7 +265,7 @@ pub(crate) fn own(
     }
 }
 
-/// Draws a geofence anywhere, perhaps a single point.
+/// Draws a geofence anywhere; its ranges may be single points.
 fn fence(rng: &mut impl Rng) -> Geofence {
     let mut range = |usual| {
         let (one, other) = (signed(rng, usual, 1e7), signed(rng, usual, 1e7));

@@ -4,7 +4,8 @@ use host_tests::bench::Bench;
 use uav_relay::sensing::estimate::InterferenceEstimate;
 use uav_relay::{Event, Identity, Instant, Mission, Phase, Placement, Relay, Settings};
 
-/// Starts the relays of `mission` with settings by index, from 1. `None` if a relay refuses its settings.
+/// Creates a chain of relays whose settings are given by index, from 1. Returns `None` if a relay refuses its
+/// settings.
 pub(crate) fn line(
     mission: Mission,
     now: Instant,
@@ -19,7 +20,7 @@ pub(crate) fn line(
     Some(Bench::new(relays?, now))
 }
 
-/// Returns true if all relays hold positions, or the leader has reported infeasibility.
+/// Returns true if all relays hold positions, or the leader reports that no target can be met.
 pub(crate) fn has_agreed(line: &Bench) -> bool {
     let mut leaders = line.relays.iter();
     let is_leader = |relay: &&Relay| relay.index() == relay.mission().leader();
@@ -30,13 +31,13 @@ pub(crate) fn has_agreed(line: &Bench) -> bool {
             .all(|relay| relay.phase() == Phase::Holding)
 }
 
-/// Returns true if the leader has reported infeasibility.
+/// Returns true if a relay has reported that no target can be met.
 pub(crate) fn is_infeasible(line: &Bench) -> bool {
     let mut events = line.events.iter();
     events.any(|(_, event)| *event == Event::Infeasible)
 }
 
-/// Checks that every reported number is finite, and no relay sends messages that others refuse.
+/// Checks that every reported number is finite, and that no relay refuses messages of another.
 pub(crate) fn check(line: &Bench) {
     for relay in &line.relays {
         for place in [relay.setpoint(), relay.agreed_place()]

@@ -10,14 +10,14 @@ mod measured;
 mod missions;
 mod positions;
 
-/// Returns the seeds of a test: `COUNT` of them, or `usual`, from `SEED` on.
+/// Returns the random seeds of a test: `COUNT` or else `usual` of them, from `SEED` on.
 fn seeds(usual: u64) -> std::ops::Range<u64> {
     let of = |name: &str| std::env::var(name).ok()?.parse().ok();
     let (first, count) = (of("SEED").unwrap_or(0), of("COUNT").unwrap_or(usual));
     first..first + count
 }
 
-/// Returns the result of `fly` for every seed, and reports seeds that panic.
+/// Returns the result of `fly` for every random seed. Reports the seeds for which it panics.
 fn each<T: Send>(usual: u64, fly: impl Fn(u64) -> T + Sync + std::panic::RefUnwindSafe) -> Vec<T> {
     let came: Vec<Result<T, u64>> = seeds(usual)
         .into_par_iter()

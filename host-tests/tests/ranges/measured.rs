@@ -12,7 +12,7 @@ use crate::draw::{mission, scaled, settings, signed};
 use crate::each;
 use crate::line::{check, has_agreed, line};
 
-/// Draws a power: any float, more often within the accepted range.
+/// Draws a measured power, W: any float, but mostly in the accepted range.
 fn power_w(rng: &mut ChaCha8Rng) -> f32 {
     match rng.random_range(0..8) {
         0 => f32::from_bits(rng.random()),
@@ -31,7 +31,7 @@ fn power_w(rng: &mut ChaCha8Rng) -> f32 {
     }
 }
 
-/// Draws a position over the range of `handle_sample`.
+/// Draws a position over the whole range that `handle_sample` may receive.
 fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     let far = [distance_m, 1e7, 1e9][rng.random_range(0..3)].max(2e-3);
     Placement {
@@ -41,7 +41,7 @@ fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     }
 }
 
-/// Measures random powers for a minute at all nodes, and then the powers of a 1 W source at 300 m.
+/// Measures random powers at all nodes for a minute, then 1e-9 W everywhere. Checks that the chain agrees in the end.
 fn fly(seed: u64, mission: Mission, settings: Settings) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Some(mut line) = line(mission, Instant::ZERO, |_| settings) else {
@@ -143,7 +143,7 @@ fn every_measured_power_and_place_in_every_mission() {
     });
 }
 
-/// Checks one power at all relays, over a range in which its square is not finite.
+/// Checks chains that measure one power everywhere, even one whose square overflows or underflows f32.
 #[test]
 fn one_power_everywhere_over_the_accepted_range() {
     let decades: Vec<i32> = (-300..=60).collect();
@@ -164,7 +164,7 @@ fn one_power_everywhere_over_the_accepted_range() {
     });
 }
 
-/// Checks any number as a ground station's measurement: accepted exactly within 1e-30 to 1e6 W.
+/// Checks that a ground station accepts a measurement from 1e-30 W to 1e6 W, and no other number.
 #[test]
 fn a_ground_station_accepts_exactly_its_range() {
     let auth = Auth {

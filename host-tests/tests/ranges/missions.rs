@@ -9,10 +9,10 @@ use crate::draw::{mission, own, settings, slow_settings};
 use crate::each;
 use crate::line::{check, has_agreed, is_infeasible, line};
 
-/// Time limit for an agreement, in addition to the chain's hop times and probing periods.
+/// Longest permitted time to an agreement of a random chain.
 const PATIENCE: Duration = Duration::from_millis(600_000);
 
-/// Result of a chain.
+/// Result of a chain with random mission and settings.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Came {
     Refused,
@@ -20,7 +20,7 @@ enum Came {
     Infeasible,
 }
 
-/// Returns a chain of random relays; `None` if the mission or a relay's settings are refused.
+/// Creates a chain with random mission and settings. Returns `None` if these are refused.
 fn chain(
     rng: &mut ChaCha8Rng,
     settings: fn(&mut ChaCha8Rng, &Mission) -> Settings,
@@ -86,7 +86,8 @@ fn every_mission_and_setting_ends_in_places_or_infeasible() {
     assert!(of(Came::Agreed) > came.len() / 4);
 }
 
-/// Checks settings with which an agreement may take any time: fixed steps, long hops, any `dead_after`.
+/// Checks that settings with which an agreement may take any time give finite numbers. These are fixed steps, long
+/// hops, and any `dead_after`.
 #[test]
 fn every_slow_setting_gives_finite_numbers() {
     let came = each(200, |seed| {

@@ -94,7 +94,8 @@ fn degenerate_reaches_are_right() {
     assert_eq!(base.chain_sir(&[1.0]), 0.0);
 }
 
-/// Moves relay 1 as far as possible: it may be too close to the interferer for relay 2's altitude.
+/// Checks a chain in which relay 1 must not go as far as possible. There it would be too close to the interferer for
+/// relay 2's altitude.
 #[test]
 fn going_farthest_is_not_best_at_different_altitudes() {
     let link = Link {
@@ -120,7 +121,7 @@ fn going_farthest_is_not_best_at_different_altitudes() {
     assert!(link.chain_sir(&link.placement(best).unwrap()) >= best * (1.0 - 1e-14));
 }
 
-/// Checks an interferer behind Tx, where the fixed step has to start at a higher target.
+/// Checks the paper's fixed-step search with an interferer behind Tx. It must start at a higher target SIR there.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Station {

@@ -21,7 +21,7 @@ fn close_all(got: &[f64], want: &[f64], rtol: f64, what: &str) {
     }
 }
 
-/// Returns the cases of `function`; at least one case must exist.
+/// Returns the cases of `function` from the file. Panics if there is none.
 fn of(function: &str) -> Vec<Case> {
     let found = cases::of(function).unwrap();
     assert!(!found.is_empty(), "no case of {function}");
@@ -112,7 +112,8 @@ fn single_hops_match_the_file() {
     }
 }
 
-/// Checks different values of eta and `mu_los` with SIRs worked out by hand. The two are equal in the file.
+/// Checks that air-ground hops use eta and hops between drones `mu_los`, by SIRs worked out by hand. Both are equal
+/// in the file.
 #[test]
 fn each_hop_uses_its_own_path_loss() {
     let relays = [(30.0, 4.0), (15.0, 7.0)].map(|(altitude_m, power_w)| Station {

@@ -19,7 +19,7 @@ fn for_links(
     }
 }
 
-/// Compares reaches with a scan for the last sample that meets the target.
+/// Compares the reach of a hop with a scan for the last position that meets the target SIR.
 #[test]
 fn reaches_agree_with_a_scan() {
     let (mut hills, mut blocked, mut inside) = (0, 0, 0);
@@ -84,7 +84,8 @@ fn reaches_agree_with_a_scan() {
 
 /// Compares the optimum with brute force, with and without a least separation.
 ///
-/// At different altitudes the optimum needs sets of positions: the farthest chain is sometimes below it.
+/// At different altitudes the optimum needs sets of reachable positions: the chain in which each relay goes as far as
+/// possible is sometimes worse.
 #[test]
 fn one_and_two_relays_agree_with_brute_force() {
     for (seed, count, n, chain, points, apart) in [
@@ -155,7 +156,8 @@ fn greedy_and_exact_agree_at_a_common_altitude() {
     );
 }
 
-/// Checks that the sets hold only reachable positions. The chain traced back through them meets its target.
+/// Checks that the reference places a chain so that its target SIR is met. It traces the positions back through the
+/// sets of reachable positions.
 #[test]
 fn placements_meet_their_target() {
     let style = Style {

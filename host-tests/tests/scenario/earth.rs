@@ -8,7 +8,7 @@ use super::*;
 const TX: [f64; 2] = [47.40, 8.54];
 const RX: [f64; 2] = [47.41, 8.55];
 
-/// Returns a file with a line on earth, level at 420 m, and the interferer of `lines`.
+/// Returns a scenario file with the interferer of `lines` and a line on level ground, 420 m above sea.
 fn sited(lines: &str) -> String {
     let end =
         |[lat, lon]: [f64; 2]| format!("{{ lat_deg = {lat}, lon_deg = {lon}, amsl_m = 420 }}");
@@ -26,7 +26,8 @@ fn place(lines: &str) -> (f64, f64) {
     }
 }
 
-/// Compares with a library of geodesics, within a unit of the coordinates, 1.1 cm.
+/// Compares the position of an interferer on earth with a library of geodesics. The tolerance is one unit of the
+/// coordinates, 1.1 cm.
 #[test]
 fn an_interferer_on_earth_is_where_geodesics_have_it() {
     let earth = Geodesic::wgs84();
@@ -103,7 +104,8 @@ fn what_is_no_place_on_the_line_is_refused() {
     refused(&nowhere, Problem::NoSite, &parts);
 }
 
-/// Checks towers by the change of interference, (d^2 + h^2) / (d^2 + (h - t)^2) in decibels.
+/// Checks that an interferer on a tower is refused if the tower changes the interference by over 1 dB. The change is
+/// (d^2 + h^2) / (d^2 + (h - t)^2), for a tower of height t.
 #[test]
 fn an_interferer_on_a_tower_is_refused_where_that_matters() {
     let azimuth = "lat_deg = 47.404\nlon_deg = 8.548";

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::*;
 
-/// Returns the keys in `text`, also in comments, as `table.key`.
+/// Returns the keys in a scenario file, also those in comments, as `table.key`.
 fn shown(text: &str) -> BTreeSet<String> {
     let mut keys = BTreeSet::new();
     let (mut table, mut list) = (String::new(), String::new());

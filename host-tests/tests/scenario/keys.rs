@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Scalar key of the table. Path, file with `@` for the value, a value below, both limits, one above, the stated range.
+/// Row of the table of numeric keys. It has the key's path, a file with `@` for the value, a value below the range,
+/// both limits, a value above, and the stated range.
 struct Row {
     key: &'static str,
     file: String,

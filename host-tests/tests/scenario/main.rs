@@ -10,7 +10,7 @@ mod power;
 
 use uav_relay_scenario::{Problem, Scenario, ScenarioError};
 
-/// Smallest valid files: one with an interferer, one with a field.
+/// First part of the smallest valid files. `POWER`, and `INTERFERER` or `FIELD`, complete them.
 const GEOMETRY: &str = "[geometry]\ndistance_m = 1000\naltitude_m = 20\n";
 const POWER: &str = "[power]\ntx_w = 80\nuav_w = 1\n";
 const INTERFERER: &str = "[[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n";
@@ -24,7 +24,8 @@ fn parse(text: &str) -> Result<Scenario, ScenarioError> {
     Scenario::parse("flight.toml", text)
 }
 
-/// Asserts that `text` is refused for `problem`, in one line with the file and all of `parts`.
+/// Asserts that the file `text` is refused for `problem`. The error is one line with the file's name and all of
+/// `parts`.
 fn refused(text: &str, problem: Problem, parts: &[&str]) {
     let error = parse(text).expect_err(text);
     one_line(&error, "flight.toml", parts);

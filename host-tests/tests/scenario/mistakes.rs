@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 
-/// Returns the problem and the error line of each file.
+/// Returns the kind of problem and the error line of each file.
 fn refusals(files: &[String]) -> String {
     let mut all = String::new();
     for text in files {
@@ -238,7 +238,7 @@ fn noise_out_of_range_is_refused_with_its_range() {
     ));
 }
 
-/// Checks that every program validates the address, before the flight.
+/// Checks that a wrong UDP address of the autopilot is refused in the file, before any flight.
 #[test]
 fn an_autopilot_at_no_udp_port_is_refused() {
     let file = |autopilot: &str| small(&format!("[companion]\nautopilot = {autopilot}\n"));

@@ -98,10 +98,11 @@ fn an_eirp_that_no_mission_takes_is_refused() {
     refused(&relay, Problem::OutOfRange, &parts);
 }
 
-/// End of a link: position, m, and antenna gain, dBi.
+/// End of a radio link: its position in m, and its antenna gain in dBi.
 type End = ([f64; 3], f64);
 
-/// Returns the received power of `dbm`, in dBm: free space, excess loss, both antennas.
+/// Returns the received power in dBm for a transmitted power `dbm`. It counts free space, excess loss and both
+/// antennas.
 fn received_dbm(
     dbm: f64,
     (from, sends_dbi): End,
@@ -119,7 +120,8 @@ fn milliwatts(dbm: f64) -> f64 {
     10_f64.powf(dbm / 10.0)
 }
 
-/// Compares SINRs with the link budget: equal, or for unequal receiving gains lower bounds.
+/// Compares the crate's SINRs with a link budget. They are equal, or lower if the receiving antennas have different
+/// gains.
 #[test]
 fn the_chain_has_the_sinrs_of_a_link_budget() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);

@@ -11,10 +11,10 @@ use crate::count;
 
 type Setups = fn(&RandomScene) -> Result<Setup, FigureError>;
 
-/// Least fraction of the optimum after some agreements, and the quantile of the scenes that it is for.
+/// Limits of a test: number of agreements, quantile of the scenes, and least fraction of the optimum.
 type Limits = &'static [(usize, f64, f64)];
 
-/// Tells the relays a source that is mirrored, a hundred times as strong, and nearer.
+/// Returns a setup whose mission has a wrong interferer: mirrored, 100 times as strong, and nearer.
 fn guessed(wild: &RandomScene) -> Result<Setup, FigureError> {
     let source = wild.scene()?.sources[0].clone();
     wild.setup(Interference::Source(Interferer {
@@ -24,7 +24,7 @@ fn guessed(wild: &RandomScene) -> Result<Setup, FigureError> {
     }))
 }
 
-/// Places have a shadow of their own, and the relays also measure in flight.
+/// Returns a setup with 1 dB of shadowing at each position, whose relays also measure in flight.
 fn flown(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = wild.flown(Interference::Unknown)?;
     setup.sky.as_mut().unwrap().shadow_db = 1.0;
@@ -44,7 +44,8 @@ const GUESS: Limits = &[
     (5, 0.0, 0.9),
 ];
 
-/// Checks unknown sources, few relays that fly to learn, a wrong guess, shadowed places, two sources.
+/// Checks that relays find interferers and come near the optimum SIR. Cases are unknown sources, few relays, a wrong
+/// mission, shadowing, and two sources.
 #[test]
 fn sources_are_found() {
     let rows: [(&str, &[u16], usize, Setups, Limits); 7] = [

@@ -11,7 +11,7 @@ use uav_relay_tools::listening::{RandomScene, quantile};
 use crate::count;
 use crate::wrong::{named, share};
 
-/// Checks an hour of a static world, measured every second.
+/// Checks that a static world leads to at most five new agreements in an hour of measurements.
 #[test]
 fn a_still_world_becomes_silent() {
     let seeds: Vec<u64> = (0..count(12)).collect();
@@ -67,7 +67,8 @@ fn under_faults_all_believe_the_same_to_the_bit() {
     assert!(quantile(&mut shares, 0.5) >= 0.98, "{shares:?}");
 }
 
-/// Checks one wrong sensor of eight, from the start, before an estimate, or from later on.
+/// Checks that a chain of eight detects one wrong sensor and ignores it. The sensor is wrong from the start or from
+/// 40 s on.
 #[test]
 fn a_broken_sensor_is_named_and_left_out() {
     for (off_db, since_s) in [

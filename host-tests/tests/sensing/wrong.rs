@@ -11,7 +11,8 @@ use uav_relay_tools::listening::{RandomScene, quantile};
 
 use crate::count;
 
-/// Simulated sensor faults. Constant values are those of a 10 W interferer at 500 m, a receiver's noise, and zero.
+/// Simulated faults of a sensor: factors on its readings, and constant readings. The constants are those of a 10 W
+/// interferer at 500 m, of a receiver's noise, and zero.
 const KINDS: [(&str, SensorReading); 7] = [
     ("0.1 times", SensorReading::Times(0.1)),
     ("0.5 times", SensorReading::Times(0.5)),
@@ -22,7 +23,7 @@ const KINDS: [(&str, SensorReading); 7] = [
     ("0 W always", SensorReading::Always(0.0)),
 ];
 
-/// Returns a chain whose ends measure and send their measurements.
+/// Returns the setup of a chain whose Tx and Rx measure the interference and send it to the relays.
 fn setup(wild: &RandomScene) -> Setup {
     let mut setup = wild.setup(Interference::Unknown).unwrap();
     setup.settings.wiring = Wiring::Shared;
@@ -30,7 +31,7 @@ fn setup(wild: &RandomScene) -> Setup {
     setup
 }
 
-/// Returns the final fraction of the optimum.
+/// Returns the SIR of the final positions as a fraction of the optimum.
 pub(crate) fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
     let goals = outcome.stands.last().unwrap().goals.as_ref();
     goals.map_or(0.0, |goals| {
@@ -38,7 +39,7 @@ pub(crate) fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
     })
 }
 
-/// Returns the nodes reported as wrong, each once.
+/// Returns the nodes whose sensors were reported as wrong, each once.
 pub(crate) fn named(outcome: &Outcome) -> Vec<u16> {
     let off = outcome
         .moments
@@ -50,7 +51,7 @@ pub(crate) fn named(outcome: &Outcome) -> Vec<u16> {
     named
 }
 
-/// Returns the fractions of the optimum without faults, by scene, as a reference.
+/// Returns the fraction of the optimum SIR that each scene reaches without sensor faults.
 fn sound(relays: u16) -> Vec<f64> {
     let one = |seed| {
         let wild = RandomScene::new(seed, relays, 1);
@@ -59,7 +60,7 @@ fn sound(relays: u16) -> Vec<f64> {
     (0..count(24)).into_par_iter().map(one).collect()
 }
 
-/// Returns the outcome with a wrong sensor at `node` from the start.
+/// Runs a scene in which the sensor of `node` is wrong from the start, as `says` describes.
 fn with_wrong(wild: &RandomScene, node: u16, says: SensorReading) -> Outcome {
     let mut wrong = setup(wild);
     wrong.sky.as_mut().unwrap().broken = vec![Broken {
@@ -70,7 +71,8 @@ fn with_wrong(wild: &RandomScene, node: u16, says: SensorReading) -> Outcome {
     run(wrong).unwrap()
 }
 
-/// Checks the cost of each kind of wrong sensor, and the nodes reported.
+/// Checks how much SIR each kind of wrong sensor costs, and which sensors are reported as wrong. `sound` has the
+/// fractions of the optimum without faults; `node` gives the node with the wrong sensor.
 fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
     for (what, says) in KINDS {
         let one = |seed: usize| {
@@ -123,7 +125,8 @@ fn a_wrong_end_costs_next_to_nothing() {
     }
 }
 
-/// Checks that one or two relays name no other sensor and report a misfit; more may, seldom.
+/// Checks that one or two relays never blame another sensor, and report that no interferer fits. Three or four relays
+/// may blame another one in 2 % of the scenes.
 #[test]
 fn a_short_chain_seldom_names_another_sensor() {
     for relays in [1, 2, 3, 4] {
@@ -179,7 +182,7 @@ fn sensors_that_are_right_are_not_named() {
     assert_eq!(all, 0);
 }
 
-/// Checks ends behind a hill whose measurements start late or stop early.
+/// Checks that measurements of Tx and Rx help although they start late or stop early. Rx is behind a hill.
 #[test]
 fn measurements_of_an_end_may_come_late_or_stop() {
     let [begin, late, end] = [0, 60_000, 10_000_000].map(Instant::from_millis);

@@ -21,10 +21,10 @@ pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Driver of either wiring over ports of either kind.
+/// Port driver of a relay: for two wires or a shared channel, over either kind of mock port.
 pub(crate) trait Driver {
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant>;
-    /// Returns the counters of the upstream or shared port, then the downstream port.
+    /// Returns the counters of each port: those of the upstream or shared port come first.
     fn stats(&self) -> Vec<SerialStats>;
 }
 
@@ -89,7 +89,8 @@ impl Node {
     }
 }
 
-/// Creates a chain with wires, or a channel, of `capacity` bytes. Returns the outer ends of the wires too.
+/// Creates relays on wires or on a channel with buffers of `capacity` bytes. Returns the relays, and the far ends of
+/// the outermost wires.
 pub(crate) fn chain(
     kind: Kind,
     wiring: Wiring,
@@ -120,7 +121,8 @@ pub(crate) fn chain(
     (nodes, far)
 }
 
-/// Polls nodes when they are due or have bytes to read, and checks the guarantees of `poll`.
+/// Polls the relays when they are due or have bytes to read, and checks the guarantees of `poll`. Returns the time at
+/// the end.
 pub(crate) fn run(nodes: &mut [Node], from: Instant, until: Instant) -> Instant {
     let mut now = from;
     while now < until {

@@ -6,12 +6,12 @@ use std::rc::Rc;
 
 use embedded_hal_nb::serial::ErrorKind;
 
-/// Medium that carries bytes from one end to all others.
+/// Simulated medium that carries the bytes of each end to all others.
 struct Medium {
-    /// Bytes that have arrived at each end and are unread.
+    /// Bytes that each end has received but not yet read.
     inboxes: Vec<VecDeque<u8>>,
     capacity: usize,
-    /// True if one end at a time sends a frame, as with carrier sense.
+    /// True if only one end at a time may send a frame, as with carrier sense.
     turns: bool,
     talker: Option<usize>,
     carried: usize,
@@ -40,27 +40,27 @@ impl End {
             .collect()
     }
 
-    /// Creates a full-duplex wire with `capacity` bytes in each direction.
+    /// Creates the two ends of a full-duplex wire that holds `capacity` bytes in each direction.
     pub(crate) fn wire(capacity: usize) -> [Self; 2] {
         Self::medium(2, capacity, false).try_into().ok().unwrap()
     }
 
-    /// Creates a shared channel.
+    /// Creates the ends of a shared channel that holds `capacity` bytes for each end.
     pub(crate) fn channel(ends: usize, capacity: usize) -> Vec<Self> {
         Self::medium(ends, capacity, true)
     }
 
-    /// Returns the number of unread bytes.
+    /// Returns the number of bytes that this end has received but not yet read.
     pub(crate) fn waiting(&self) -> usize {
         self.medium.borrow().inboxes[self.number].len()
     }
 
-    /// Returns the number of bytes sent by all ends.
+    /// Returns the number of bytes that all ends of the medium have sent.
     pub(crate) fn carried(&self) -> usize {
         self.medium.borrow().carried
     }
 
-    /// Adds received bytes.
+    /// Adds bytes to those that this end has received.
     pub(crate) fn stuff(&self, bytes: &[u8]) {
         self.medium.borrow_mut().inboxes[self.number].extend(bytes);
     }
@@ -88,7 +88,7 @@ impl End {
     }
 }
 
-/// Read errors at regular intervals, each of which loses its byte.
+/// Schedule of read errors: one every `every` bytes, each of which loses its byte.
 #[derive(Clone, Default)]
 pub(crate) struct Trouble {
     pub(crate) every: usize,
@@ -125,7 +125,7 @@ impl Trouble {
     }
 }
 
-/// End behind `embedded_hal_nb`.
+/// End of a medium as a port of `embedded_hal_nb`.
 pub(crate) struct NbEnd {
     pub(crate) end: End,
     pub(crate) trouble: Trouble,
@@ -165,7 +165,7 @@ mod as_nb {
     }
 }
 
-/// End behind `embedded_io`, which panics where a real one would block.
+/// End of a medium as a port of `embedded_io`. It panics where a real port would block.
 pub(crate) struct IoEnd {
     pub(crate) end: End,
     pub(crate) trouble: Trouble,

@@ -6,15 +6,15 @@ use std::rc::Rc;
 
 use embedded_hal::digital::{ErrorKind, ErrorType, OutputPin};
 
-/// Recorded bytes and edges; times are in microseconds.
+/// Record of a UART's bytes and of its pin's edges, with times in µs.
 #[derive(Default)]
 pub(crate) struct Bench {
-    /// Real time, which advances during a poll.
+    /// Real time, µs, which advances during a poll.
     pub(crate) clock: u64,
-    /// Start and end of each byte.
+    /// Start and end of the transmission of each byte, µs.
     pub(crate) bytes: Vec<(u64, u64)>,
     pub(crate) edges: Vec<(u64, bool)>,
-    /// Remaining failures to set the pin low, and high.
+    /// Number of coming attempts to set the pin low, and high, that will fail.
     pub(crate) refusals: [u32; 2],
 }
 
@@ -31,9 +31,9 @@ impl Bench {
 pub(crate) struct Uart {
     pub(crate) bench: Rc<RefCell<Bench>>,
     pub(crate) byte_time: u64,
-    /// Size of the FIFO, without the byte that is leaving.
+    /// Size of the UART's FIFO in bytes, without the byte that is leaving.
     pub(crate) fifo: u64,
-    /// Computing time between two reads of the clock.
+    /// Computing time between two reads of the clock, µs.
     pub(crate) lag: u64,
 }
 
@@ -51,7 +51,7 @@ impl Uart {
         bench.bytes.push((start, start + self.byte_time));
     }
 
-    /// Simulates a read, which takes time and returns no byte.
+    /// Simulates a read of the UART's state: it takes time and returns no byte.
     fn look(&self) {
         self.bench.borrow_mut().clock += self.lag;
     }

@@ -6,10 +6,11 @@ use uav_relay_sim::svg::{Picture, Room, draw, room};
 
 use super::{all, assert_apart, assert_inside, chain, drawn, has_text, level, number, tip};
 
-/// Bottom of the view from the side, without the legend.
+/// Bottom of the view from the side without its legend, in units of the picture.
 const SIDE: f64 = 282.0;
 
-/// Returns a chain that bends to the left of its interferer, over `edge` of half the room.
+/// Returns the picture of a chain that swings to the left of its interferer. The largest offset is the fraction
+/// `edge` of the permitted one.
 fn swung(relays: usize, edge: f64) -> Picture {
     let picture = chain(relays, 1000.0, |share| 20.0 + 800.0 * share * (1.0 - share));
     let share = |number: usize| number as f64 / (relays as f64 + 1.0);
@@ -54,7 +55,8 @@ fn gallery() -> Vec<Picture> {
     pictures
 }
 
-/// Returns the picture's height, and the coordinates of a class's shapes, from the side and from above.
+/// Returns the shapes of a class: those in the view from the side, and those in the view from above. `key` is the
+/// attribute with a shape's y.
 fn parts<'a>(
     document: &'a Document<'a>,
     tag: &'a str,
@@ -75,7 +77,8 @@ fn without_room_beside_the_line_there_is_one_view() {
     assert!(all(&document, "line", "edge").is_empty());
 }
 
-/// Checks an interferer beside a straight chain, which seems to be below it in a side view.
+/// Checks the view from above of an interferer beside a straight chain. In a side view it would seem to be below the
+/// chain.
 #[test]
 fn an_interferer_beside_the_line_is_seen_beside_it() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();
@@ -104,7 +107,8 @@ fn an_interferer_beside_the_line_is_seen_beside_it() {
     }
 }
 
-/// Checks interferers farther from the line than its length. An arrow is at the edge of a plot with readable axes.
+/// Checks that an interferer far beside the line is drawn as an arrow at the edge. The axes of the view from above
+/// remain readable.
 #[test]
 fn an_interferer_far_beside_the_line_is_an_arrow_at_the_edge() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();
@@ -145,7 +149,8 @@ fn an_interferer_far_beside_the_line_is_an_arrow_at_the_edge() {
     }
 }
 
-/// Checks markers in the side view: hollow beside the line, filled on it, each explained by the legend.
+/// Checks that the side view draws an interferer hollow beside the line, and filled on the line. The legend explains
+/// each marker.
 #[test]
 fn from_the_side_an_interferer_beside_the_line_is_hollow() {
     let draws = |y: f64| {
@@ -177,7 +182,7 @@ fn tip_of(node: &Node) -> Option<String> {
     Some(super::words(&title))
 }
 
-/// Returns the top corner of a marker with a tooltip.
+/// Returns the top corner (x, y) of a marker that has a tooltip; `None` for other shapes.
 fn corner(mark: &Node) -> Option<(f64, f64)> {
     mark.children().find(|child| child.has_tag_name("title"))?;
     let start = mark.attribute("d")?[1..].split('L').next()?;
@@ -210,7 +215,7 @@ fn both_views_have_every_relay_and_every_hop_inside_the_frame() {
     }
 }
 
-/// Checks the common scale of relays, interferer and edges; y grows downward, to the right of x.
+/// Checks that relays, interferer and edges have one scale, with y downward, to the right of x.
 #[test]
 fn the_view_from_above_is_to_scale() {
     let picture = swung(8, 0.9);

@@ -98,7 +98,7 @@ fn short_chains_have_every_number_and_long_ones_a_few() {
     }
 }
 
-/// Returns the height of most of the texts.
+/// Returns the y coordinate that most of the texts have.
 fn row_of_most(texts: &[Node]) -> f64 {
     let heights: Vec<f64> = texts.iter().map(|text| number(text, "y")).collect();
     let count = |height: f64| heights.iter().filter(|other| **other == height).count();

@@ -9,10 +9,10 @@ mod plot;
 use roxmltree::{Document, Node};
 use uav_relay_sim::svg::{Picture, draw};
 
-/// Size of the picture's view box.
+/// Width and height of the picture, in its own units.
 const SIZE: (f64, f64) = (480.0, 330.0);
 
-/// Returns a chain of equally spaced relays with artificial SIRs, the worst (0 dB) in the middle.
+/// Returns the picture of equally spaced relays with artificial SIRs. The worst hop (0 dB) is in the middle.
 fn chain(relays: usize, distance_m: f64, altitude: impl Fn(f64) -> f64) -> Picture {
     let hops = relays as f64 + 1.0;
     let share = |number: usize| number as f64 / hops;
@@ -35,7 +35,7 @@ fn level(relays: usize) -> Picture {
     chain(relays, 1000.0, |_| 20.0)
 }
 
-/// Returns pictures with all possible contents.
+/// Returns pictures of chains that together have every possible content.
 fn gallery() -> Vec<Picture> {
     let mut pictures: Vec<Picture> = [1, 2, 8, 20, 21, 50, 100, 1000].map(level).into();
     pictures.push(chain(5, 10.0, |_| 20.0));
@@ -95,7 +95,7 @@ fn number(node: &Node, name: &str) -> f64 {
     node.attribute(name).unwrap().parse().unwrap()
 }
 
-/// Returns the visible text of a node and its parts.
+/// Returns the visible text of an SVG node and of the nodes in it.
 fn words(node: &Node) -> String {
     node.descendants()
         .filter(Node::is_text)
@@ -118,21 +118,21 @@ fn tip(node: &Node) -> String {
     )
 }
 
-/// Returns the rectangle that a number covers, with letters of ordinary width.
+/// Returns the rectangle that a text covers, for letters of ordinary width: left, right, top, bottom.
 fn extent(node: &Node, size: f64) -> [f64; 4] {
     let (x, y) = (number(node, "x"), number(node, "y"));
     let half = 0.5 * 0.556 * size * words(node).chars().count() as f64;
     [x - half, x + half, y - 0.72 * size, y]
 }
 
-/// Returns the drawing, after a check that it contains finite numbers only.
+/// Draws a picture, and checks that it contains finite numbers only.
 fn drawn(picture: &Picture) -> String {
     let svg = draw(picture);
     assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     svg
 }
 
-/// Asserts that all coordinates are within the width and height. Returns their number.
+/// Asserts that all coordinates are within the width and height. Returns the number of coordinates.
 fn assert_inside(document: &Document, (width, height): (f64, f64)) -> usize {
     let mut checked = 0;
     for node in document.descendants() {
@@ -150,7 +150,8 @@ fn assert_inside(document: &Document, (width, height): (f64, f64)) -> usize {
     checked
 }
 
-/// Asserts that no two texts of these classes, with their font sizes, cover each other. Returns their rectangles.
+/// Asserts that no two texts of some classes cover each other. Returns their rectangles. `classes` has the class
+/// names and font sizes.
 fn assert_apart(document: &Document, classes: &[(&str, f64)]) -> Vec<[f64; 4]> {
     let mut extents: Vec<([f64; 4], String)> = Vec::new();
     for (class, size) in classes {

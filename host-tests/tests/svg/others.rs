@@ -37,7 +37,8 @@ fn the_interferer_of_the_previous_mission_is_faint() {
     }
 }
 
-/// Checks positions at the present interferer, far off the chain, and undefined.
+/// Checks that another interferer is not drawn if it would disturb. It is at the present one's position, far away, or
+/// at an undefined position.
 #[test]
 fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
     let same = level(8).interferers;
@@ -55,7 +56,7 @@ fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
     }
 }
 
-/// Checks that the estimate is drawn even next to the true position.
+/// Checks that an estimated interferer is drawn even next to the true one.
 #[test]
 fn what_is_believed_is_drawn_beside_what_is_true() {
     for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {

@@ -15,14 +15,15 @@ use super::ALLOWED;
 use super::roomy::Roomy;
 use super::scene::Scene;
 
-/// Result of a scene.
+/// Result of a scene: the theorem's case, its SIR against brute force, and the error of its stated SIR.
 struct Seen {
     case: String,
     short: f64,
     told: f64,
 }
 
-/// Compares the result of `best` over `band` of each scene with brute force, and counts the cases.
+/// Checks that results of `best` are as good as brute force in random scenes, and counts their cases. `band` gives
+/// the altitudes that brute force searches.
 fn no_worse_than_brute_force(
     seed: u64,
     draw: impl Fn(&mut ChaCha8Rng) -> Roomy + Sync,
@@ -91,7 +92,7 @@ const CASES: [&str; 8] = [
 
 type Draw = fn(&mut ChaCha8Rng) -> Roomy;
 
-/// Checks a relay at its altitude, and that all cases but those of `but` occur.
+/// Checks a relay at a given altitude with lateral offsets. All cases must occur but those of `but`.
 fn at_its_altitude(seed: u64, draw: Draw, but: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -104,7 +105,7 @@ fn at_its_altitude(seed: u64, draw: Draw, but: &[&str]) {
     }
 }
 
-/// Checks a relay with a free altitude, and that all of `cases` occur.
+/// Checks a relay with lateral offsets at any altitude, and that all cases of `cases` occur.
 fn anywhere(seed: u64, draw: Draw, cases: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -173,7 +174,8 @@ fn one_relay_aside_has_the_recorded_optimum() {
     );
 }
 
-/// Checks Theorems 1 and 3 without lateral room, and that room is never worse.
+/// Checks that the solution without lateral offsets is that of Theorems 1 and 3. Permitted offsets never make it
+/// worse.
 #[test]
 fn without_room_it_is_theorems_1_and_3() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(514));

@@ -3,7 +3,7 @@
 use super::scene::Scene;
 
 impl Scene {
-    /// Returns the best SIR over the box `x` by `h`, by searches along lines and around the best points.
+    /// Returns the best SIR over a box of x and altitude. It searches along lines, then around the best points.
     pub(crate) fn brute(&mut self, x: (f64, f64), h: (f64, f64)) -> f64 {
         let lines = |(low, high): (f64, f64)| {
             if low < high {
@@ -44,7 +44,7 @@ impl Scene {
         }
     }
 
-    /// Returns the best SIR of a search of the plane around `place`.
+    /// Returns the best SIR that a search of x and altitude around `place` finds.
     fn about(&mut self, place: (f64, f64), x: (f64, f64), h: (f64, f64)) -> f64 {
         let (mut at, mut up) = place;
         let mut half = ((x.1 - x.0) / 8.0, (h.1 - h.0) / 8.0);
@@ -67,8 +67,8 @@ impl Scene {
     }
 }
 
-/// Returns the maximum of `f` over `range` and its position. Samples are denser at `near`; a golden-section search refines the
-/// best.
+/// Returns the maximum of `f` over `range` and its position. Samples are denser around `near`; a golden-section
+/// search refines the best.
 fn along(range: (f64, f64), near: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     let (low, high) = range;
     let mut at = vec![low, high];

@@ -139,7 +139,8 @@ fn turns_agree_with_a_scan() {
     assert!(seen.iter().all(|&seen| seen > 50), "{seen:?}");
 }
 
-/// Checks the case of Corollary 1 given by p_t / p_u and C_1 to C_3, for X in [0, D].
+/// Checks that the power ratio p_t / p_u and its limits C_1 to C_3 predict the case of Corollary 1. The interferer's
+/// X is within [0, D].
 #[test]
 fn the_guide_agrees_with_the_cases() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(506));

@@ -8,5 +8,5 @@ mod optima;
 mod roomy;
 mod scene;
 
-/// Largest relative shortfall from the best SIR.
+/// Largest permitted shortfall from the best SIR, as a fraction.
 const ALLOWED: f64 = 1e-4;

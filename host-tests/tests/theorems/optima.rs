@@ -8,7 +8,8 @@ use uav_relay_oracle::random::{self, count, log_uniform};
 use super::ALLOWED;
 use super::scene::Scene;
 
-/// Compares the positions of `best` with brute force over the box of `over`, and counts the cases.
+/// Checks that results of `best` are as good as brute force in random scenes, and counts their cases. `over` gives
+/// the ranges of x and altitude to search.
 fn no_worse_than_brute_force(
     seed: u64,
     draw: impl Fn(&mut ChaCha8Rng) -> Scene,
@@ -93,7 +94,7 @@ fn theorem_2(seed: u64, draw: Draw) -> Cases {
     )
 }
 
-/// Checks Theorem 3, and that the named edges occur.
+/// Checks Theorem 3 in random scenes, and that the cases of `edges` occur.
 fn theorem_3(seed: u64, draw: Draw, edges: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,

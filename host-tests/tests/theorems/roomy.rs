@@ -32,14 +32,15 @@ impl Roomy {
         }
     }
 
-    /// Draws a scene with noise.
+    /// Draws a scene with a range of lateral offsets and with receiver noise.
     pub(crate) fn noisy(rng: &mut impl Rng) -> Self {
         let silent = Self::random(rng);
         let link = random::in_noise(rng, &silent.scene.link);
         Self::new(Scene::new(&link, silent.scene.band), silent.lateral)
     }
 
-    /// Draws a scene, some with the interferer on the line or at an end; room on both sides, one, or none.
+    /// Draws a scene with lateral offsets to both sides, to one side, or none. Some interferers are on the line or at
+    /// one of its ends.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let mut scene = Scene::random(rng);
         let d = scene.link.distance_m;
@@ -96,7 +97,8 @@ impl Roomy {
         [(0.0, self.scene.link.distance_m), self.lateral, band]
     }
 
-    /// Returns the best SIR over the box, by a grid and random searches from its best separated points.
+    /// Returns the best SIR over a box of x, y and altitude: by a grid, then by random searches. These begin at the
+    /// best points of the grid that are far from each other.
     pub(crate) fn brute(&self, ranges: [(f64, f64); 3]) -> f64 {
         let link = &self.scene.link;
         let of = [
@@ -130,7 +132,7 @@ impl Roomy {
             .fold(0.0, f64::max)
     }
 
-    /// Returns the best SIR of a random search from `at`. Axis-parallel steps would stick to ridges.
+    /// Returns the best SIR that a random search from `at` finds. Steps along one axis would stick to ridges.
     pub(crate) fn about(&self, mut at: [f64; 3], ranges: [(f64, f64); 3]) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut most = self.sir(at);
@@ -157,7 +159,7 @@ impl Roomy {
     }
 }
 
-/// Returns samples of a range: its ends, even ones, and denser ones around each of `near`.
+/// Returns samples of a range: its ends, equidistant ones, and denser ones around each of `near`.
 pub(crate) fn marks((low, high): (f64, f64), near: &[f64]) -> Vec<f64> {
     let mut at = vec![low, high];
     for step in 1..12 {

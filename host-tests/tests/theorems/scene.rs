@@ -8,7 +8,7 @@ use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
 
-/// Single relay, its link in the relay's f32 precision, and its band.
+/// Single relay: its link with numbers in f32 precision, and its range of altitudes.
 pub(crate) struct Scene {
     pub(crate) link: Link,
     pub(crate) band: (f64, f64),
@@ -36,7 +36,7 @@ impl Scene {
         }
     }
 
-    /// Draws a scene of 10 m to 100 km with the interferer anywhere; lowest altitude 0.002 to 0.5 of D.
+    /// Draws a scene with D of 10 m to 100 km and the interferer anywhere. The lowest altitude is 0.002 to 0.5 of D.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let style = Style {
             relays: 1..=1,
@@ -52,7 +52,7 @@ impl Scene {
         Self::new(&link, (low, high))
     }
 
-    /// Draws a scene with noise, from almost none to far above the interference.
+    /// Draws a scene with receiver noise, from almost none to far above the interference.
     pub(crate) fn noisy(rng: &mut impl Rng) -> Self {
         let scene = Self::random(rng);
         let link = random::in_noise(rng, &scene.link);
@@ -63,7 +63,7 @@ impl Scene {
         Self::new(&case.link(1), (case.params.h_min, case.params.h_max))
     }
 
-    /// Returns the worse SIR of both hops, in f64 from received powers.
+    /// Returns the smaller SIR of the two hops of a relay at x and altitude `h`, in f64.
     pub(crate) fn sir(&mut self, x: f64, h: f64) -> f64 {
         self.link.relays[0].altitude_m = h;
         let first = self.link.sir_relay(1, 0.0, x).unwrap();

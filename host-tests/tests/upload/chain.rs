@@ -6,7 +6,8 @@ use super::*;
 
 const AT: Instant = seconds(20);
 
-/// Runs `setup` with an upload of `config`. Returns the time until all relays have positions, ms, and the bytes sent for it.
+/// Runs `setup` with an upload of `config`. Returns the time from the upload to the last agreement, ms, and the bytes
+/// that it costs.
 fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
     let mut calm = setup.clone();
     calm.partitions.clear();

@@ -19,7 +19,7 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::{Setup, UploadSpec};
 
-/// Returns `base` with another interferer position.
+/// Returns the mission `base` with its interferer at (`x_m`, `y_m`).
 fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
     MissionConfig {
         interference: Interference::Source(Interferer {
@@ -31,7 +31,7 @@ fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
     }
 }
 
-/// Returns a chain of `base` with signed frames, on one radio or on wires.
+/// Returns a chain of `base` with signed frames, on one radio channel or on wires.
 fn signed(base: Mission, shared: bool) -> Setup {
     let mut setup = if shared {
         Setup::on_shared_channel(base)
@@ -56,10 +56,10 @@ fn upload(
     }
 }
 
-/// Checks a run. Returns the first fault as an error.
+/// Checks a run with uploads. Returns the first fault as an error.
 ///
-/// Members of a view fly the same mission, which a quorum has held; setpoints are within limits; a settled chain flies `version`
-/// in the positions of an undisturbed chain with `config`.
+/// Members of a membership view must fly the same mission, which a quorum has held. Setpoints must be within limits.
+/// A settled chain must fly `version`, in the positions of a new chain with `config`.
 fn judge(
     setup: &Setup,
     outcome: &Outcome,
@@ -96,7 +96,7 @@ fn judge(
     ledger::judge(setup, outcome, &left(outcome), version, config)
 }
 
-/// Runs `setup`, which ends with `version` and `config` flown by all that are left.
+/// Runs `setup`. Checks that all relays that are left fly mission `version` with `config` in the end.
 fn flies(setup: &Setup, version: u16, config: MissionConfig, name: &str) -> Outcome {
     let outcome = run(setup.clone()).unwrap();
     judge(setup, &outcome, version, config).unwrap_or_else(|what| panic!("{name}: {what}"));

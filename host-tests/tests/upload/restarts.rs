@@ -4,7 +4,7 @@ use uav_relay::Wiring;
 
 use super::*;
 
-/// Runs eight relays that all reboot after an upload; `forgetful` ones lose it.
+/// Runs eight relays that all reboot after an upload. The relays `forgetful` have lost the upload then.
 fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
     let base = mission(8);
     let mut setup = signed(base, wiring == Wiring::Shared);
@@ -20,7 +20,7 @@ fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
     (setup, outcome)
 }
 
-/// Returns the number of views that relays accepted after the power failure.
+/// Returns the number of membership views that relays accepted after the power failure.
 fn views(outcome: &Outcome) -> usize {
     let moments = outcome
         .moments

@@ -7,7 +7,7 @@ use uav_relay_oracle::random::seed;
 
 use super::*;
 
-/// Draws a mission with another interferer, sometimes also another altitude and separation.
+/// Draws a mission with the interferer elsewhere, and sometimes with another altitude and separation.
 fn drawn(base: &Mission, rng: &mut ChaCha8Rng) -> MissionConfig {
     let x_m = rng.random_range(-200.0..1_200.0);
     let y_m = rng.random_range(50.0..600.0);
@@ -21,7 +21,8 @@ fn drawn(base: &Mission, rng: &mut ChaCha8Rng) -> MissionConfig {
     config
 }
 
-/// Draws one to three uploads, up to three losses, frame loss up to 50 %. Relays may forget the upload.
+/// Draws one to three uploads, up to three lost relays, and frame loss of up to 50 %. Some relays lose the upload
+/// when they reboot.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let shared = rng.random_bool(0.8);
     let base = mission(8);

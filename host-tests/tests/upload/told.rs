@@ -21,7 +21,8 @@ fn seed() -> u64 {
     number("SEED", 1)
 }
 
-/// Checks with losses and two ground stations that completion is reported once all fly, and not before.
+/// Checks that the ground station reports completion once all relays fly the upload, and not before. Frames are lost,
+/// and two ground stations are active.
 #[test]
 fn the_ground_says_flown_only_once_every_relay_flies_it() {
     let told: Vec<bool> = (0..count())
@@ -104,7 +105,7 @@ fn at(base: &Mission, altitude_m: f32) -> MissionConfig {
     }
 }
 
-/// Returns a chain at 120 m with a choice of altitudes within `band`.
+/// Returns a mission at 120 m whose relays may choose altitudes within `band`.
 fn at_120(relays: u16, band: Band) -> Mission {
     let config = *mission(relays).config();
     Mission::try_new(MissionConfig {
@@ -118,7 +119,7 @@ fn at_120(relays: u16, band: Band) -> Mission {
     .unwrap()
 }
 
-/// Places guarded relays, which need a known position.
+/// Gives relays with a motion guard the positions of their drones, which they need.
 fn tell_places(wires: &mut Wires, base: &Mission) {
     let distance = base.config().distance_m;
     let step = distance / f32::from(base.relays() + 1);
@@ -199,7 +200,8 @@ fn an_upload_outside_the_geofence_is_refused_and_told() {
     }
 }
 
-/// Checks a relay with its own altitude, whose geofence is wider only for that. It decides like the others.
+/// Checks that a relay with its own altitude refuses an upload like the others. Its geofence is wider only for that
+/// altitude.
 #[test]
 fn a_relay_with_its_own_altitude_refuses_like_the_others() {
     let base = at_120(3, Band::at(120.0));
@@ -228,7 +230,8 @@ fn a_relay_with_its_own_altitude_refuses_like_the_others() {
     }
 }
 
-/// Checks different geofences: a far relay's refusal reaches the ground station, until a newer upload.
+/// Checks that a far relay's refusal reaches the ground station. Only that relay has a geofence; a newer upload
+/// clears the refusal.
 #[test]
 fn a_refusal_of_a_far_relay_is_told_at_the_ground() {
     let base = at_120(5, Band::at(120.0));
@@ -264,7 +267,7 @@ fn a_refusal_of_a_far_relay_is_told_at_the_ground() {
     }
 }
 
-/// Checks a refusal by any relay over lossy wires.
+/// Checks that a refusal by any relay reaches the ground station, although frames are lost.
 #[test]
 fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
     (0..count()).into_par_iter().for_each(|round| {
@@ -306,7 +309,7 @@ fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
     });
 }
 
-/// Checks two ground stations at once: all fly the newer upload, and the other station learns of it.
+/// Checks two ground stations at once. All relays fly the newer upload, and the other station learns of it.
 #[test]
 fn of_two_stations_at_once_the_newer_upload_is_flown() {
     let settled: Vec<u64> = (0..count())
@@ -367,7 +370,8 @@ fn of_two_stations_at_once_the_newer_upload_is_flown() {
     );
 }
 
-/// Checks that a ground station learns the mission in flight, from either end, with losses and uploads.
+/// Checks that a ground station at either end learns which mission is flown. Frames are lost, and missions are
+/// uploaded.
 #[test]
 fn the_ground_learns_which_mission_is_flown() {
     for round in 0..40 {

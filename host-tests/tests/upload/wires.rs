@@ -13,10 +13,10 @@ use uav_relay::{
 
 use super::*;
 
-/// Interval of all main loops; frames arrive one interval after they are sent.
+/// Interval at which all main loops run. Frames arrive one interval after they are sent.
 const TURN: Duration = Duration::from_millis(5);
 
-/// Distance that a drone flies in an interval, m along each axis.
+/// Distance that a drone flies in an interval along each axis, m.
 const MOST_M: f32 = 0.05;
 
 const AUTH: Auth = Auth {
@@ -24,16 +24,16 @@ const AUTH: Auth = Auth {
     epoch: 1,
 };
 
-/// Chain on lossy wires.
+/// Chain of relays on lossy wires, with ground stations.
 pub(crate) struct Wires {
     pub(crate) bench: Bench,
     loss: Rc<Cell<f64>>,
-    /// Positions of guarded relays' drones.
+    /// Positions of the drones of relays with a motion guard.
     places: Vec<Placement>,
 }
 
 impl Wires {
-    /// Creates relays loaded with `base`, each with its own `settings`.
+    /// Creates relays loaded with `base`, each with its own `settings` and a key.
     pub(crate) fn new(base: Mission, seed: u64, settings: impl Fn(u16) -> Settings) -> Self {
         let relay = |index| {
             let identity = Identity { network: 7, index };
@@ -61,7 +61,7 @@ impl Wires {
         self.loss.set(loss);
     }
 
-    /// Uploads `upload` from the ground station at `end`, which knows `base`.
+    /// Starts an upload from the ground station at `end`, which is loaded with `base`.
     pub(crate) fn upload(&mut self, base: &Mission, end: Side, upload: Upload) {
         let now = self.bench.now;
         self.bench
@@ -70,7 +70,7 @@ impl Wires {
             .unwrap();
     }
 
-    /// Requests the mission in flight from the ground station at `end`, which knows `base`.
+    /// Makes the ground station at `end`, loaded with `base`, request the mission in flight.
     pub(crate) fn ask_flown(&mut self, base: &Mission, end: Side) {
         let now = self.bench.now;
         self.bench.ground(base, end, AUTH).ask_flown(now);
@@ -93,7 +93,7 @@ impl Wires {
         &self.bench.relays[index - 1]
     }
 
-    /// Places drones that follow their setpoints from then on.
+    /// Places the drones by relay index. They follow their setpoints from then on.
     pub(crate) fn stand(&mut self, place: impl Fn(u16) -> Placement) {
         self.places = (1..)
             .zip(&self.bench.relays)
@@ -101,14 +101,14 @@ impl Wires {
             .collect();
     }
 
-    /// Returns true if every relay has an agreed position.
+    /// Returns true if every relay has once agreed on its position.
     pub(crate) fn has_converged(&self) -> bool {
         let all = 0..self.bench.relays.len();
         all.into_iter()
             .all(|at| self.bench.has_raised(at, Event::Converged))
     }
 
-    /// Runs for an interval, after which the drones move.
+    /// Runs the chain for an interval, after which the drones move.
     pub(crate) fn turn(&mut self) {
         self.bench.run_for(TURN);
         let now = self.bench.now;
@@ -124,7 +124,7 @@ impl Wires {
         }
     }
 
-    /// Runs until `over`, for at most `most_s` seconds. Returns true if it holds.
+    /// Runs the chain until `over` is true, for at most `most_s` seconds. Returns true if it has become true.
     pub(crate) fn until(&mut self, most_s: u64, mut over: impl FnMut(&Self) -> bool) -> bool {
         let end = self.bench.now + Duration::from_millis(1_000 * most_s);
         while self.bench.now < end {

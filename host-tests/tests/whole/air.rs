@@ -12,38 +12,38 @@ use uav_relay::{
 };
 use uav_relay_sim::simulator::watch::{Seen, groups};
 
-/// Bit rate of a link, and of each relay's share of the channel.
+/// Bit rate of a wire, and of each relay's transmitter on the channel.
 const BAUD: u64 = 115_200;
 
 /// Time from the last bit sent to the last bit received, µs.
 const LATENCY_US: u64 = 2_000;
 
-/// Settings of the relays, and the scheduled peculiarities.
+/// Kind of a simulated chain: the relays' settings, and the faults that they have from the start.
 #[derive(Clone, Debug)]
 pub(crate) struct Kind {
     pub(crate) mission: Mission,
     pub(crate) wiring: Wiring,
     pub(crate) signed: bool,
     pub(crate) seed: u64,
-    /// Reception range on a shared channel, in positions along the chain.
+    /// Reception range on a shared channel, as a difference of relay indices.
     pub(crate) reach: usize,
-    /// Relay that is loaded with another mission.
+    /// Relay (from 0) that is loaded with another mission, and that mission.
     pub(crate) stranger: Option<(usize, Mission)>,
-    /// Relay whose epoch goes back at its second start.
+    /// Relay (from 0) whose epoch goes back at its second start.
     pub(crate) goes_back: Option<usize>,
-    /// Relay of which a second drone exists; the copy's index follows those of all relays.
+    /// Relay (from 0) of which a second drone, the copy, exists. The copy's number follows those of all relays.
     pub(crate) copied: Option<usize>,
 }
 
-/// Scheduled event at one relay or link. Relays are counted from 0.
+/// Scheduled event at a relay or link. Relays are counted from 0.
 #[derive(Clone, Debug)]
 pub(crate) enum Deed {
-    /// The relay is switched on; after a reboot with its stored votes and upload.
+    /// Event: the relay is switched on. After a reboot it has its stored votes and upload.
     On(usize),
     Off(usize),
-    /// The relay is informed that the other drone with its number is gone.
+    /// Event: an operator informs the relay that the other drone with its index is gone.
     Clear(usize),
-    /// Cuts (`Mend`: mends) the link from `from` to `to`; overlapping cuts are counted.
+    /// Event: the link from `from` to `to` is cut (`Mend`: mended). Overlapping cuts are counted.
     Cut {
         from: usize,
         to: usize,
@@ -52,11 +52,11 @@ pub(crate) enum Deed {
         from: usize,
         to: usize,
     },
-    /// Fraction of frames lost on every link.
+    /// Event: from now on, this fraction of frames is lost on every link.
     Loss(f64),
-    /// A mission is uploaded to the relay.
+    /// Event: a mission is uploaded to the relay.
     Upload(usize, Box<Upload>),
-    /// The relay's clock steps by this many µs, but not below 0: relay, step.
+    /// Event: the relay's clock steps by this many µs, but not below 0. The fields are the relay and the step.
     Step(usize, i64),
 }
 
@@ -102,13 +102,13 @@ struct Drone {
     starts: u32,
     stored: (Option<ViewRecord>, Option<Upload>),
     wake_us: Option<u64>,
-    /// Offset of the drone's clock from the simulated time, µs.
+    /// Difference of the drone's clock from the simulated time, µs.
     ahead_us: i64,
-    /// Time when the transmitter is free again, by port, µs.
+    /// Time at which the drone's transmitter is free again, for each port, µs.
     free_us: [u64; 2],
 }
 
-/// Chain in flight.
+/// Simulated chain in flight, with its medium and statistics.
 #[derive(Debug)]
 pub(crate) struct Air {
     kind: Kind,
@@ -120,21 +120,23 @@ pub(crate) struct Air {
     loss: f64,
     rng: ChaCha8Rng,
     seen: Vec<Seen>,
-    /// Largest number of groups that flew different agreements at once, and the time of that.
+    /// Largest number of groups that flew different agreements at once. The next field is the time of that, µs.
     pub(crate) groups: usize,
     pub(crate) groups_us: u64,
-    /// Time since which the chain has been whole; `None` while it is not.
+    /// Time since which all relays have held positions in one view, µs; `None` while they do not.
     pub(crate) whole_since_us: Option<u64>,
-    /// Time in which all relays but `spare` flew one agreement, and the longest interruption, µs.
+    /// Number of relays that need not fly the common agreement. The next fields are the time flown by the others, the
+    /// first such time, and the longest interruption, µs.
     pub(crate) spare: usize,
     pub(crate) flown_us: u64,
     pub(crate) first_us: Option<u64>,
     pub(crate) longest_us: u64,
     flies: bool,
     changed_us: u64,
-    /// Frames sent, and events by relay and name.
+    /// Number of frames sent by all relays.
     pub(crate) frames: u64,
-    /// Last reception between a relay and its copy, start of two setpoints, and longest duration, µs.
+    /// Last receptions between a relay and its copy, µs. The next fields are the time since which both have had
+    /// setpoints, and the longest such time.
     received_us: [Option<u64>; 2],
     both_us: Option<u64>,
     pub(crate) longest_both_us: u64,
@@ -150,7 +152,7 @@ impl Drone {
 }
 
 impl Air {
-    /// Stores `record` at relay `at`, as of an earlier flight.
+    /// Stores the voting record of an earlier flight at relay `at`.
     pub(crate) fn store(&mut self, at: usize, record: ViewRecord) {
         self.drones[at].stored.0 = Some(record);
     }
@@ -318,7 +320,7 @@ impl Air {
         None
     }
 
-    /// Sends the pending frames of relay `at` and updates its observed state.
+    /// Sends the pending frames of relay `at`, and updates its observed state.
     fn drain(&mut self, at: usize) {
         let now = self.drones[at].clock(self.now_us);
         let mut frame = [0; MAX_FRAME];
@@ -422,13 +424,13 @@ impl Air {
         }
     }
 
-    /// Returns the index in the chain of drone `at`, where a copy has the index of its original.
+    /// Returns the index (from 0) of drone `at` in the chain. A copy has the index of its original.
     fn place(&self, at: usize) -> usize {
         let all = usize::from(self.kind.mission.relays());
         self.kind.copied.filter(|_| at == all).unwrap_or(at)
     }
 
-    /// Returns the state of the relays without the copied one and its copy.
+    /// Returns the observed states of all relays except the copied one and its copy.
     fn uncopied(&self) -> Vec<Seen> {
         let drones = (0..self.drones.len()).filter(|at| Some(self.place(*at)) != self.kind.copied);
         drones.map(|at| self.seen[at]).collect()
@@ -456,7 +458,7 @@ impl Air {
         }
     }
 
-    /// Adds the time since the last change to the flight or to its interruption.
+    /// Adds the time since the last call to the time flown, or to the present interruption.
     pub(crate) fn measure(&mut self) {
         let span_us = self.now_us - self.changed_us;
         if self.flies {
@@ -474,7 +476,8 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the size of the largest group of relays that fly one agreement. All are members of its view.
+    /// Returns the size of the largest group that flies one agreement with all members of its view. A view is the
+    /// agreed membership of the chain.
     fn flying(&self) -> usize {
         let holds = |seen: &&Seen| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding
@@ -488,7 +491,7 @@ impl Air {
         holding.iter().filter_map(of).max().unwrap_or(0)
     }
 
-    /// Returns true if all relays are on, in one complete view, with setpoints.
+    /// Returns true if all relays are on and hold positions in one membership view of all relays.
     fn is_whole(&self) -> bool {
         let all = usize::from(self.kind.mission.relays());
         let is_on = |at: &usize| self.seen[*at].is_on;
@@ -507,7 +510,7 @@ impl Air {
             })
     }
 
-    /// Returns the state of all relays as text.
+    /// Returns the state of all relays as text, for failure reports.
     pub(crate) fn described(&self) -> String {
         let each = self.drones.iter().map(|drone| {
             let relay = &drone.relay;

@@ -12,13 +12,14 @@ use super::number;
 use super::schedule::{SECOND, Schedule};
 use host_tests::fixtures::mission;
 
-/// Returns how often all relays together raised the event `name`.
+/// Returns the number of times that all relays together raised the event `name`.
 fn told(air: &Air, name: &str) -> u32 {
     let of = |((_, event), times): (&(usize, String), &u32)| (event == name).then_some(*times);
     air.events.iter().filter_map(of).sum()
 }
 
-/// Checks that relays fly without pauses although relay 2 of four never receives relay 3.
+/// Checks that four relays fly without long pauses although one link works in one direction only. One of the relays
+/// may be left out.
 #[test]
 fn a_link_that_is_one_way_from_the_start_leaves_one_relay_out_for_good() {
     let mut late = Vec::new();
@@ -49,10 +50,10 @@ fn a_link_that_is_one_way_from_the_start_leaves_one_relay_out_for_good() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Returns eight relays after two hours with a flapping link, and the fraction of time flown.
+/// Simulates eight relays with a flapping link for two hours. Returns them, and the fraction of time flown.
 ///
-/// The link is between relays `link + 1` and `link + 2`. The time counts from the first agreement, while at least seven relays
-/// fly it.
+/// The link is between relays `link + 1` and `link + 2`. The fraction counts from the first agreement; at least seven
+/// relays must fly it.
 fn flown_with_flaps(link: usize, (up_us, down_us): (u64, u64), seed: u64) -> (Air, f64) {
     let mut schedule = Schedule::of(8, seed);
     schedule.kind.reach = 3;
@@ -98,8 +99,9 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
     assert!(worst.is_empty(), "{worst:?}");
 }
 
-/// Checks a chain that has closed over relay 3. Its hello counted relays 1 and 2 although it was linked to neither. Relay 6 then
-/// selected it in place of relay 5 every 16 s.
+/// Checks that a relay that is left out does not draw its neighbours away from the chain. The chain has closed over
+/// relay 3, which is linked to neither relay 1 nor relay 2. If its hello counted these two, relay 6 would select it
+/// in place of relay 5 every 16 s.
 #[test]
 fn a_relay_that_is_left_out_draws_no_other_away() {
     let (air, share) = flown_with_flaps(2, (10_191_000, 25_107_000), 325);
@@ -107,11 +109,11 @@ fn a_relay_that_is_left_out_draws_no_other_away() {
     assert!(share > 0.98, "{share}");
 }
 
-/// Links that stay up for a little longer than the longest hold-down. One end is released before the other one, and the link is
-/// lost again soon.
+/// Random seeds of links that stay up a little longer than the longest hold-down. One end of such a link is released
+/// before the other, and the link is lost again soon.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
-/// Checks any flapping link with a period of 5 s to 300 s.
+/// Checks that one flapping link costs at most a tenth of the flight time, for periods of 5 s to 300 s.
 #[test]
 fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));
@@ -142,7 +144,8 @@ fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     assert!(below == 0 && median > 0.99, "{all:?}");
 }
 
-/// Checks that a relay reports a neighbour with another mission once a minute.
+/// Checks that a neighbour with another mission is reported seldom. No event may occur more than 22 times in ten
+/// minutes.
 #[test]
 fn a_relay_of_another_mission_is_told_of_once_a_minute() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
@@ -166,7 +169,7 @@ fn a_relay_of_another_mission_is_told_of_once_a_minute() {
     }
 }
 
-/// Checks four relays of which the epoch of relay 2 goes back.
+/// Checks that an epoch of relay 2 that goes back is reported, and costs few frames.
 #[test]
 fn an_epoch_that_goes_back_on_wires_is_told_and_costs_few_frames() {
     for wiring in [Wiring::Pair, Wiring::Shared] {

@@ -15,7 +15,7 @@ use host_tests::fixtures::voted;
 use rand::{RngExt, SeedableRng};
 use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
-/// Time limit from the last fault to the whole chain, s.
+/// Longest permitted time from the last fault until all relays hold positions in one view, s.
 const WHOLE_S: u64 = 120;
 
 /// Returns the environment variable `name` as a number, or `usual`.
@@ -23,11 +23,12 @@ fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// Result of one schedule.
+/// Result of one schedule of faults.
 #[derive(Clone, Debug)]
 struct Found {
     seed: u64,
-    /// Time from the end of the last fault until the chain was whole for good, s; `None` beyond 15 minutes.
+    /// Time from the last fault until the chain was whole for good, s; `None` beyond 15 minutes. In a whole chain,
+    /// all relays hold positions in one membership view.
     whole_s: Option<f64>,
     groups: usize,
     groups_s: f64,
@@ -40,7 +41,7 @@ fn flown(seed: u64, schedule: &Schedule) -> Found {
     ended(seed, schedule, schedule.begun())
 }
 
-/// Flies a schedule in `air` to its end.
+/// Runs the chain `air` to the end of its schedule, and until it is whole.
 fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
     let end = schedule.faults_end_us;
     air.run(end);
@@ -70,7 +71,7 @@ fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
     }
 }
 
-/// Flies `count` schedules on all cores; the results are in the order of their seeds.
+/// Runs `count` schedules on all cores. Returns the results in the order of their seeds.
 fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Found> {
     let next = AtomicU64::new(first);
     let all = Mutex::new(Vec::new());
@@ -129,7 +130,8 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks a relay and its copy: one loses its setpoint within 2 s. The chain is whole once one is removed.
+/// Checks a relay and its copy: one of them loses its setpoint within 2 s. The chain is whole once one of them is
+/// removed.
 ///
 /// Two chains can fly only where a copy is on either side of a cut, because each copy has its vote.
 #[test]
@@ -159,10 +161,10 @@ fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
-/// Checks schedules that once never recovered.
+/// Checks schedules from which a chain recovers only with difficulty.
 ///
-/// The reasons were view numbers that ran away, an idle neighbour switched on elsewhere, two interleaved chains, and two
-/// candidates for one position received in turn.
+/// Their causes are view numbers far ahead, an idle neighbour that is switched on elsewhere, two interleaved chains,
+/// and two candidates for one position that are received in turn.
 #[test]
 fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
@@ -175,7 +177,7 @@ fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
     }
 }
 
-/// Returns a schedule in which one relay neither sends nor receives frames for the given time.
+/// Returns a schedule in which relay `alone` neither sends nor receives frames for `minutes`.
 fn one_alone(relays: u16, alone: usize, minutes: u64) -> Schedule {
     let mut schedule = Schedule::of(relays, 1);
     schedule.cut(|at| at == alone, 60 * SECOND, (60 + 60 * minutes) * SECOND);
@@ -227,7 +229,8 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Checks a relay whose record of an earlier flight has a far later view number than the others'.
+/// Checks that a chain recovers if one relay has a stored vote with a far later view number. The vote is from an
+/// earlier flight.
 #[test]
 fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
     for (relays, later) in [(2_u16, 1), (4, 0), (5, 2), (8, 7)] {
@@ -250,9 +253,9 @@ fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
     }
 }
 
-/// Flies chains with clock steps of up to ten hours. In half of them a relay is isolated for three minutes.
+/// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
-/// Returns the number of schedules, those that recovered late, and those with two chains at once.
+/// Returns the number of chains, those that recovered late, and those that flew as two chains at once.
 fn with_steps(forward: bool) -> (u64, Vec<Found>, Vec<Found>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);
@@ -291,7 +294,8 @@ fn clocks_that_step_back_leave_one_whole_chain() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks forward clock steps, which end waits for leases early: two chains may fly until these expire.
+/// Checks clocks that step forward. A step ends the wait for others' leases early, so that two chains may fly until
+/// these expire.
 #[test]
 fn clocks_that_step_forward_leave_a_whole_chain_and_seldom_two_for_a_while() {
     let (count, late, two) = with_steps(true);

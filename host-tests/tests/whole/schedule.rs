@@ -9,7 +9,7 @@ use host_tests::fixtures::mission;
 
 pub(crate) const SECOND: u64 = 1_000_000;
 
-/// Schedule of faults, and the end of the last fault.
+/// Schedule of faults of a chain, with the time of the end of the last one.
 #[derive(Clone, Debug)]
 pub(crate) struct Schedule {
     pub(crate) kind: Kind,
@@ -18,7 +18,7 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// Returns one chain of relays that are all switched on at time 0.
+    /// Returns a schedule without faults, in which all relays are switched on at time 0.
     pub(crate) fn of(relays: u16, seed: u64) -> Self {
         let kind = Kind {
             mission: mission(relays),
@@ -51,7 +51,7 @@ impl Schedule {
         self.faults_end_us = self.faults_end_us.max(at_us);
     }
 
-    /// Switches relay `at` off, and on again.
+    /// Switches relay `at` off at `off_us`, and on again at `on_us`.
     pub(crate) fn reboot(&mut self, at: usize, off_us: u64, on_us: u64) {
         self.put(off_us, Deed::Off(at));
         self.put(on_us, Deed::On(at));
@@ -64,19 +64,19 @@ impl Schedule {
         self.put(at_us, Deed::Step(at, by_us));
     }
 
-    /// Loses frames from `from` to `to` for a time.
+    /// Loses the frames from relay `from` to relay `to` between two times.
     pub(crate) fn deafen(&mut self, from: usize, to: usize, from_us: u64, until_us: u64) {
         self.put(from_us, Deed::Cut { from, to });
         self.put(until_us, Deed::Mend { from, to });
     }
 
-    /// Cuts the link of two relays in both directions for a time.
+    /// Cuts the link of two relays in both directions between two times.
     pub(crate) fn part(&mut self, one: usize, other: usize, from_us: u64, until_us: u64) {
         self.deafen(one, other, from_us, until_us);
         self.deafen(other, one, from_us, until_us);
     }
 
-    /// Separates the relays for which `is_in` is true from all others for a time.
+    /// Separates the relays for which `is_in` is true from all others, between two times.
     pub(crate) fn cut(&mut self, is_in: impl Fn(usize) -> bool, from_us: u64, until_us: u64) {
         let all = usize::from(self.kind.mission.relays());
         for one in 0..all {
@@ -86,7 +86,7 @@ impl Schedule {
         }
     }
 
-    /// Lets the link of two relays flap until a time.
+    /// Lets the link of two relays fail and return again and again until `until_us`.
     pub(crate) fn flap(
         &mut self,
         (one, other): (usize, usize),
@@ -111,13 +111,13 @@ fn relays(rng: &mut ChaCha8Rng) -> u16 {
     }
 }
 
-/// Draws the duration of a fault, µs: log-uniform from 2 s to 4 minutes.
+/// Draws the duration of a fault, µs: 2 s to 4 minutes, log-uniform.
 fn span(rng: &mut ChaCha8Rng) -> u64 {
     let seconds = 2.0 * f64::powf(120.0, rng.random_range(0.0..1.0));
     (seconds * 1e6) as u64
 }
 
-/// Draws a schedule of all faults, in one of six schedules with clocks that step back.
+/// Draws a schedule of faults of every kind. In one of six schedules clocks step back.
 pub(crate) fn random(seed: u64) -> Schedule {
     let mut schedule = without_steps(seed);
     // A separate random generator leaves the rest of the schedule unchanged.
@@ -132,7 +132,7 @@ pub(crate) fn random(seed: u64) -> Schedule {
     schedule
 }
 
-/// Draws a schedule of faults of every kind except clock steps.
+/// Draws a schedule of faults of every kind except steps of clocks.
 pub(crate) fn without_steps(seed: u64) -> Schedule {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let count = relays(rng);
@@ -223,7 +223,7 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
     schedule
 }
 
-/// Returns a mission with the interferer at another position.
+/// Returns an upload of the schedule's mission with the interferer at another position.
 fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
     let base = &schedule.kind.mission;
     let mut config = *base.config();
@@ -237,10 +237,10 @@ fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
     Box::new(Upload::new(base, 1, config).unwrap())
 }
 
-/// Draws a schedule with a copied relay, one of which is removed after all other faults.
+/// Draws a schedule with a relay and its copy, one of which is removed after all other faults.
 ///
-/// In half of the schedules the other copy is informed of that. Copies that do not receive each other, and cut chains, are
-/// included.
+/// In half of the schedules the other one is informed of that. In some schedules, the two do not receive each other,
+/// or the chain is cut.
 pub(crate) fn with_copy(seed: u64) -> Schedule {
     let mut schedule = without_steps(seed);
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0xC0B1);
@@ -282,7 +282,7 @@ pub(crate) fn with_copy(seed: u64) -> Schedule {
 }
 
 impl Schedule {
-    /// Returns true if no relay is ever cut off from another.
+    /// Returns true if no link between two relays is ever cut in this schedule.
     pub(crate) fn is_uncut(&self) -> bool {
         !self
             .deeds

@@ -13,7 +13,8 @@ use super::said::Said;
 use super::signed::{Met, NOW, settings};
 use super::votes::*;
 
-/// Returns relay 4, which received version 2 from its neighbours and flies it in view 1 of all eight.
+/// Returns relay 4, which has adopted an upload of version 2 in membership view 1 of all eight relays. The upload
+/// comes with it.
 fn adopted() -> (Met, Said) {
     let mut met = Met::fourth();
     let newer = upload(2, met.base);
@@ -21,7 +22,7 @@ fn adopted() -> (Met, Said) {
     (met, newer)
 }
 
-/// Makes relay 4 accept `newer` and fly it in view 1 of all eight.
+/// Makes relay 4 receive the upload `newer`, and adopt it in membership view 1 of all eight relays.
 pub(crate) fn adopts(met: &mut Met, newer: &Said) {
     let of = mission_id(newer);
     met.hears(0, newer);
@@ -134,10 +135,10 @@ fn a_stored_mission_is_held_and_flown_after_a_reboot() {
     }
 }
 
-/// Checks the numbers that link offers to hellos.
+/// Checks the numbers by which a mission offer answers a hello.
 ///
-/// A number changes `dead_after` after its first use. An offer must have one of the last two, sent at most twice `dead_after`
-/// ago; a relay's offer repeats the number that it received.
+/// A number changes `dead_after` after its first use. An offer must have one of the last two, sent at most twice
+/// `dead_after` ago; a relay's offer repeats the number that it received.
 #[test]
 fn an_offer_that_answers_no_recent_hello_is_stale() {
     let met = Met::fourth();

@@ -19,7 +19,7 @@ use super::said::{Said, plain_of};
 use super::strategies::messages;
 use super::votes::mark;
 
-/// Sets the number and digest of a message, where it has them.
+/// Sets the pass number and the mission digest of a message, in messages that have them.
 fn renamed(said: &Said, number: u16, mission: u16) -> Said {
     // The view of that number proposed by relay 1; proposed numbers are above 0.
     let view = u32::from(number.max(1)) << 10 | 1;
@@ -49,7 +49,7 @@ fn renamed(said: &Said, number: u16, mission: u16) -> Said {
     })
 }
 
-/// Returns `said` with fields changed to values that are plausible in the test's mission.
+/// Returns the message with some fields changed to values that are plausible in the test's mission.
 fn tamed(said: &Said) -> Said {
     let within = |numbers: Vec<f32>| numbers.into_iter().map(|number| number % 1000.0);
     match said.name() {
@@ -96,19 +96,19 @@ fn tamed(said: &Said) -> Said {
     }
 }
 
-/// Message of a neighbour in one step.
+/// Step of a random test: a message that the relay receives from a neighbour.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is drawn by itself")]
 struct Step {
     said: Said,
     right_side: bool,
     right_mission: bool,
-    /// Offset of its number from that of the next pass, or of the last one that it answers.
+    /// Offset of the message's pass number from that of the next pass. An answer's is counted from the last pass.
     off: i16,
     tame: bool,
     /// Time until the next step, ms.
     wait_ms: u64,
-    /// True if the relay answers a pass in this state.
+    /// True if a pass in this step is followed by a neighbour's answer to it.
     answered: bool,
 }
 
@@ -138,13 +138,14 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     vec(step, 1..40)
 }
 
-/// Flight of a relay among any messages.
+/// State of a test in which a relay receives random messages.
 struct Flight {
     bench: Bench,
-    /// A message of each tag.
+    /// Messages of the test, one of each tag, in the order of the tags.
     kinds: Vec<Said>,
     ports: (Port, Port),
-    /// True once a pass may have been accepted. The number of the pass sent, and that of the last one accepted.
+    /// True once the relay may have accepted a pass. The next fields are the number of the pass sent, and of the last
+    /// one accepted.
     begun: bool,
     pass: u16,
     last: u16,
@@ -152,7 +153,7 @@ struct Flight {
 }
 
 impl Flight {
-    /// Returns the messages of a step, each with its port. The step's own, and perhaps the answer to a pass.
+    /// Returns the messages of a step with the ports at which they arrive. A pass may be followed by its answer.
     fn said(&mut self, step: &Step) -> Vec<(Port, Said)> {
         let (from, to) = self.ports;
         let tag = step.said.tag();
@@ -195,7 +196,8 @@ impl Flight {
     }
 }
 
-/// Sends a relay of 8 any messages and checks its bounds; all causes in `expected` must occur.
+/// Sends random messages to relay `own` of eight, and checks its bounds. All statistics counters in `expected` must
+/// occur.
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
     let ports = ways(mission.interference);
@@ -299,7 +301,7 @@ fn any_messages_leave_a_relay_in_a_field_in_bounds() {
     led_by_anything(weak, 1, &[]);
 }
 
-/// Checks the headers and the counter of a leader's first frames.
+/// Checks the headers of a leader's first frames, and that their counter rises by one.
 #[test]
 fn a_relays_frames_have_its_header_and_a_rising_counter() {
     let mut head = Bench::new(1, 8, Wiring::Pair);

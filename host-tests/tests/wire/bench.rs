@@ -13,13 +13,13 @@ use uav_relay_fuzz::counted::named;
 
 use super::said::{Said, plain_of, wire};
 
-/// A relay at the current time.
+/// Test bench: a relay without a key, and the current time.
 #[derive(Clone, Debug)]
 pub(crate) struct Bench {
     relay: Relay,
-    /// Number of its node.
+    /// Node number of the relay.
     pub(crate) own: u16,
-    /// Digest of its mission as loaded.
+    /// Digest of the mission with which the relay was loaded.
     pub(crate) mission: u16,
     pub(crate) now: Instant,
 }
@@ -39,7 +39,7 @@ impl DerefMut for Bench {
 }
 
 impl Bench {
-    /// Creates relay `own` of `relays` in the paper's scenario.
+    /// Creates relay `own` of `relays` relays in the paper's scenario.
     pub(crate) fn new(own: u16, relays: u16, wiring: Wiring) -> Self {
         Self::of(paper(relays), own, wiring)
     }
@@ -62,7 +62,7 @@ impl Bench {
         }
     }
 
-    /// Delivers a message of the neighbour at `port`; returns what the relay then sends.
+    /// Delivers a message of the neighbour at `port`. Returns the ports and messages that the relay then sends.
     pub(crate) fn hears(&mut self, port: Port, said: &Said) -> Vec<(Port, Said)> {
         let sender = match port {
             Port::Upstream => self.own - 1,
@@ -71,21 +71,22 @@ impl Bench {
         self.hears_from(sender, port, said)
     }
 
-    /// Delivers a message of node `sender`; returns what the relay then sends.
+    /// Delivers a message of node `sender`. Returns the ports and messages that the relay then sends.
     pub(crate) fn hears_from(&mut self, sender: u16, port: Port, said: &Said) -> Vec<(Port, Said)> {
         let bytes = between(sender, self.own, said);
         self.relay.handle_bytes(self.now, port, &bytes);
         self.sends()
     }
 
-    /// Returns the messages that the relay sends at the bench's time, with their ports, without claims.
+    /// Returns the ports and messages that the relay sends now, without index claims.
     pub(crate) fn sends(&mut self) -> Vec<(Port, Said)> {
         let mut out = self.sends_with_claims();
         out.retain(|(_, said)| !said.is("Claim"));
         out
     }
 
-    /// Returns the ports and messages that the relay sends now. Each must be valid, and the next timeout in the future.
+    /// Returns the ports and messages that the relay sends now. Checks that each is valid, and that the next timeout
+    /// is in the future.
     pub(crate) fn sends_with_claims(&mut self) -> Vec<(Port, Said)> {
         let mut out = Vec::new();
         let mut buffer = [0; MAX_FRAME];
@@ -103,21 +104,21 @@ impl Bench {
         out
     }
 
-    /// Advances the time by a millisecond; returns what the relay then sends.
+    /// Advances the time by a millisecond. Returns what the relay then sends.
     pub(crate) fn ticks(&mut self) -> Vec<(Port, Said)> {
         self.now = self.now + Duration::from_millis(1);
         self.relay.handle_timeout(self.now);
         self.sends()
     }
 
-    /// Advances the time to the next timeout; returns what the relay then sends.
+    /// Advances the time to the relay's next timeout. Returns what it then sends.
     pub(crate) fn wakes(&mut self) -> Vec<(Port, Said)> {
         self.now = self.relay.poll_timeout().unwrap();
         self.relay.handle_timeout(self.now);
         self.sends()
     }
 
-    /// Advances time for a second; returns all that the relay sends.
+    /// Advances the time by a second. Returns all that the relay sends meanwhile.
     pub(crate) fn settles(&mut self) -> Vec<(Port, Said)> {
         let mut out = self.sends();
         out.extend((0..1000).flat_map(|_| self.ticks()));
@@ -128,7 +129,7 @@ impl Bench {
         events(&mut self.relay)
     }
 
-    /// Returns the names of the reception counters above zero.
+    /// Returns the names of the relay's counters of received frames and messages that are above zero.
     pub(crate) fn counted(&self) -> Vec<&'static str> {
         counted(self.relay.stats())
     }
@@ -138,7 +139,7 @@ pub(crate) fn events(relay: &mut Relay) -> Vec<Event> {
     iter::from_fn(|| relay.poll_event()).collect()
 }
 
-/// Encodes a frame of node `sender` to node `destination`.
+/// Encodes a message of node `sender` to node `destination` as a frame on the wire.
 pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     let header = Header {
         network: NETWORK,
@@ -149,7 +150,7 @@ pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
     wire(header, said.body())
 }
 
-/// Counters of which each received frame increments one.
+/// Names of the statistics counters of which each received frame increments one.
 pub(crate) const OF_FRAMES: [&str; 9] = [
     "received",
     "overheard",
@@ -162,7 +163,7 @@ pub(crate) const OF_FRAMES: [&str; 9] = [
     "misaddressed",
 ];
 
-/// Counters of received messages; those without a tag count only at a relay without a key.
+/// Names of the statistics counters of received messages. `unsigned` counts only at a relay without a key.
 const OF_MESSAGES: [&str; 6] = [
     "repeated",
     "unsigned",
@@ -172,14 +173,14 @@ const OF_MESSAGES: [&str; 6] = [
     "stale",
 ];
 
-/// Returns the counters of which each received frame increments one.
+/// Returns the counters of which each received frame increments one, with their names.
 pub(crate) fn of_frames(stats: &Stats) -> Vec<(&'static str, u32)> {
     let mut all = named(stats).to_vec();
     all.retain(|(name, _)| OF_FRAMES.contains(name));
     all
 }
 
-/// Returns the names of the reception counters above zero.
+/// Returns the names of the counters of received frames and messages that are above zero.
 pub(crate) fn counted(stats: &Stats) -> Vec<&'static str> {
     let mut names: Vec<&str> = named(stats)
         .into_iter()

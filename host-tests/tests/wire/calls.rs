@@ -7,7 +7,8 @@ use super::bench::Bench;
 use super::kinds::{FIRST, beat, one_of_each};
 use super::votes::*;
 
-/// Checks the middle of a part without a quorum. It holds, returns the decision, and requests nothing more.
+/// Checks a relay in the middle of a group without a quorum. It forwards the refusing decision, has no setpoint, and
+/// requests no further membership view.
 #[test]
 fn a_part_without_quorum_stops_requesting_views() {
     let mut bench = Bench::new(4, 8, Wiring::Pair);
@@ -32,7 +33,8 @@ fn a_part_without_quorum_stops_requesting_views() {
     assert!(bench.now > Instant::from_millis(60_000));
 }
 
-/// Checks a leader without a quorum: it proposes again after `probe_after`, doubled with each refusal.
+/// Checks that a leader without a quorum proposes again, after ever longer waits. The first one is `probe_after`; it
+/// doubles with each refusal, up to eight times.
 #[test]
 fn a_leader_without_quorum_proposes_again_ever_later() {
     let mut head = Bench::new(1, 8, Wiring::Pair);
@@ -71,7 +73,8 @@ fn a_leader_without_quorum_proposes_again_ever_later() {
     }
 }
 
-/// Checks hellos with and without a request. A view number far ahead, perhaps the last one, is approached in steps.
+/// Checks that a hello is answered by a hello only if it requests one. A view number far ahead of the relay's own is
+/// approached in limited steps.
 #[test]
 fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
     for (asks, newest, known) in [

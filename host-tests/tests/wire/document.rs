@@ -17,7 +17,7 @@ fn cells(row: &str) -> Vec<&str> {
     row.split('|').map(str::trim).collect()
 }
 
-/// Returns the rows of the first table in `text`, without its head.
+/// Returns the rows of the first table in `text`, without its heading.
 fn rows(text: &str) -> impl Iterator<Item = Vec<&str>> {
     let table = text.lines().skip_while(|line| !line.starts_with('|'));
     table
@@ -26,12 +26,12 @@ fn rows(text: &str) -> impl Iterator<Item = Vec<&str>> {
         .map(cells)
 }
 
-/// Returns the text between two backticks.
+/// Returns the text of a table cell that is between two backticks.
 fn code(cell: &str) -> &str {
     cell.strip_prefix('`').unwrap().strip_suffix('`').unwrap()
 }
 
-/// Returns the bytes of the annotated rows and of the code block of an example.
+/// Returns the bytes of an example twice: from the annotated rows, and from the code block.
 fn example(section: &str) -> (Vec<u8>, Vec<u8>) {
     let hex = |text: &str| bytes(&text.split_whitespace().collect::<String>()).unwrap();
     let mut plain = Vec::new();
@@ -95,7 +95,8 @@ fn every_rejected_stream_is_counted_as_it_says() {
     }
 }
 
-/// Returns the digest of a mission with the f32 numbers of its interference, by the document.
+/// Returns the digest of a mission by the rules of `FORMAT.md`. `interference` has the f32 numbers of the mission's
+/// interference.
 fn digest_by_the_rules(mission: &Mission, interference: &[f32]) -> u16 {
     let config = mission.config();
     let mut bytes = config.relays.to_le_bytes().to_vec();

@@ -17,14 +17,15 @@ const PORTS: [(Wiring, Port); 2] = [
     (Wiring::Shared, Port::Shared),
 ];
 
-/// Delivers a frame to relay 4 of 8; returns the claims and echoes that it sends.
+/// Delivers a frame to relay 4 of 8. Returns the index claims and echoes of claims that it sends.
 fn hears(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, Said)> {
     let now = bench.now;
     bench.handle_bytes(now, port, bytes);
     bench.sends_with_claims()
 }
 
-/// Returns relay 4 of 8, its own sweep, and its claim number. It answers another frame with its number by that.
+/// Returns relay 4 of 8, a sweep message in its name, and the number of its index claim. The relay answered that
+/// message by a claim, as another node may have its index.
 fn relay_4(wiring: Wiring, port: Port) -> (Bench, Said, u32) {
     let mut bench = Bench::new(4, 8, wiring);
     bench.now = NOW;
@@ -50,7 +51,8 @@ fn a_neighbours_claim_is_echoed_to_its_number() {
     }
 }
 
-/// Checks claims. One that does not name the relay's own may be from before its start: it is only answered.
+/// Checks that a relay becomes passive if a larger claim names the relay's own claim number. A claim that does not
+/// name it may be from before the relay's start, and is only answered.
 #[test]
 fn the_smaller_claim_turns_passive_and_the_larger_answers() {
     for (wiring, port) in PORTS {
@@ -81,7 +83,7 @@ fn the_smaller_claim_turns_passive_and_the_larger_answers() {
     }
 }
 
-/// Checks a radio that returns a relay's own frames.
+/// Checks that a relay's own frames have no effect on it when a radio returns them.
 #[test]
 fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
     for (wiring, port) in PORTS {
@@ -100,7 +102,7 @@ fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
     }
 }
 
-/// Returns all frames that a relay sends.
+/// Returns all frames that a relay sends at time zero.
 fn frames(relay: &mut Relay) -> Vec<Vec<u8>> {
     let mut buffer = [0; MAX_FRAME];
     let mut frames = Vec::new();
@@ -111,7 +113,7 @@ fn frames(relay: &mut Relay) -> Vec<Vec<u8>> {
     frames
 }
 
-/// Returns relay 4 of 8 with a key, and its first two frames, which are handshakes.
+/// Returns relay 4 of 8 with a key, and the two handshakes that it sends first.
 fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     let settings = Settings {
         wiring: Wiring::Shared,
@@ -132,7 +134,8 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     (relay, frames)
 }
 
-/// Checks handshakes as claims: the relay becomes passive or answers once; its own have no effect.
+/// Checks that handshakes take the place of index claims if relays have a key. One of two duplicates becomes passive,
+/// the other one answers; a relay's own handshakes have no effect on it.
 #[test]
 fn with_a_key_handshakes_are_the_claims() {
     let mut passive = 0;

@@ -9,10 +9,10 @@ use uav_relay_decode::{range, walk};
 use super::golden::vectors;
 use super::said::FORMAT;
 
-/// Values of each field, by message and name.
+/// Values of each field that the test vectors have, as text. The key is the message's name and the field's.
 type Seen = BTreeMap<String, BTreeSet<String>>;
 
-/// Returns the name under which a message's fields are collected: one for messages of one layout.
+/// Returns the name under which a message's fields are collected. Messages with the same fields share a name.
 fn layout_of(message: &str) -> &str {
     match message {
         "Measured" | "Aside" => "Sweep",
@@ -59,7 +59,7 @@ fn note_one(path: &str, value: &Value<'_>, seen: &mut Seen) {
     seen.entry(path.to_owned()).or_default().insert(text);
 }
 
-/// Returns the values of a field that some vector must have.
+/// Collects the values of a field that some test vector must have.
 fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut Seen) {
     let mut want = |text: String| {
         all.entry(path.to_owned()).or_default().insert(text);

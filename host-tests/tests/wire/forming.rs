@@ -78,7 +78,7 @@ fn last_of_20(quorum: bool) -> Bench {
     Bench::with(paper(20), 20, settings)
 }
 
-/// Returns the decision on a proposal.
+/// Returns the decision by which the last relay answers a proposal.
 fn decided_by(last: &mut Bench, proposal: &Said) -> Said {
     let mut out = last.hears(Port::Upstream, proposal);
     let (port, said) = out.pop().unwrap();
@@ -86,7 +86,8 @@ fn decided_by(last: &mut Bench, proposal: &Said) -> Said {
     said
 }
 
-/// Checks the quorum: more than half of the earlier view's members, or half with its proposer.
+/// Checks the quorum: more than half of the earlier view's members, or half of them with its proposer. A view is the
+/// agreed membership of the chain.
 #[test]
 fn a_quorum_is_over_half_or_half_with_the_proposer() {
     for quorum in [true, false] {
@@ -123,7 +124,7 @@ fn a_quorum_is_over_half_or_half_with_the_proposer() {
     }
 }
 
-/// Checks that a member adds its vote, and its own lease if that is shorter.
+/// Checks that a member of the earlier membership view adds its vote, and its own lease if shorter.
 #[test]
 fn a_member_adds_its_vote() {
     let last = last_of_20(true);
@@ -144,7 +145,8 @@ fn a_member_adds_its_vote() {
     }
 }
 
-/// Checks that an accepted view, which may have been agreed on, is decided again.
+/// Checks that the last relay decides again for a view that was accepted and may have been agreed on. A view is the
+/// agreed membership of the chain.
 #[test]
 fn a_view_that_may_have_been_agreed_on_is_decided_again() {
     let mut last = last_of_20(true);
@@ -171,7 +173,8 @@ fn a_view_that_may_have_been_agreed_on_is_decided_again() {
     }
 }
 
-/// Checks a leader whose proposal has led to an earlier view: it continues with the next proposal.
+/// Checks a leader whose proposal ends in a decision for an earlier membership view. It continues with its next
+/// proposal.
 #[test]
 fn a_leader_continues_after_an_earlier_view_is_decided() {
     let mut head = Bench::new(1, 8, Wiring::Pair);

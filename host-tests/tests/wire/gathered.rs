@@ -12,7 +12,8 @@ use super::votes::FORMS;
 const UP: Port = Port::Upstream;
 const DOWN: Port = Port::Downstream;
 
-/// Checks results that are not awaited, and profiles and chosen positions in a field.
+/// Checks that the result of a profile collection is stale if it is not awaited. In a field of interference,
+/// collections and joint positions are stale, too.
 #[test]
 fn profiles_that_are_not_awaited_are_stale() {
     let field = Interference::Field(FIELD);
@@ -29,7 +30,7 @@ fn profiles_that_are_not_awaited_are_stale() {
     }
 }
 
-/// Returns relay 4 of 8; with `differs` it holds 33 m.
+/// Returns relay 4 of 8, which uses the joint method. With `differs`, it holds an altitude of 33 m.
 fn fourth(differs: bool) -> Bench {
     let common = source().common;
     let settings = Settings {
@@ -44,7 +45,7 @@ fn fourth(differs: bool) -> Bench {
     Bench::with(source(), 4, settings)
 }
 
-/// Returns a collection, or its result, with profiles of the relays `indices`.
+/// Returns a message that collects relays' profiles, or its result, with those of the relays `indices`.
 fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Said {
     let seat = |index: &u16| json!({ "relay": index, "altitude_m": 30.0, "power_w": 0.5 });
     let seats: Vec<_> = indices.iter().map(seat).collect();
@@ -53,7 +54,7 @@ fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Sa
     Said::new(name, &fields)
 }
 
-/// Returns a collection, or its result, with one profile more.
+/// Returns a message that collects relays' profiles, or its result, with the profile of one more relay.
 fn and(said: &Said, name: &str, index: u16, altitude_m: f32, power_w: f32) -> Said {
     let mut fields = json!(said.fields());
     let seat = json!({ "relay": index, "altitude_m": altitude_m, "power_w": power_w });
@@ -84,7 +85,8 @@ fn a_collection_is_forwarded_and_its_result_returned() {
     }
 }
 
-/// Checks that a full roster is forwarded unchanged, and that the next pass continues behind it.
+/// Checks that a relay forwards a full collection of profiles unchanged. The next collection must continue behind the
+/// last relay in it.
 #[test]
 fn a_full_roster_is_continued_by_the_next_pass() {
     let config = MissionConfig {
@@ -113,8 +115,8 @@ fn a_full_roster_is_continued_by_the_next_pass() {
     assert_eq!(bench.hears(UP, &next), [(DOWN, own)]);
 }
 
-/// Checks that the number alone does not identify a collection. Checks a relay that missed earlier ones, as after a reboot,
-/// too.
+/// Checks that a relay that does not know the collected profiles refuses a pass and requests a view. Such a relay has
+/// missed a collection, for example by a reboot.
 #[test]
 fn a_pass_of_unknown_profiles_is_stale_and_asks_for_a_view() {
     let fresh = fourth(false);
@@ -136,7 +138,8 @@ fn a_pass_of_unknown_profiles_is_stale_and_asks_for_a_view() {
     }
 }
 
-/// Checks that earlier relays never report a relay's own profile or a later one.
+/// Checks that a collection of profiles with that of the receiver or of a later relay is stale. Earlier relays never
+/// report these.
 #[test]
 fn a_collection_with_its_receivers_profile_is_stale() {
     for index in [4, 5] {
@@ -147,7 +150,8 @@ fn a_collection_with_its_receivers_profile_is_stale() {
     }
 }
 
-/// Checks invalid rosters: another pass, other relays, incomplete, beyond the chain, duplicates.
+/// Checks that a wrong result of a profile collection is stale and changes nothing. Its pass or relays are other
+/// ones, profiles are missing or beyond the chain, or it arrives twice.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let mut bench = fourth(false);

@@ -18,7 +18,7 @@ pub(crate) fn vectors() -> Vectors {
     vectors
 }
 
-/// Encodes a body by the crate.
+/// Encodes a message's body by the crate's codec.
 pub(crate) fn written(message: &Message) -> Vec<u8> {
     let mut body = [0; MAX_BODY];
     let len = message.encode(&mut body).unwrap();
@@ -34,7 +34,7 @@ pub(crate) fn only_frame(wire: &[u8]) -> Vec<u8> {
     deframer.push(*end).unwrap().unwrap().to_vec()
 }
 
-/// Returns true if the values are the same, however their numbers are written.
+/// Returns true if two JSON values are the same, however their numbers are written.
 fn is_same(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Number(a), Value::Number(b)) => {

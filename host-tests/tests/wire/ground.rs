@@ -10,7 +10,7 @@ use super::said::Said;
 use super::signed::{Met, settings};
 use super::votes::{ASKS, FLIES, FORMS, FRESH, READY, hello, near};
 
-/// Returns relay `own` of eight, which has met a ground station at `port`.
+/// Returns relay `own` of eight with a key, which has authenticated a ground station at `port`.
 fn with_ground(own: u16, ground: u16, port: Port) -> Met {
     let mission = Mission::try_new(paper(8)).unwrap();
     Met::new(mission, own, settings(wiring(port)), &[(ground, port)])

@@ -13,20 +13,21 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Field in which a chain of eight is feasible.
+/// Field of interference in which a chain of eight can meet a target SIR.
 pub(crate) const FIELD: Field = Field::new(&[at(-100.0, 1e8), at(500.0, 3e7), at(900.0, 2e8)]);
 
-/// Field with almost no interference.
+/// Field of interference that is as weak as the format permits.
 pub(crate) const WEAK: Field = Field::new(&[at(0.0, 1e32)]);
 
-/// Field of the strongest and the weakest interference.
+/// Field of interference from the weakest to the strongest that the format permits.
 pub(crate) const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
-/// Numbers of the first two passes of a leader's life.
+/// Number of a leader's first pass in the tests. `SECOND` is the number of the next pass.
 pub(crate) const FIRST: u16 = 64;
 pub(crate) const SECOND: u16 = 65;
 
-/// Returns the paper's scenario with another interference, a band of 20 m to 300 m, and lateral room.
+/// Returns the paper's scenario with the given interference. Altitudes are 20 m to 300 m, lateral offsets -60 m to 40
+/// m.
 pub(crate) fn mission(interference: Interference) -> MissionConfig {
     MissionConfig {
         interference,
@@ -42,12 +43,12 @@ pub(crate) fn mission(interference: Interference) -> MissionConfig {
     }
 }
 
-/// Returns the paper's scenario with its interferer, a band of 20 m to 300 m, and lateral room.
+/// Returns the paper's scenario with its interferer. Altitudes are 20 m to 300 m, and lateral offsets are permitted.
 pub(crate) fn source() -> MissionConfig {
     mission(paper(8).interference)
 }
 
-/// Returns a message of each tag, in their order, for the pass `number`; its digest is `mission`.
+/// Returns one message of each tag, in the order of the tags. Passes have the number `number`; digests are `mission`.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     let pass = json!({ "number": number, "view_digest": mission });
     let of = |name: &str, more: serde_json::Value| {
@@ -113,31 +114,31 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     ]
 }
 
-/// Returns a heartbeat.
+/// Returns a heartbeat with the numbers of its request and of its reply; 0 for none.
 pub(crate) fn beat(mission: u16, ask: u16, answer: u16) -> Said {
     let fields = json!({ "mission": mission, "request": ask, "reply": answer });
     Said::new("Heartbeat", &fields)
 }
 
-/// Returns an interference level, as the ground reports it.
+/// Returns an interference report as a ground station sends it.
 pub(crate) fn level(mission: u16) -> Said {
     Said::new("Level", &json!({ "mission": mission, "power_w": 1e-9 }))
 }
 
-/// Returns a claim by a node that has received claim `other`.
+/// Returns an index claim with its number, by a node that has received a claim with the number `other`.
 pub(crate) fn claim(number: u32, other: u32, flags: u8) -> Said {
     let fields = json!({ "number": number, "other_number": other, "flags": flags });
     Said::new("Claim", &fields)
 }
 
-/// Returns relay 4 of 8 and the ports from and to which passes go.
+/// Returns relay 4 of 8, the port at which it receives passes, and the port to which it forwards them.
 pub(crate) fn relay_4(config: MissionConfig) -> (Bench, Port, Port) {
     let bench = Bench::of(config, 4, Wiring::Pair);
     let (from, to) = ways(config.interference);
     (bench, from, to)
 }
 
-/// Returns the ports from and to which passes go.
+/// Returns the port at which a relay receives passes, and the port to which it forwards them.
 pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     match interference {
         Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),
@@ -145,7 +146,7 @@ pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     }
 }
 
-/// Makes the relay hold its position by pass `number`.
+/// Gives the relay a position: delivers the pass `number` and its result.
 pub(crate) fn place(bench: &mut Bench, (from, to): (Port, Port), number: u16) {
     let kinds = one_of_each(number, bench.mission);
     bench.hears(from, &kinds[0]);

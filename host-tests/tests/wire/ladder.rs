@@ -12,7 +12,7 @@ fn bits(targets: &[f32]) -> Vec<u32> {
     targets.iter().map(|target| target.to_bits()).collect()
 }
 
-/// Returns the ladder with fused multiply-add, which the format forbids.
+/// Returns the target SIRs of a sweep message by fused multiply-add, which the format forbids.
 fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     let mut gap = f32::from_bits(0x3300_0000 + (u32::from(gap) << 20));
     let mut targets = targets(anchor, 1, 0);
@@ -23,7 +23,7 @@ fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     targets[8..].to_vec()
 }
 
-/// Returns anchor, gap code and growth code of a sweep.
+/// Returns the codes by which a sweep message gives its target SIRs: anchor, gap and growth.
 fn ladder_of(sweep: &Said) -> (f32, u8, u8) {
     let code = |name| sweep.number(name) as u8;
     let anchor = sweep.number("anchor") as f32;

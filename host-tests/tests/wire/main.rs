@@ -36,7 +36,7 @@ mod uploads;
 mod views;
 mod votes;
 
-/// Returns a configuration for `cases` cases from `SEED`; failures leave no file behind.
+/// Returns a proptest configuration for `cases` cases from `SEED`. Failures leave no file behind.
 fn config(cases: u32) -> Config {
     Config {
         cases,

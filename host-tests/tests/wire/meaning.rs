@@ -19,7 +19,7 @@ use uav_relay_decode::value::{Fields, Value};
 use super::offer;
 use super::said::{Said, list, number};
 
-/// Fields of a message or of a group, in the types of the crate.
+/// Fields of a message, or of a group in it, which are read in the types of the crate.
 struct Of<'a>(&'a Fields<'static>);
 
 impl Of<'_> {
@@ -47,7 +47,7 @@ impl Of<'_> {
         PerTarget::from_slice(&list(self.0, name)).unwrap()
     }
 
-    /// Returns true if an Option has a value.
+    /// Returns true if the optional field `name` has a value.
     fn has(&self, name: &str) -> bool {
         self.0.get(name) != Some(&Value::None)
     }
@@ -82,7 +82,7 @@ impl Of<'_> {
     }
 }
 
-/// Returns the crate's message.
+/// Returns the crate's message with the values that `said` has by the tables of the format.
 pub(crate) fn message(said: &Said) -> Message {
     let fields = said.fields();
     let of = Of(&fields);
@@ -275,7 +275,7 @@ fn vote(name: &str, of: &Of<'_>) -> Message {
     })
 }
 
-/// Decodes the upload by the crate, because only the crate can construct it, and checks each number.
+/// Decodes an upload with the crate, and checks each number. Only the crate can construct an upload.
 fn upload(said: &Said, of: &Of<'_>) -> Upload {
     let upload = Upload::decode(&offer::kept(said)).unwrap();
     let config = upload.config();
@@ -333,7 +333,7 @@ fn upload(said: &Said, of: &Of<'_>) -> Upload {
     upload
 }
 
-/// Decodes measurements by the crate, because only relays can add sums, and checks each number.
+/// Decodes summed measurements with the crate, and checks each number. Only relays can add measurements up.
 fn sense(said: &Said, of: &Of<'_>) -> Message {
     let message = Message::decode(said.body()).unwrap();
     let (Message::Sense(heard) | Message::Sensed(heard)) = &message else {

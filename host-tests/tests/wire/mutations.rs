@@ -8,7 +8,7 @@ use super::said::Said;
 const ENCODING: Result<(), MessageError> = Err(MessageError::Encoding);
 const VALUE: Result<(), MessageError> = Err(MessageError::Value);
 
-/// Numbers of the tables; each is also tried with its sign changed, and with its neighbours.
+/// Limits in the tables of the format. Each is also tried with the other sign, and with the next numbers.
 const BOUNDS: [f64; 20] = [
     0.0,
     1e-30,
@@ -57,8 +57,8 @@ const NODES: [u16; 20] = [
 
 const SITES: [i32; 2] = [900_000_000, 1_800_000_000];
 
-/// Returns all 4-byte numbers to try. They are f32, views and sites, and numbers of the body itself with their neighbours if the
-/// rules of its message compare them.
+/// Returns all 4-byte numbers to try in a body: f32, view identifiers and coordinates of sites. The body's own
+/// numbers and their neighbours are added if the rules of its message compare them.
 fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     let mut floats: Vec<f32> = BOUNDS.iter().map(|bound| *bound as f32).collect();
     let own = match message {
@@ -89,7 +89,7 @@ fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     quads
 }
 
-/// Returns f64 to try, in an offer: bounds, multiples of its factors, and neighbours.
+/// Returns f64 to try in an offer: limits, multiples of its path-loss factors, and their neighbours.
 fn octets(body: &[u8]) -> Vec<[u8; 8]> {
     let own = body
         .windows(8)
@@ -100,7 +100,7 @@ fn octets(body: &[u8]) -> Vec<[u8; 8]> {
     near.chain(strange).map(f64::to_le_bytes).collect()
 }
 
-/// Asserts that the crate decodes or refuses the body as the tables do; returns the verdict.
+/// Asserts that the crate decodes or refuses a body as the tables of the format do. Returns the verdict.
 fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     let read = Message::decode(body);
     let verdict = read.as_ref().map(|_| ()).map_err(|error| *error);
@@ -111,7 +111,7 @@ fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     verdict
 }
 
-/// Counts verdicts: accepted, wrong encoding, out of range.
+/// Numbers of bodies by verdict: accepted, wrongly encoded, out of range.
 #[derive(Default, Debug)]
 struct Seen([usize; 3]);
 

@@ -5,7 +5,7 @@ use uav_relay_decode::envelope::sealed;
 
 use super::said::Said;
 
-/// Fields of the sites; all 0 for none.
+/// Names of the fields with the sites of Tx and Rx; all are 0 for a mission without sites.
 pub(crate) const SITES: [&str; 6] = [
     "tx_lat_e7",
     "tx_lon_e7",
@@ -15,16 +15,16 @@ pub(crate) const SITES: [&str; 6] = [
     "rx_amsl_mm",
 ];
 
-/// Offsets in the body: number of relays, noise, and sites.
+/// Offset of the number of relays in an offer's body. The next constants are those of noise and sites.
 const RELAYS: usize = 5;
 const NOISE: usize = 83;
 const SITES_AT: usize = 87;
 
-/// Length of the body, and of the part stored across a reboot, without the answered hello.
+/// Length of an offer's body. `KEPT` is the part that a relay stores: all but the number of the answered hello.
 pub(crate) const BYTES: usize = 113;
 pub(crate) const KEPT: usize = 111;
 
-/// Returns an offer that eight relays loaded with `base` can fly.
+/// Returns an offer of mission `version` that eight relays loaded with `base` can fly.
 pub(crate) fn upload(version: u16, base: u16) -> Said {
     let fields = json!({
         "version": version, "base": base, "relays": 8, "distance_m": 1000.0, "min_separation_m": 4.0,
@@ -49,7 +49,8 @@ pub(crate) fn kept(offer: &Said) -> Vec<u8> {
     offer.body()[..KEPT].to_vec()
 }
 
-/// Returns the mission's digest and version. The digest is a CRC-32C of the mission, and of that with the sites, if any.
+/// Returns the digest and version of an offered mission. The digest is from a CRC-32C of the mission, and then of
+/// that with the sites, if any.
 pub(crate) fn mission_id(offer: &Said) -> (u16, u16) {
     // Zero noise is left out.
     let end = if offer.number("noise_w") > 0.0 {
@@ -61,7 +62,7 @@ pub(crate) fn mission_id(offer: &Said) -> (u16, u16) {
     (digest, offer.number("version") as u16)
 }
 
-/// Combines a digest with the sites.
+/// Returns the mission digest `digest` combined with the offer's sites; unchanged without sites.
 pub(crate) fn between(offer: &Said, digest: u16) -> u16 {
     let sites = &offer.body()[SITES_AT..KEPT];
     if sites.iter().all(|byte| *byte == 0) {
@@ -70,7 +71,7 @@ pub(crate) fn between(offer: &Said, digest: u16) -> u16 {
     low_half(&[&digest.to_le_bytes()[..], sites].concat())
 }
 
-/// Returns the low half of the CRC-32C of `bytes`.
+/// Returns the low 16 bits of the CRC-32C of `bytes`.
 pub(crate) fn low_half(bytes: &[u8]) -> u16 {
     let sealed = sealed(bytes.to_vec());
     u16::from_le_bytes([sealed[bytes.len()], sealed[bytes.len() + 1]])

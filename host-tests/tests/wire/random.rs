@@ -21,7 +21,8 @@ use super::strategies::{bodies, headers, kinds, messages};
 proptest! {
     #![proptest_config(config(4000))]
 
-    /// Checks that both codecs agree, and a frame's overhead: header, CRC, a stuffing byte, a delimiter.
+    /// Checks that both codecs agree on random messages, and the overhead of a frame. It is a header, a CRC, a
+    /// stuffing byte and a delimiter.
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
         let message = message(&said);
@@ -53,7 +54,7 @@ proptest! {
         prop_assert_eq!(message.encode(&mut body), None);
     }
 
-    /// Checks the longest messages: an offer fills a frame except for its tag.
+    /// Checks the lengths of the longest messages. An offer fills a frame except for the tag.
     #[test]
     fn the_longest_messages_have_the_documented_lengths(
         offer in kinds(&["Offer"]),
@@ -66,7 +67,7 @@ proptest! {
     }
 }
 
-/// Checks that a body is decoded to the meaning of its fields, or refused for the reason in the tables.
+/// Checks that the crate decodes a body to the meaning of its fields, or refuses it as the tables do.
 fn is_judged_by_the_tables(body: &[u8]) {
     let read = Message::decode(body);
     match Said::read(body) {
@@ -137,7 +138,7 @@ proptest! {
 
 #[test]
 fn the_draws_reach_messages_and_both_refusals() {
-    /// First unused message tag, which counts for all later tags as well.
+    /// First unused message tag; all later tags are counted with it.
     const NONE: usize = 21;
 
     let mut runner = TestRunner::new(config(1));
@@ -178,7 +179,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
     }
 }
 
-/// Checks that a sweep with a solved position is encoded as an Aside, without measured values.
+/// Checks that a sweep message with a joint solution is encoded as `Aside`, without measured values.
 #[test]
 fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {

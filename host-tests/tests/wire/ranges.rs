@@ -13,7 +13,7 @@ use super::meaning;
 use super::offer::{BYTES, KEPT, kept, mission_id, upload};
 use super::said::{FORMAT, Said};
 
-/// Returns true if a body is accepted; otherwise it must be out of range.
+/// Returns true if the crate accepts an offer's body. Otherwise the reason must be a value out of range.
 fn taken(body: &[u8]) -> bool {
     match Message::decode(body) {
         Ok(message) => {
@@ -28,7 +28,8 @@ fn taken(body: &[u8]) -> bool {
     }
 }
 
-/// Checks separations from slightly below to slightly above the limit, in f32 steps.
+/// Checks that an offer is refused if its relays do not fit on the line with its least separation. It tries f32
+/// separations around the limit.
 #[test]
 fn an_offer_needs_room_for_its_relays() {
     let mut seen = [0; 2];
@@ -54,7 +55,7 @@ fn an_offer_needs_room_for_its_relays() {
     assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
 }
 
-/// Returns a mission in which every number differs.
+/// Returns a mission of eight relays whose other numbers differ from those of the paper's.
 fn other(channel: Channel) -> MissionConfig {
     MissionConfig {
         relays: 8,

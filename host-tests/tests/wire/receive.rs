@@ -21,7 +21,8 @@ use super::said::Said;
 use super::strategies::pieces;
 use super::stream::{chunks, unstuffed};
 
-/// Returns the documented counter for the bytes between two delimiters, at relay `own` of 8.
+/// Returns the name of the counter that the bytes between two delimiters must increment. They arrive at relay `own`
+/// of 8.
 fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port) -> &'static str {
     let plain = match unstuffed(chunk) {
         Ok(plain) => plain,
@@ -77,7 +78,7 @@ fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port
     }
 }
 
-/// Draws headers, mostly to relay 4 from its neighbours.
+/// Draws frame headers: mostly from the neighbours of relay 4 to this relay.
 fn near_relay_4() -> impl Strategy<Value = Header> {
     let network = prop_oneof![8 => Just(NETWORK), 1 => any::<u16>()];
     let sender = prop_oneof![4 => Just(3), 4 => Just(5), 2 => 0..10_u16, 1 => 0..=4095_u16];
@@ -92,7 +93,7 @@ fn near_relay_4() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Feeds relay `index` of 8 with random pieces; all counters of `expected` must occur.
+/// Sends random pieces of frames to relay `index` of 8. All statistics counters in `expected` must occur.
 fn fed_with_anything(
     interference: Interference,
     index: u16,

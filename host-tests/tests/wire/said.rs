@@ -12,10 +12,10 @@ use uav_relay_decode::refusal::Refusal;
 use uav_relay_decode::value::{Fields, Value};
 use uav_relay_decode::{walk, write};
 
-/// Tables of `FORMAT.md`.
+/// Tables of messages and fields, read from `FORMAT.md`.
 pub(crate) static FORMAT: LazyLock<Format> = LazyLock::new(|| Format::load().unwrap());
 
-/// Body of a valid message.
+/// Body of a valid message, whose fields have the names in `FORMAT.md`.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct Said(Vec<u8>);
 
@@ -25,7 +25,7 @@ impl fmt::Debug for Said {
     }
 }
 
-/// Decodes and checks a body by the tables of FORMAT.md; the error is the reason for refusal.
+/// Decodes and checks a body by the tables of `FORMAT.md`. The error is the reason for a refusal.
 fn walked(body: &[u8]) -> Result<Fields<'static>, MessageError> {
     match walk::message(&FORMAT, body) {
         Ok((_, fields)) => Ok(fields),
@@ -35,7 +35,7 @@ fn walked(body: &[u8]) -> Result<Fields<'static>, MessageError> {
 }
 
 impl Said {
-    /// Encodes the message `name`; `fields` are as `cargo decode --json` prints them.
+    /// Creates the message `name`. Its `fields` are as `cargo decode --json` prints them.
     pub(crate) fn new(name: &str, fields: &Json) -> Self {
         let body = write::write(&FORMAT, name, fields);
         let said = Self(body.unwrap_or_else(|error| panic!("{error}: {name} {fields}")));
@@ -47,7 +47,7 @@ impl Said {
         walked(body).map(|_| Self(body.to_vec()))
     }
 
-    /// Returns the reason for refusal of a body, if any.
+    /// Checks a body by the tables of `FORMAT.md`. The error is the reason for a refusal.
     pub(crate) fn verdict(body: &[u8]) -> Result<(), MessageError> {
         walked(body).map(|_| ())
     }
@@ -72,12 +72,12 @@ impl Said {
         walked(&self.0).unwrap()
     }
 
-    /// Returns the number of a field, or of the flags.
+    /// Returns the value of the numeric field `name`; for `flags`, the bits.
     pub(crate) fn number(&self, name: &str) -> f64 {
         number(&self.fields(), name)
     }
 
-    /// Returns true if all of `flags` are set.
+    /// Returns true if all bits of `flags` are set in the message's flags.
     pub(crate) fn has(&self, flags: u8) -> bool {
         self.number("flags") as u8 & flags == flags
     }
@@ -86,7 +86,7 @@ impl Said {
         list(&self.fields(), name)
     }
 
-    /// Returns the message with other values of some fields.
+    /// Returns the message with the fields in `changes` set to other values.
     pub(crate) fn with(&self, changes: Json) -> Self {
         let mut fields = json!(self.fields());
         let Json::Object(changes) = changes else {
@@ -97,7 +97,7 @@ impl Said {
     }
 }
 
-/// Returns the number of a field.
+/// Returns the value of the numeric field `name`.
 pub(crate) fn number(fields: &Fields<'_>, name: &str) -> f64 {
     match fields.get(name) {
         Some(Value::Single(number)) => (*number).into(),
@@ -112,7 +112,7 @@ pub(crate) fn number(fields: &Fields<'_>, name: &str) -> f64 {
     }
 }
 
-/// Returns the numbers of a list of f32.
+/// Returns the numbers of the field `name`, a list of f32.
 pub(crate) fn list(fields: &Fields<'_>, name: &str) -> Vec<f32> {
     let Some(Value::List(values)) = fields.get(name) else {
         panic!("{name}: {fields:?}");
@@ -124,12 +124,12 @@ pub(crate) fn list(fields: &Fields<'_>, name: &str) -> Vec<f32> {
     values.iter().map(single).collect()
 }
 
-/// Encodes a frame on the wire.
+/// Encodes a body as a frame on the wire, with header, CRC and byte stuffing.
 pub(crate) fn wire(head: Header, body: &[u8]) -> Vec<u8> {
     stuffed(&unsigned(head, body))
 }
 
-/// Returns the plain bytes of one whole frame on the wire.
+/// Returns the bytes of one complete frame on the wire without byte stuffing and delimiter.
 pub(crate) fn plain_of(wire: &[u8]) -> Vec<u8> {
     let (end, stuffed) = wire.split_last().unwrap();
     let (plain, whole) = unstuffed(stuffed);

@@ -12,7 +12,7 @@ fn missions() -> [MissionConfig; 2] {
     [source(), mission(Interference::Field(FIELD))]
 }
 
-/// Asserts that a message is stale, and that nothing else changes.
+/// Asserts that the relay counts a message as stale and ignores it, so that nothing else changes.
 fn is_stale(bench: &Bench, port: Port, said: &Said) {
     let mut after = bench.clone();
     let before = bench.stats().stale;
@@ -126,8 +126,9 @@ fn a_token_is_forwarded_and_its_result_returned() {
     assert_eq!(bench.counted(), ["received"]);
 }
 
-/// Checks answers to another pass or of another kind, and passes that are over. Tokens without a position, in a field, or
-/// beyond Rx, too.
+/// Checks that messages that the relay does not await are stale. These are answers to another pass or of another
+/// kind, and passes that are over. Tokens (messages of Algorithm 2) are stale without a position, in a field, or
+/// beyond Rx.
 #[test]
 fn what_is_not_awaited_or_does_not_fit_is_stale() {
     for config in missions() {
@@ -158,7 +159,7 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
     }
 }
 
-/// Checks a reach beyond Rx in a field: no target can be met.
+/// Checks a pass in a field by which the sender would have to be beyond Rx: no target SIR can be met.
 #[test]
 fn a_reach_from_beyond_rx_is_of_no_use() {
     let (mut bench, from, to) = relay_4(mission(Interference::Field(FIELD)));
@@ -169,7 +170,7 @@ fn a_reach_from_beyond_rx_is_of_no_use() {
     assert!(out[0].1.is("Sweep") && out[0].1.list("reach_m").is_empty());
 }
 
-/// Checks that tiny targets are met, although intermediate values exceed f32.
+/// Checks that the smallest target SIRs are met in a field, although intermediate values exceed f32.
 #[test]
 fn the_smallest_targets_are_met_in_a_field() {
     for (field, anchor) in [

@@ -9,21 +9,22 @@ use super::votes::{ASKS, FORMS, FRESH, a_hello, id, near};
 
 const AIR: Port = Port::Shared;
 
-/// Returns relay 6 of 12, and a sweep for it.
+/// Returns relay 6 of 12 on a shared channel, and a sweep message for it.
 fn sixth() -> (Bench, Said) {
     let bench = Bench::new(6, 12, Wiring::Shared);
     let sweep = one_of_each(FIRST, bench.mission)[0].clone();
     (bench, sweep)
 }
 
-/// Returns the hello of a node that receives its nearest node and has selected `neighbour`.
+/// Returns the hello of a node that receives its nearest node and has chosen the neighbour `neighbour`.
 ///
-/// It requests nothing.
+/// The hello requests nothing.
 fn chose(bench: &Bench, neighbour: u16) -> Said {
     near(1, 1, &a_hello(0, bench.mission, neighbour, 0))
 }
 
-/// Checks hellos from up to four nodes away; other frames of strangers count as misaddressed.
+/// Checks that a relay on a shared channel accepts hellos of the four nearest nodes on each side. Other frames of
+/// nodes that are not its neighbours count as misaddressed.
 #[test]
 fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
     for sender in 0..=14_u16 {
@@ -56,7 +57,7 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
     }
 }
 
-/// Checks a neighbour that reports no neighbour: messages wait until it chooses this relay again.
+/// Checks a neighbour that reports no neighbour of its own. Messages to it wait until it chooses this relay again.
 #[test]
 fn a_neighbour_back_with_a_newer_view_makes_the_relay_ask() {
     for (newest, calls) in [(0, false), (id(5, 1), true)] {
@@ -73,7 +74,8 @@ fn a_neighbour_back_with_a_newer_view_makes_the_relay_ask() {
     }
 }
 
-/// Checks that a pending pass is held while the neighbour has chosen another node. The pass is repeated afterwards.
+/// Checks that a relay holds a received pass back while its next neighbour has chosen another node. It forwards the
+/// pass afterwards.
 #[test]
 fn a_pass_waits_for_a_neighbour_that_takes_another() {
     let (mut bench, sweep) = sixth();
@@ -86,7 +88,7 @@ fn a_pass_waits_for_a_neighbour_that_takes_another() {
     assert_eq!(out[0].1.number("number"), f64::from(FIRST));
 }
 
-/// Checks that a one-way link is ignored, and that losses do not break an established one.
+/// Checks that a one-way link is ignored unless it was established in both directions before.
 #[test]
 fn a_one_way_link_is_ignored_unless_it_was_established() {
     for (linked, hears, waits) in [

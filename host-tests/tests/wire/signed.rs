@@ -22,12 +22,12 @@ pub(crate) const NOW: Instant = Instant::ZERO;
 
 const KEY: [u8; 32] = *b"whoever reads this is not secret";
 
-/// Flag of a frame: a tag follows the body.
+/// Flag in a frame's header: an authentication tag follows the body.
 const SIGNED: u16 = 1;
-/// Flag of a frame: the body is a handshake.
+/// Flag in a frame's header: the body is a handshake.
 const HANDSHAKE: u16 = 2;
 
-/// Returns settings with the key.
+/// Returns the settings of a relay with the test's key.
 pub(crate) fn settings(wiring: Wiring) -> Settings {
     Settings {
         wiring,
@@ -39,12 +39,12 @@ pub(crate) fn settings(wiring: Wiring) -> Settings {
     }
 }
 
-/// A relay with the key, and peers that it has met.
+/// Test bench: a relay with a key, and peers that it has authenticated.
 #[derive(Clone, Debug)]
 pub(crate) struct Met {
     pub(crate) relay: Relay,
     peers: Vec<Peer>,
-    /// Digest of its mission as loaded.
+    /// Digest of the mission with which the relay was loaded.
     pub(crate) base: u16,
 }
 
@@ -63,7 +63,7 @@ impl DerefMut for Met {
 }
 
 impl Met {
-    /// Creates relay `own` of `mission`; it has met the nodes of `peers`, each at its port, and is idle.
+    /// Creates relay `own` of `mission`, which is idle. It has authenticated the nodes of `peers`, each at its port.
     pub(crate) fn new(
         mission: Mission,
         own: u16,
@@ -84,7 +84,7 @@ impl Met {
         met
     }
 
-    /// Creates relay 4 of eight in the paper's scenario, which has met both neighbours.
+    /// Creates relay 4 of eight in the paper's scenario, which has authenticated both neighbours.
     pub(crate) fn fourth() -> Self {
         Self::fourth_with(settings(Wiring::Pair))
     }
@@ -95,7 +95,8 @@ impl Met {
         Self::new(mission, 4, settings, &peers)
     }
 
-    /// Delivers a message of a peer; an offer answers the relay's current hello. Returns what the relay then sends.
+    /// Delivers a message of peer `peer`. Returns what the relay then sends. A mission offer is changed to answer the
+    /// relay's current hello.
     pub(crate) fn hears(&mut self, peer: usize, said: &Said) -> Vec<(u16, Said)> {
         if said.is("Offer") {
             let answer = self.number(peer, NOW);
@@ -104,7 +105,7 @@ impl Met {
         self.hears_as_it_is(peer, NOW, said)
     }
 
-    /// Delivers a message unchanged; returns what the relay then sends.
+    /// Delivers a message of peer `peer` unchanged. Returns what the relay then sends.
     pub(crate) fn hears_as_it_is(
         &mut self,
         peer: usize,
@@ -121,7 +122,7 @@ impl Met {
         self.relay.handle_bytes(now, peer.port, &frame);
     }
 
-    /// Returns the number of the hello with which the relay would answer a request of a peer.
+    /// Returns the number in the hello with which the relay would answer a request of peer `peer`.
     pub(crate) fn number(&self, peer: usize, now: Instant) -> u16 {
         let mut asked = self.clone();
         let node = asked.peers[peer].node;
@@ -139,7 +140,8 @@ impl Met {
         hello.unwrap().number("offer_number") as u16
     }
 
-    /// Returns the messages that the relay sends at `now`, without handshakes and hello numbers.
+    /// Returns the destinations and messages that the relay sends at `now`. Handshakes are left out, and numbers of
+    /// hellos are set to 0.
     pub(crate) fn sends(&mut self, now: Instant) -> Vec<(u16, Said)> {
         let unnumbered = |said: Said| {
             if !said.is("Hello") {
@@ -155,7 +157,7 @@ impl Met {
             .collect()
     }
 
-    /// Returns the messages that the relay sends a millisecond after `now`.
+    /// Returns the destinations and messages that the relay sends a millisecond after `now`.
     pub(crate) fn sends_after(&mut self, now: Instant) -> Vec<(u16, Said)> {
         let later = now + Duration::from_millis(1);
         self.relay.handle_timeout(later);
@@ -170,26 +172,26 @@ impl Met {
         counted(self.relay.stats())
     }
 
-    /// Returns digest and version of the uploaded mission that the relay holds.
+    /// Returns the digest and version of the uploaded mission that the relay holds; `None` without one.
     pub(crate) fn held(&self) -> Option<(u16, u16)> {
         let mission_id = self.relay.upload().map(Upload::id)?;
         Some((mission_id.digest, mission_id.version))
     }
 }
 
-/// Peer node with its session.
+/// Simulated neighbour or ground station with its authenticated session.
 #[derive(Clone, Debug)]
 struct Peer {
     node: u16,
     relay: u16,
     port: Port,
-    /// Nonces of the peer and the relay.
+    /// Nonces of the session: the peer's and the relay's.
     nonces: [u64; 2],
     counter: u32,
 }
 
 impl Peer {
-    /// Creates a peer `node` and authenticates it with `relay`.
+    /// Creates peer `node`, and authenticates it and `relay` by handshakes.
     fn meets(relay: &mut Relay, own: u16, node: u16, port: Port) -> Self {
         let mut peer = Self {
             node,
@@ -237,7 +239,7 @@ impl Peer {
     }
 }
 
-/// Returns destination, flags and body of all frames that `relay` sends at `now`.
+/// Returns the destination, flags and body of each frame that `relay` sends at `now`.
 fn frames(relay: &mut Relay, now: Instant) -> Vec<(u16, u16, Vec<u8>)> {
     let mut out = Vec::new();
     let mut buffer = [0; MAX_FRAME];

@@ -16,7 +16,7 @@ use super::signed::{Met, NOW, settings};
 use super::uploads::fourth;
 use super::votes::{FLIES, REFUSED, WHOLE, hello};
 
-/// Sites a kilometre apart, to the millimetre.
+/// Coordinates of two sites a kilometre apart, to the millimetre.
 const A_KILOMETRE: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -38,14 +38,16 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
     }
 }
 
-/// Returns an upload of version 2 with sites a kilometre apart. The receiver's is `east` units farther east.
+/// Returns an upload of version 2 with sites a kilometre apart, and these sites. The receiver is `east` units of 1e-7
+/// degrees farther east.
 fn farther(base: u16, east: i32) -> (Said, [i32; 6]) {
     let mut sites = A_KILOMETRE;
     sites[4] += east;
     (with_sites(&upload(2, base), sites), sites)
 }
 
-/// Checks refusals with and without a line on earth, so that a chain decides unanimously.
+/// Checks that an upload whose sites do not fit its distance is refused. Relays with and without sites refuse it,
+/// because a chain must decide unanimously.
 #[test]
 fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
     for sited in [false, true] {
@@ -123,7 +125,7 @@ fn the_sites_are_those_of_the_mission_that_is_flown() {
     }
 }
 
-/// Returns relay 4 with a guard.
+/// Returns relay 4 of eight with a motion guard and a large geofence.
 fn guarded() -> Met {
     let mission = Mission::try_new(paper(8)).unwrap();
     // The geofence has room for all offers here.
@@ -178,7 +180,7 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     assert_eq!(stale(&met, line), (1, 0));
 }
 
-/// Checks a relay that adopts another line: it has no setpoint until its drone can have stopped.
+/// Checks that a relay that adopts another line has no setpoint at first. It waits until its drone can have stopped.
 #[test]
 fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let config = paper(1);

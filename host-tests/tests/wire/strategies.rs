@@ -23,7 +23,7 @@ pub(crate) fn headers() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Draws valid messages of the kinds `names`. The draws shrink: behind the drawn bytes there are zeros.
+/// Draws valid messages of the kinds `names`. A draw shrinks to a message of zeros.
 pub(crate) fn kinds(names: &'static [&'static str]) -> BoxedStrategy<Said> {
     (proptest::sample::select(names), vec(any::<u8>(), 0..400))
         .prop_map(|(name, bytes)| {
@@ -44,7 +44,7 @@ pub(crate) fn messages() -> BoxedStrategy<Said> {
     kinds(names.collect::<Vec<_>>().leak())
 }
 
-/// Draws a valid, nearly valid or invalid body.
+/// Draws message bodies that are valid, nearly valid or invalid.
 pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
     let valid = || messages().prop_map(|said| said.body().to_vec());
     let changed = || (valid(), any::<Index>());
@@ -105,7 +105,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
     .boxed()
 }
 
-/// Draws pieces of a stream: valid, damaged and oversized frames, noise, delimiters.
+/// Draws pieces of a byte stream: valid, damaged and oversized frames, noise, and delimiters.
 pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStrategy<Vec<u8>> {
     let heads = heads.boxed();
     let good = (heads.clone(), messages()).prop_map(|(head, said)| wire(head, said.body()));

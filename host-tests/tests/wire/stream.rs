@@ -14,7 +14,8 @@ use super::strategies::{headers, pieces};
 
 type Outcome = Result<Vec<u8>, DeframeError>;
 
-/// Returns the deframer's results for a stream.
+/// Returns the frames and errors that the deframer finds in a stream, byte by byte. Checks that decoding in runs
+/// gives the same.
 fn deframed(stream: &[u8]) -> Vec<Outcome> {
     let mut deframer = Deframer::new();
     let mut out = Vec::new();
@@ -27,7 +28,7 @@ fn deframed(stream: &[u8]) -> Vec<Outcome> {
     out
 }
 
-/// Returns the deframer's results for a stream that it decodes in runs.
+/// Returns the frames and errors that the deframer finds in a stream that it decodes in runs of bytes.
 fn deframed_in_runs(stream: &[u8]) -> Vec<Outcome> {
     let mut deframer = Deframer::new();
     let mut out = Vec::new();
@@ -41,7 +42,7 @@ fn deframed_in_runs(stream: &[u8]) -> Vec<Outcome> {
     out
 }
 
-/// Returns the result by the rules. `stuffed` are the bytes between two delimiters, at least one.
+/// Returns what the rules make of `stuffed`, the bytes between two delimiters: a frame or an error.
 pub(crate) fn unstuffed(stuffed: &[u8]) -> Outcome {
     let (plain, whole) = envelope::unstuffed(stuffed);
     if plain.len() > MAX_DECODED {
@@ -53,7 +54,7 @@ pub(crate) fn unstuffed(stuffed: &[u8]) -> Outcome {
     }
 }
 
-/// Returns the stuffed frames of a stream, without empty and incomplete ones.
+/// Returns the stuffed frames in a stream, without empty ones and an incomplete last one.
 pub(crate) fn chunks(stream: &[u8]) -> Vec<&[u8]> {
     let mut chunks: Vec<&[u8]> = stream.split(|&byte| byte == 0).collect();
     chunks.pop();
@@ -65,7 +66,8 @@ fn by_the_rules(stream: &[u8]) -> Vec<Outcome> {
     chunks(stream).into_iter().map(unstuffed).collect()
 }
 
-/// Returns a relay's state after the stream, cut at the given lengths in turn.
+/// Returns a relay's state as text after a stream that arrives in pieces. `cuts` has the lengths of the pieces,
+/// repeated as needed.
 fn state_after(stream: &[u8], cuts: &[usize]) -> String {
     let mut bench = Bench::new(2, 8, Wiring::Pair);
     let (start, mut rest) = (bench.now, stream);
@@ -80,7 +82,7 @@ fn state_after(stream: &[u8], cuts: &[usize]) -> String {
     format!("{bench:?}")
 }
 
-/// Returns every golden frame with noise, cut, oversized and empty frames in between.
+/// Returns a stream of all test vectors. Noise, and cut, oversized and empty frames are between them.
 fn fixed_stream() -> Vec<u8> {
     let mut stream = b"noise before the first delimiter\0\0\0".to_vec();
     for (k, vector) in vectors().frames.into_iter().enumerate() {
@@ -180,7 +182,8 @@ fn empty_frames_are_ignored() {
     assert_eq!(deframed(&[1, 0]), [Ok(vec![])]);
 }
 
-/// Draws pieces of frames, or any bytes. One of those in 64 is a delimiter, half are small: short runs and frequent zeros.
+/// Draws streams of pieces of frames, or of any bytes. Of these bytes, one in 64 is a delimiter, and half are small.
+/// This gives short runs and frequent zeros.
 fn streams() -> impl Strategy<Value = Vec<u8>> {
     let byte = any::<[u8; 2]>().prop_map(|draw| match draw {
         [_, 0..4] => 0,

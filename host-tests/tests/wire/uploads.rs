@@ -11,7 +11,7 @@ use super::said::Said;
 use super::signed::{Met, NOW, settings};
 use super::votes::*;
 
-/// Returns an offer of version 2 with another interferer.
+/// Returns an offer of version 2 with the interferer at another y.
 fn beside(base: u16, y_m: u8) -> Said {
     upload(2, base).with(json!({ "interferer_y_m": y_m }))
 }
@@ -89,7 +89,8 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
     assert_eq!(met.held(), Some(of));
 }
 
-/// Checks a relay with sites, for which another distance has no line on earth.
+/// Checks that a relay with sites refuses a mission of another length, and reports it once. The length of a line
+/// between the sites is fixed.
 #[test]
 fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
     let refused = Event::UploadRefused {
@@ -130,7 +131,7 @@ fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
     assert_eq!((met.events(), met.stats().mission), (vec![], 3));
 }
 
-/// Returns relay 4 of eight, before it has met anyone.
+/// Returns relay 4 of eight, which has not authenticated any neighbour yet.
 pub(crate) fn fourth(settings: Settings) -> Relay {
     let mission = Mission::try_new(paper(8)).unwrap();
     host_tests::fixtures::relay(mission, 4, settings)

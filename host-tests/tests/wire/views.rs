@@ -11,7 +11,8 @@ use super::votes::*;
 const UP: Port = Port::Upstream;
 const DOWN: Port = Port::Downstream;
 
-/// Returns relay 4, idle, which has accepted `view` of all eight relays, and the digest of its passes.
+/// Returns relay 4, idle, after it accepted membership view `view` of all eight relays. The digest of the view's
+/// passes comes with it.
 fn in_view(view: u32) -> (Bench, u16) {
     let mut bench = Bench::new(4, 8, Wiring::Pair);
     let of = (bench.mission, 0);
@@ -23,7 +24,8 @@ fn in_view(view: u32) -> (Bench, u16) {
     (bench, own)
 }
 
-/// Returns relay 4 in `view`, idle after the agreement on positions in it, 5 ms after its start.
+/// Returns relay 4 in membership view `view`, idle after an agreement on positions. It started 5 ms before. The
+/// digest of the view's passes comes with it.
 fn agreed_in_view(view: u32) -> (Bench, u16) {
     let (mut bench, own) = in_view(view);
     let at = Instant::from_millis(5);
@@ -39,7 +41,8 @@ fn agreed_in_view(view: u32) -> (Bench, u16) {
     (bench, own)
 }
 
-/// Checks passes and renewals with the digest of this view or of another one, which a hello answers.
+/// Checks that a relay takes passes and lease renewals with the digest of its membership view. It answers those with
+/// another digest by a hello.
 #[test]
 fn passes_have_the_digest_of_their_view() {
     for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {
@@ -78,7 +81,8 @@ fn passes_have_the_digest_of_their_view() {
     }
 }
 
-/// Checks that a relay requests a new view after a pass of another view of the same mission.
+/// Checks that a relay requests a new membership view when it receives a pass of another view. Both views are of the
+/// same mission.
 #[test]
 fn a_pass_of_another_view_has_the_relay_ask_for_one() {
     let (mut bench, own) = in_view(id(2, 1));
@@ -114,7 +118,8 @@ fn heartbeats_have_the_digest_of_the_mission_in_every_view() {
     }
 }
 
-/// Checks late proposals, and a leader that insists on an old view: it is told of the newest.
+/// Checks that a late proposal of an old membership view changes nothing. A leader that proposes an old view again is
+/// told of the newest one.
 #[test]
 fn a_late_proposal_of_an_old_view_changes_nothing() {
     let (mut bench, _) = in_view(id(5, 2));
@@ -158,7 +163,8 @@ fn a_view_request_is_forwarded_unless_it_is_of_an_older_view() {
     }
 }
 
-/// Checks that an accepted view counts only after a pass or renewal in it: all have then accepted it.
+/// Checks that an accepted membership view counts as agreed only after a pass or lease renewal in it. All members
+/// have accepted it then.
 #[test]
 fn a_view_counts_once_a_pass_or_renewal_of_it_has_come() {
     let view = id(3, 2);
@@ -182,7 +188,7 @@ fn a_view_counts_once_a_pass_or_renewal_of_it_has_come() {
     }
 }
 
-/// Checks that the second renewal grants the lease, and that the lease's expiry causes a view request.
+/// Checks that the second lease renewal grants a lease. Its expiry causes a request for a new membership view.
 #[test]
 fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
     let (mut bench, own) = agreed_in_view(id(3, 2));

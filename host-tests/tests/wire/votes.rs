@@ -12,22 +12,23 @@ pub(crate) const FLIES: u8 = 16;
 pub(crate) const WHOLE: u8 = 32;
 pub(crate) const REFUSED: u8 = 64;
 
-/// Returns the identifier of view `number` proposed by `node`.
+/// Returns the identifier of the membership view with `number` that `node` proposed.
 pub(crate) const fn id(number: u32, node: u16) -> u32 {
     number << 10 | node as u32
 }
 
-/// Returns a view's contribution to the digest of its mission.
+/// Returns what a membership view adds to the mission digest in the messages of that view.
 pub(crate) fn mark(view: u32) -> u16 {
     let low = view & 0xFFFF;
     let (top, next) = (view >> 24, view >> 16 & 0xFF);
     u16::try_from((low + (next << 8) + top) & 0xFFFF).unwrap()
 }
 
-/// Time for which a booted relay may be relied on, in tenths of a second: `dead_after`.
+/// Time for which other relays may rely on a booted relay, in units of 0.1 s. It is `dead_after`.
 pub(crate) const RELIED: u16 = 150;
 
-/// Returns the proposal of `view` forwarded at `place`, with the votes of booted relays up to `place`.
+/// Returns the proposal of membership view `view` as the relay at position `place` forwards it. All relays up to
+/// `place` have booted and voted for it.
 pub(crate) fn proposed(view: u32, (mission, version): (u16, u16), place: u16, relays: u16) -> Said {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,
@@ -37,14 +38,16 @@ pub(crate) fn proposed(view: u32, (mission, version): (u16, u16), place: u16, re
     Said::new("Proposal", &fields)
 }
 
-/// Returns the decision for the proposed view of `relays`, whose positions may be used at once.
+/// Returns the decision that accepts a proposed membership view of `relays` relays. The relay at position `place`
+/// sends it, and the view's positions may be used at once.
 pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Said {
     let accepted = json!({ "view": view, "relays": relays });
     let changes = json!({ "base_relays": relays, "accepted": accepted });
     refused(view, of, place, relays).with(changes)
 }
 
-/// Returns the decision that refuses a view because only `there` of eight relays have voted.
+/// Returns the decision that refuses a membership view, as only `there` of eight relays have voted. The relay at
+/// position `place` sends it.
 pub(crate) fn refused(view: u32, (mission, version): (u16, u16), place: u16, there: u16) -> Said {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,
@@ -53,7 +56,8 @@ pub(crate) fn refused(view: u32, (mission, version): (u16, u16), place: u16, the
     Said::new("Decision", &fields)
 }
 
-/// Returns the hello of a node that receives no others, and knows only view 0. Its mission is `holds` (digest, version).
+/// Returns the hello of a node that receives no other node and knows only membership view 0. The node holds the
+/// uploaded mission `holds`: its digest and version.
 pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
     let (digest, version) = holds;
     let fields = json!({
@@ -63,15 +67,15 @@ pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) 
     Said::new("Hello", &fields)
 }
 
-/// Returns the hello of a node that receives no others and holds and flies the loaded mission.
+/// Returns the hello of a node that receives no other node, and holds and flies the loaded mission.
 pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> Said {
     let hello = hello(mission, neighbour, (mission, 0), flags | FLIES);
     hello.with(json!({ "latest_view": newest }))
 }
 
-/// Sets which nodes a hello's sender receives (bit 0: the nearest), and its connected relays.
+/// Returns a hello with the nodes that its sender receives, and with its number of connected relays.
 ///
-/// The number of connected relays includes the sender.
+/// Bit 0 of `hears` is the nearest node. `behind` counts the connected relays with the sender.
 pub(crate) fn near(hears: u8, behind: u16, hello: &Said) -> Said {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }
