@@ -193,9 +193,9 @@ where
     }
 }
 
-/// Port of a relay on a channel that all neighbours receive: a radio modem, or a half-duplex bus with a driver-enable
-/// pin. The modem controls the access to the channel; this crate only keeps relays from retransmitting at the same
-/// times.
+/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus
+/// with a driver-enable pin. The modem controls the access to the channel; this crate only keeps relays from
+/// retransmitting at the same times.
 #[derive(Debug)]
 pub struct AsyncShared<R, W, Pin = NoPin> {
     channel: AsyncLink<R, W, Pin>,

@@ -209,7 +209,8 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of rejected intact frames: unknown sender, invalid signature, malformed, replayed.
+    /// Returns the number of rejected intact frames. Their sender is not in reach, or they are forged, replayed or
+    /// malformed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -600,7 +601,7 @@ impl Levels {
         self.measured == 0
     }
 
-    /// Schedules the last report again for the relay at `distance`, which has restarted and may not have it.
+    /// Schedules the last report again for the relay at `distance`, which may have restarted and lost it.
     pub(super) fn owe(&mut self, distance: u16) {
         if self.power_w > 0.0 {
             self.untold |= bit(distance);
