@@ -12,8 +12,8 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove that the neighbour has restarted. Fewer
-/// may be late messages of an earlier one.
+/// Number of consecutive messages of another association (session) that prove a restart. Fewer of them may be late
+/// messages of an earlier association.
 const STRAYS: u8 = 3;
 
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
@@ -118,14 +118,14 @@ impl Association {
         }
     }
 
-    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x, by more than the
-    /// errors of both reports.
+    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The distance must be
+    /// larger than the errors of both reports.
     pub(super) fn is_passed(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
-    /// Returns true if this relay's reported x is on the right side of the neighbour's last x, by more than the
-    /// errors of both reports.
+    /// Returns true if this relay's reported x is on the right side of the neighbour's last x. The distance must be
+    /// at least the errors of both reports.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -306,8 +306,8 @@ impl Association {
     }
 }
 
-/// Obstacles on one side: a lost relay that may still hover, and a drone that is not flown to setpoints. They limit
-/// this relay's x.
+/// Obstacles on one side: a lost relay that may still hover, and a drone that is not flown. They limit this relay's
+/// x.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Nearest lost node on this side, and the limit of this relay's x because of that node, m.
@@ -443,7 +443,7 @@ impl KeepOut {
         self.near_m = near_m;
     }
 
-    /// Returns the x at which this relay is the separation away from the last lost relay, m; NaN if it already is.
+    /// Returns the x at which this relay is the separation away from the last lost relay, m. NaN if it already is.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
@@ -579,7 +579,7 @@ pub enum HoldReason {
     Unheard,
     /// The neighbour is on the wrong side of this relay along the line, or too close to tell. Neither moves.
     Order,
-    /// The agreed positions of the two neighbours are closer along x than their positions across the line allow.
+    /// The agreed positions are closer along x than the two relays' positions across the line allow.
     Close,
     /// A lost relay may still hover between this relay and its agreed position.
     Lost,

@@ -188,7 +188,7 @@ impl GuardConfig {
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a position, m: four steps of an f32 at the geofence's larger |x|.
+    /// Returns the maximum rounding error of a position in the geofence, m: four steps of an f32.
     pub(super) fn rounding(&self) -> f32 {
         4.0 * f32::EPSILON * self.fence.most_x_m.abs().max(self.fence.least_x_m.abs())
     }

@@ -79,8 +79,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown to setpoints. The
-    /// fence's limits do not apply to manual flight.
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The fence's limits
+    /// do not apply to manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -180,20 +180,20 @@ impl FenceFollower {
         self.asked_m < own.config.separation_m
     }
 
-    /// Returns true if the neighbour upstream may have been closer than the separation since the start: this relay
-    /// has not cleared a fence yet.
+    /// Returns true if the neighbour upstream may still be closer than the separation after a start. This relay has
+    /// received its fence, but has not cleared one yet.
     pub(super) const fn is_tight(&self) -> bool {
         self.is_agreed() && !self.clear
     }
 
-    /// Returns true if this relay's agreed x is less than the separation beyond that of the neighbour upstream.
+    /// Returns true if the agreed x of this relay and the upstream relay are closer than the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.is_agreed() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the neighbour requests, if that distance and `downstream_m` add up. Their
-    /// sum has to be the separation, so that this relay's two neighbours are that far apart. `downstream_m` is the
-    /// distance on the other side.
+    /// Agrees to the distance along x that the neighbour requests, unless that is too small. With `downstream_m`, the
+    /// distance on the other side, it must add up to the separation, so that this relay's two neighbours are that far
+    /// apart.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.asked_m;
         let enough = missing_m <= downstream_m + own.config.rounding();

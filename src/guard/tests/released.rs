@@ -45,7 +45,7 @@ impl Row {
         }
     }
 
-    /// Passes one message of relay `k`, from 0, to its neighbour.
+    /// Passes the next message of relay `k` to its neighbour and returns it. Relays count from 0.
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;
