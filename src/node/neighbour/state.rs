@@ -38,9 +38,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// Selected node that, by its last report, has selected this relay, too.
+    /// A node is selected that, by its last report, has selected this relay, too.
     Linked,
-    /// Selected node that has not selected this relay, or no longer.
+    /// A node is selected that has not selected this relay, or does so no longer.
     Pairing {
         since: Instant,
     },
@@ -49,26 +49,27 @@ enum NeighbourState {
     },
 }
 
-/// State of one side.
+/// Neighbour on one side of this relay: its selection, its liveness and the search for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbour {
-    /// Selected node, 0 for none.
+    /// Node number of the selected neighbour, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time before which a returned node is no reason for a view. The node on its other side may be about to select it.
+    /// Time before which a returned node does not cause a request for a new view. The node on its other side may be
+    /// about to select it.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Selected node at the time the links were given up; 0 for none.
+    /// Node whose link was dropped last for want of a quorum, until another is selected; 0 for none.
     given_up: u16,
     /// Farther node that was replaced by the selected node; 0 for none.
     replaced: u16,
-    /// Start of the last search.
+    /// Start of the last search for a neighbour.
     searches_since: Instant,
-    /// Distance to the selected node, in places.
+    /// Distance to the selected node, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
-    /// Nodes that have reported hearing this relay.
+    /// Nodes on this side that have recently reported that they receive this relay.
     pub(super) both_ways: Hearing,
     /// Neighbour that each node on this side has selected toward this relay, nearest node first. 0 for none.
     pub(super) taken_by: [u16; CANDIDATES as usize],
@@ -80,19 +81,19 @@ pub(crate) struct Neighbour {
     pub(super) unheard: ConsecutiveCounts,
     /// Nodes reported as found since another node was linked or lost: bit 0 is the nearest one.
     found: u8,
-    /// Nodes of another mission.
+    /// Limiter of reports about nodes on this side that have another mission.
     pub(super) mismatches: ReportLimiter,
     /// Consecutive handshakes with each node's index that were signed with another key.
     pub(super) forged: ConsecutiveCounts,
-    /// Interval between questions.
+    /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
-    /// Silence after which a sign of life is requested.
+    /// Silence of the neighbour after which a heartbeat is requested.
     patience: Duration,
     jitter: Jitter,
     pub(super) signs: Signs,
-    /// Newest mission of the selected node, as far as it has reported.
+    /// Newest mission that the selected node has reported to hold; `None` if it has not.
     pub(crate) holds: Option<MissionId>,
-    /// Time of the next check for a sign of life.
+    /// Time of the next check of the neighbour's silence, or of the next step of the search.
     look_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
@@ -167,12 +168,12 @@ impl Neighbour {
         self.node
     }
 
-    /// Returns true if no neighbour is selected and the search is over.
+    /// Returns true if this side has no neighbour and the search for one has ended without success.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true during the grace period after a node's return.
+    /// Returns true shortly after a node was selected again, while this causes no request for a new view.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
@@ -187,7 +188,7 @@ impl Neighbour {
         self.liveness.is_silent()
     }
 
-    /// Records a sign of life as of `at`; returns true if the neighbour had been lost until now.
+    /// Records that the neighbour was alive at time `at`. Returns true if it had been lost until now.
     pub(crate) fn record_sign_of_life(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.record_sign_of_life(at);
         if self.is_mutual() {
@@ -206,7 +207,7 @@ impl Neighbour {
         self.state == NeighbourState::Linked
     }
 
-    /// Records whether the neighbour has selected this relay; returns true if that is a change.
+    /// Records if the neighbour has selected this relay (`mutual`). Returns true if that is a change.
     pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -221,14 +222,15 @@ impl Neighbour {
         true
     }
 
-    /// Returns true if the selected node is to be reported as found, and marks it as reported.
+    /// Returns true if the selected node has not been reported as found yet, and marks it as reported.
     pub(crate) const fn should_report_found(&mut self) -> bool {
         let told = self.found;
         self.found |= mask(self.distance);
         self.found != told
     }
 
-    /// Restarts the silence of a neighbour in the same view; returns true if such a neighbour is not lost.
+    /// Measures the silence of a neighbour in the same view from `now` on. Returns true if there is such a neighbour
+    /// and it is not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -239,7 +241,7 @@ impl Neighbour {
         excused
     }
 
-    /// Returns true if the check for a sign of life is due.
+    /// Returns true if the check of the neighbour's silence, or the next step of the search, is due.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.look_at.is_some_and(|at| at <= now)
     }
@@ -248,8 +250,9 @@ impl Neighbour {
         self.look_at
     }
 
-    /// Handles a silence; returns true if the neighbour is lost from now on. It is not lost before `dead`. `searches` is true if
-    /// other nodes can be heard here. `asking` replaces the usual interval between questions.
+    /// Handles the timer of this side; returns true if the neighbour is lost from now on. It is not lost before a
+    /// silence of `dead`. `searches` is true if other nodes can be heard here. `asking` replaces the usual interval
+    /// between questions.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -319,10 +322,11 @@ impl Neighbour {
         lost
     }
 
-    /// Returns the silence of a node after which its link counts as down.
+    /// Returns the silence of a node after which the link to it counts as down.
     ///
-    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only. A few lost frames then make a
-    /// silence that is several times as long, so the link counts as down after the longest silence of any neighbour.
+    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only. A few lost
+    /// frames then make a silence that is several times as long, so the link counts as down after the longest silence
+    /// of any neighbour.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
         if self.has_no_peer() && !self.is_near(now, settings) {
             longest_lease(settings)
@@ -336,7 +340,7 @@ impl Neighbour {
             .is_some_and(|near| now.since(near) <= settings.dead_after)
     }
 
-    /// Records a frame of a node that is not selected. If the chain has ended here, the next check is soon.
+    /// Records a frame of a node that is not selected. If this side has no neighbour, its next hellos are soon.
     pub(crate) fn record_unselected(&mut self, now: Instant, settings: &Settings) {
         if self.has_no_peer() && !self.is_near(now, settings) {
             self.look_at = Some(now + self.tick);
@@ -344,7 +348,8 @@ impl Neighbour {
         self.near = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour. It then sends requests to all candidates.
+    /// Returns the start of the search while this side has no neighbour, else `None`. It then sends hellos to all
+    /// candidates.
     pub(super) const fn searching_since(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -365,7 +370,7 @@ impl Neighbour {
         node != 0 && self.given_up == node
     }
 
-    /// Releases the selected node and searches again, because the linked part of the chain has no quorum.
+    /// Drops the selected node and searches again, because this part of the chain has no quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -377,8 +382,8 @@ impl Neighbour {
         }
     }
 
-    /// Considers a node that has sent a hello and is not selected. Returns true if it is selected from now on. The candidate hears
-    /// this relay, and has selected this relay or none.
+    /// Decides if the node of a hello is selected as the neighbour from now on; returns true if so. The candidate
+    /// hears this relay, and has selected this relay or none.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
