@@ -444,7 +444,7 @@ impl Neighbour {
     }
 }
 
-/// Node that is not selected and hears this relay.
+/// Candidate for the neighbour on one side: a node that is not selected and receives this relay.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "four things that its hello says"
@@ -452,21 +452,21 @@ impl Neighbour {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
-    /// Distance in places; `downstream` is true if the node is toward Rx.
+    /// Distance of the node, in relays along the chain. `downstream` is true if the node is toward Rx.
     pub(crate) distance: u16,
     pub(crate) downstream: bool,
-    /// True if the node has selected this relay.
+    /// True if the candidate has selected this relay as its neighbour.
     pub(crate) pairs: bool,
-    /// True if the node is nearer than the selected node.
+    /// True if the candidate is nearer than the selected node.
     pub(crate) nearer: bool,
-    /// True if the node is heard by the node beyond it.
+    /// True if the candidate has reported that it can be inserted between this relay and its neighbour.
     pub(crate) ready: bool,
-    /// True if this node connects more relays than the selected node.
+    /// True if the candidate connects more relays than the selected node.
     pub(crate) longer: bool,
 }
 
 impl Candidate {
-    /// Returns the number of nodes that may be between the candidate and the lost node.
+    /// Returns the number of nodes between the candidate and the nearest node, which is lost.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -478,51 +478,53 @@ impl Candidate {
 }
 
 impl Neighbour {
-    /// Returns true if the neighbour is certain and has changed. The comparison is with the one at the last decision on a proposal.
+    /// Returns true if the neighbour has changed since the last decision on a view proposal. The change must be
+    /// certain: the search is over, or the new neighbour is linked.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Returns true if the neighbour is the one of the agreed view.
+    /// Returns true if the selected neighbour is also the one in the agreed view.
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
 
-    /// Records the proposer. `Itself` means that this relay proposed and has no predecessor.
+    /// Records the origin of a view proposal. `Itself` means that this relay proposed and has no predecessor.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// Records that the proposal received from this side was granted.
+    /// Records that the view proposal received from this side was granted.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
 
-    /// Leaves the view: this side has no agreed neighbour.
+    /// Leaves the view: this side has no neighbour in the agreed view any more.
     pub(crate) const fn leave(&mut self) {
         self.agreed.agree(0);
     }
 
-    /// Records a refusal: there is no further request until the neighbour changes.
+    /// Records that a view proposal was refused. There is no further request until the neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that the proposal was granted and forwarded to the neighbour, or ended here.
+    /// Records that a view proposal was granted. It was forwarded to the neighbour on this side, or the chain `ends`
+    /// here.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Nodes on one side according to the decisions on views; 0 for none.
+/// Neighbours on one side according to the decisions on views; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
-    /// Neighbour in the agreed view.
+    /// Neighbour in the agreed view (agreed set of members).
     in_view: u16,
-    /// Neighbour at the last granted or refused proposal.
+    /// Neighbour at the last view proposal that was granted or refused.
     counted: u16,
-    /// Node that sent the last proposal.
+    /// Node that sent the last view proposal.
     proposer: u16,
 }
 
@@ -550,12 +552,12 @@ impl AgreedNodes {
         };
     }
 
-    /// Records that the proposal received from this side was granted.
+    /// Records that the view proposal received from this side was granted.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
 
-    /// Records that a proposal was granted with neighbour `node`.
+    /// Records that a view proposal was granted with `node` as the neighbour on this side.
     pub(super) const fn agree(&mut self, node: u16) {
         self.in_view = node;
         self.counted = node;
@@ -569,9 +571,9 @@ impl AgreedNodes {
 /// Pending heartbeat to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Signs {
-    /// True if a question is pending.
+    /// True if a heartbeat request (question) to the neighbour is pending.
     pub(super) ask: bool,
-    /// Number of the neighbour's question to answer, 0 for none.
+    /// Number of the neighbour's heartbeat request that is to be answered, 0 for none.
     pub(super) answer: u16,
 }
 
@@ -582,14 +584,17 @@ impl Signs {
     };
 }
 
-/// Consecutive reports of a node that it does not hear this relay: an answer or two may be lost.
+/// Number of consecutive hellos without reception of this relay after which their sender is reported.
+///
+/// Fewer may be due to a lost answer or two.
 const UNHEARD: u8 = 8;
 
-/// Consecutive handshakes with a node's index that are signed with another key.
+/// Number of consecutive handshakes of a node with another key after which the node is reported.
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Returns true if the node `distance` places away and this relay hear each other. The link is not held down.
+    /// Returns true if this relay and the node `distance` relays away receive each other. The link must not be held
+    /// down because it flaps.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held_down_nodes(now, settings);
         let is_in = |nodes: u8| mask(distance) & nodes != 0;
@@ -599,19 +604,20 @@ impl Neighbour {
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
-    /// Returns true if the neighbour on this side is linked and less than `distance` places away.
+    /// Returns true if the neighbour on this side is linked and less than `distance` relays away.
     pub(crate) fn joins_with(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
-    /// Returns true if the neighbour on this side is linked and more than `distance` places away.
+    /// Returns true if the neighbour on this side is linked and more than `distance` relays away.
     pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }
 
-    /// Records a hello of the node `distance` places away.
+    /// Records a hello of the node `distance` relays away.
     ///
-    /// `neighbour` is the one that it has selected toward this relay. `hears` is true if it receives this one.
+    /// `neighbour` is the node that the sender has selected toward this relay. `hears` is true if the sender receives
+    /// this relay.
     pub(crate) fn record_hello(
         &mut self,
         distance: u16,
@@ -628,13 +634,13 @@ impl Neighbour {
         }
     }
 
-    /// Returns the neighbour that the node `distance` places away has selected toward this relay. 0 for none.
+    /// Returns the neighbour that the node `distance` relays away has selected toward this relay. 0 for none.
     pub(crate) fn selected_by(&self, distance: u16) -> u16 {
         let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` places away. `taken` is true if that is the selected node.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if that is the selected node.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -651,49 +657,53 @@ impl Neighbour {
         }
     }
 
-    /// Returns the nodes heard recently whose links are not held down, as a bit mask. Bit 0 is the nearest one.
+    /// Returns the nodes received recently whose links are in use or usable, as a bit mask. Links that flap (held
+    /// down) are left out. Bit 0 is the nearest node.
     pub(crate) fn received_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         let held = self.damping.held_down_nodes(now, settings);
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Counts the reports of a node that it does not hear this relay. Returns true at the last of [`UNHEARD`] in a row.
+    /// Counts the reports of the node `distance` relays away that it does not receive this relay. Returns true at
+    /// exactly [`UNHEARD`] such reports in a row.
     pub(crate) fn record_reception(&mut self, distance: u16, heard: bool) -> bool {
         self.unheard.count(distance, !heard, UNHEARD)
     }
 
-    /// Returns true if the node `distance` places away has to be reported for its other mission.
+    /// Returns true if the node `distance` relays away has to be reported for having another mission.
     ///
     /// At most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.mismatches.should_report(distance, now)
     }
 
-    /// Counts a handshake that was signed with another key. Returns true at the last of [`FORGED`] in a row.
+    /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true at exactly
+    /// [`FORGED`] of them in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
 
-    /// Resets the count: the node `distance` places away has the key.
+    /// Resets the count of handshakes with another key: the node `distance` relays away has the right key.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
     }
 }
 
 impl Neighbour {
-    /// Records the neighbour's question with this number.
+    /// Records the number of the neighbour's heartbeat request, which a heartbeat will answer; 0 is none.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.signs.answer = number;
         }
     }
 
-    /// Returns the time at which the answered question `number` was sent.
+    /// Returns the time at which the answered heartbeat request `number` was sent; `None` if it is unknown.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat. Its node, question number, and number of the question that it answers.
+    /// Returns the pending heartbeat as (destination, own number, answered number). The own number is that of its
+    /// question, the answered number that of the neighbour's question; 0 for none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let Signs { ask, answer } = core::mem::take(&mut self.signs);
         if !(ask || answer != 0) || self.node == 0 {
@@ -707,12 +717,13 @@ impl Neighbour {
         Some((self.node, question, answer))
     }
 
-    /// Schedules a hello to the candidate `distance` places away; with `ask` it requests an answer.
+    /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.
     pub(crate) const fn schedule_hello(&mut self, distance: u16, ask: bool) {
         self.hellos.schedule(distance, ask);
     }
 
-    /// Returns the distance of the nearest candidate with a pending hello. The second value is true if that requests an answer.
+    /// Returns the distance of the nearest node with a pending hello, in relays. The second value is true if the
+    /// hello requests an answer.
     pub(crate) fn poll_hello(&mut self) -> Option<(u16, bool)> {
         self.hellos.poll()
     }

@@ -32,13 +32,13 @@ impl Chain {
         Self((0..relays).map(|_| Electorate::new(relays, 1)).collect())
     }
 
-    /// Makes the relay with list index `at` accept `view`; returns true if the relay accepts.
+    /// Makes the relay with list index `at` accept the decided view `view`. Returns true if it does.
     fn accept(&mut self, at: usize, view: View) -> bool {
         let base = self.0[at].agreed();
         self.0[at].accept(view.id, base, Some(view))
     }
 
-    /// Returns the poll of a proposal that visits `nodes`.
+    /// Returns the votes on a proposal that visits `nodes` in this order.
     fn poll(&mut self, nodes: &[u16], proposal: ViewId) -> Poll {
         let mut told = None;
         for &node in nodes {
@@ -49,7 +49,7 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the decision on a proposal to `nodes`; the last `accept` of them receive it.
+    /// Returns the decision on a proposal that visits `nodes`; the last `accept` of them receive it.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -79,7 +79,8 @@ const fn granted(id: ViewId, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks all parts of all initial chains of up to seven relays.
+/// Checks all parts of chains of up to seven relays: a part decides on a view if it is a quorum. That is more than
+/// half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_decide_or_half_with_the_elder() {
     for relays in 1..=7_u16 {
@@ -298,7 +299,8 @@ fn others_may_rely_on_members_alone() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Refused proposals free their places. Only a limited number of proposals without a decision is remembered.
+/// A refused proposal needs no room in the list of votes. The list holds a limited number of proposals without a
+/// known decision.
 #[test]
 fn votes_are_remembered_until_what_came_of_them_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -337,7 +339,8 @@ fn votes_are_remembered_until_what_came_of_them_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Requirement of the module's documentation. Node 3 is a member of the current view, forgets it, and votes in the initial view.
+/// Shows that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
+/// view, forgets it, and votes in the initial view.
 #[test]
 fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
     let mut chain = Chain::of(5);
