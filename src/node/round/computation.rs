@@ -400,7 +400,7 @@ impl LeaderTask {
         *self = Self::Solving(chain);
     }
 
-    /// Starts a search for the highest target SIR; see [`Searching`](Self::Searching) for `last` and `given`.
+    /// Starts a search for the highest target SIR. See [`Searching`](Self::Searching) for `last` and `given`.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,

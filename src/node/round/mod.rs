@@ -129,7 +129,7 @@ impl Round {
         }
     }
 
-    /// Calls [`proceed`](Self::proceed), and adds to the effects how the sensing results differ from `before`.
+    /// Calls [`proceed`](Self::proceed), and adds changes of the sensing results since `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
