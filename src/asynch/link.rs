@@ -293,7 +293,7 @@ impl Frames {
         self.0.is_empty()
     }
 
-    /// Returns true if one more frame of any length fits.
+    /// Returns true if one more frame of any length fits into the queue.
     pub(super) fn has_room(&self) -> bool {
         ROOM.saturating_sub(self.0.len()) >= MAX_FRAME
     }
@@ -310,7 +310,7 @@ impl Frames {
         fits
     }
 
-    /// Moves the first frame into `frame` and returns its length; 0 if there is none.
+    /// Moves the first queued frame into `frame` and returns its length in bytes; 0 if there is none.
     pub(super) fn pop(&mut self, frame: &mut FrameBuf) -> usize {
         let mut len = 0;
         for place in frame {

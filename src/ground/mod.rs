@@ -32,7 +32,7 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 /// Time after which the ground station repeats a question that a relay has not answered.
 const PATIENCE: Duration = Duration::from_millis(1_000);
 
-/// Unanswered questions to one relay before the next relay is polled.
+/// Number of unanswered questions to one relay before the next relay is polled.
 const QUESTIONS: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.

@@ -87,7 +87,8 @@ impl Association {
         }
     }
 
-    /// Returns true if no flown neighbour is on this side: the chain ends here, or the neighbour is absent.
+    /// Returns true if no flown neighbour is on this side. The chain ends here, or the neighbour's drone is not flown
+    /// to setpoints.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
@@ -239,14 +240,15 @@ impl Association {
         }
     }
 
-    /// Stores from a message of this association if the neighbour requests an open chain. A reply is due if the
-    /// neighbour has not received the last request of this relay.
+    /// Stores the neighbour's request for an open chain, or its end, from a message of this association. A reply is
+    /// due if the neighbour has not received the last request of this relay.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.opens = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
-    /// Sets if the messages to the neighbour request an open chain. A message is due after a change.
+    /// Sets or clears the request for an open chain in the messages to the neighbour. A message is due after a
+    /// change.
     pub(super) const fn forward_open(&mut self, opens: bool) {
         self.due |= self.open_sent != opens;
         self.open_sent = opens;
@@ -266,7 +268,8 @@ impl Association {
         self.halt_reminders_left > 0
     }
 
-    /// Sets if the messages to the neighbour request a halt of the chain. A message is due after a change.
+    /// Sets or clears the request to halt the chain in the messages to the neighbour. A message is due after a
+    /// change.
     pub(super) const fn forward_halt(&mut self, halts: bool) {
         self.due |= self.halt_sent != halts;
         self.halt_sent = halts;
@@ -427,10 +430,10 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Moves the limit for relays that were lost before the first setpoint to that setpoint's `x_m`.
+    /// Sets the limit of this relay's x for relays that were lost before its first setpoint to `x_m`.
     ///
-    /// These relays were never heard and may hover anywhere beyond it. At `near_m` this relay is the separation away
-    /// from them.
+    /// These relays were never heard and may hover anywhere beyond the first setpoint, which is at `x_m`. At `near_m`
+    /// this relay is the separation away from them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -575,7 +578,7 @@ impl Fence {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
-    /// The order along x is not known yet, because no fence has been exchanged with the neighbour.
+    /// The order of the two relays along x has not been confirmed by messages yet.
     Unheard,
     /// The neighbour is on the wrong side of this relay along the line, or too close to tell. Neither moves.
     Order,

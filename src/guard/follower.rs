@@ -9,14 +9,14 @@ use crate::time::Jitter;
 /// Limit of a wrapping difference of fence numbers: a received fence is newer if it is below.
 const AHEAD: u16 = 0x8000;
 
-/// State of the fence toward Tx: the neighbour upstream places it, and this relay stays beyond it.
+/// State of the fence plane toward Tx: the neighbour upstream places it, this relay stays beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence received, 0 before the first.
+    /// Number of the newest fence plane that the neighbour has announced, 0 before the first.
     number: u16,
-    /// x of the newest fence, m.
+    /// x of the newest fence plane that the neighbour has announced, m.
     fence_m: f32,
     /// Distance along x (step) that the neighbour requests to keep, m; infinite before its first fence.
     asked_m: f32,
@@ -24,9 +24,9 @@ pub(super) struct FenceFollower {
     taken_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
-    /// True once this relay is known to be beyond a received fence (has cleared it).
+    /// True once this relay is known to be beyond a fence plane that the neighbour has announced.
     clear: bool,
-    /// True if this relay has reported to the neighbour that it is beyond the newest fence.
+    /// True if this relay has reported to the neighbour that it is beyond the newest fence plane.
     owner_informed: bool,
 }
 
@@ -79,7 +79,7 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The fence's limits
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The limits along x
     /// do not apply to manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
@@ -180,8 +180,8 @@ impl FenceFollower {
         self.asked_m < own.config.separation_m
     }
 
-    /// Returns true if the neighbour upstream may still be closer than the separation after a start. This relay has
-    /// received its fence, but has not cleared one yet.
+    /// Returns true if the neighbour upstream may still be closer than the separation after a start. It has announced
+    /// a fence plane, but this relay is not yet known to be beyond one.
     pub(super) const fn is_tight(&self) -> bool {
         self.is_agreed() && !self.clear
     }
@@ -212,7 +212,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if no flown neighbour is upstream, or if the neighbour has announced a fence.
+    /// Returns true if no flown neighbour is upstream, or if the neighbour has announced a fence plane.
     ///
     /// A neighbour announces a fence once it has found this relay beyond it. False while a lost relay may be on the
     /// wrong side.
@@ -229,13 +229,13 @@ impl FenceFollower {
             || !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
     }
 
-    /// Returns true if a fence was received in this association.
+    /// Returns true if the neighbour has announced a fence plane in this association.
     pub(super) const fn is_agreed(&self) -> bool {
         self.number != 0
     }
 
-    /// Updates the state after a position report. A message is due once the newest fence is cleared, because its
-    /// owner waits for that. `low_m` is the lowest x of this relay and those beyond it, m.
+    /// Updates the state after a position report. A message is due once this relay is beyond the newest fence plane,
+    /// because the neighbour waits for that. `low_m` is the lowest x of this relay and those beyond it, m.
     pub(super) fn settle(&mut self, own: &Own, low_m: f32) {
         if self.is_agreed() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -243,10 +243,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest possible x of the relays upstream before the first fence is cleared, m.
+    /// Returns the highest possible x of the relays upstream during the start, m.
     ///
-    /// Until then the neighbour upstream, and relays beyond it, may be closer than the separation. Afterwards all are below this
-    /// relay, and the result is negative infinity.
+    /// Until this relay is beyond the first fence plane, the neighbour upstream, and relays beyond it, may be closer
+    /// than the separation. Afterwards all are below this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)

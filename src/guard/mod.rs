@@ -287,7 +287,8 @@ impl Guard {
         }
     }
 
-    /// Moves the setpoint as far as currently granted, and returns it. `None` before there is an agreed position and a report.
+    /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` before there is an agreed
+    /// position and a report.
     ///
     /// `now` is the time at which the setpoint is passed on: the relay flies toward it within [`GuardConfig::lag`].
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
@@ -355,8 +356,8 @@ impl Guard {
             .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Decides if the chain has to open here: neighbours the separation apart along x. Requests of one neighbour for
-    /// that are forwarded to the other one. `clear` is true if this relay may move across the line.
+    /// Decides if this relay needs an open chain: all relays the separation apart along x. Requests of one neighbour
+    /// for that are forwarded to the other one. `clear` is true if this relay may move across the line.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let waits = !clear && !own.has_agreed_cross_section();
@@ -543,7 +544,7 @@ impl Guard {
         waits.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 
-    /// Number of rejected inputs: not a number, or out of range. It saturates.
+    /// Returns the number of rejected inputs: not a number, or out of range. It saturates.
     pub const fn refused(&self) -> u32 {
         self.refused
     }

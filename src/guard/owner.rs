@@ -7,16 +7,16 @@ use crate::place::CrossSection;
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Rx: this relay places it, and the neighbour downstream stays beyond it.
+/// State of the fence plane toward Rx: this relay places it, the neighbour downstream stays beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence, 0 before the first.
+    /// Number of the newest fence plane that this relay has announced, 0 before the first.
     number: u16,
-    /// x of the newest fence, m; infinite before the first.
+    /// x of the newest fence plane that this relay has announced, m; infinite before the first.
     fence_m: f32,
-    /// Distance along x (step) from the fence that this relay requests, m; infinite before the first fence.
+    /// Distance along x (step) that this relay requests to keep from the fence plane, m; infinite at first.
     asked_m: f32,
     /// Distance along x (step) to which the neighbour has agreed, m. A larger one that this relay requests replaces
     /// it at once. Infinite for the separation.
@@ -28,9 +28,9 @@ pub(super) struct FenceOwner {
     /// Lateral offset and altitude of the neighbour's setpoint; `still` is true once it has arrived there.
     across: CrossSection,
     still: bool,
-    /// True if the neighbour has received the newest fence.
+    /// True if the neighbour has received the newest fence plane.
     answered: bool,
-    /// True once the neighbour has reported that it is beyond a fence (has cleared it).
+    /// True once the neighbour has reported that it is beyond a fence plane.
     clear: bool,
 }
 
@@ -80,7 +80,7 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The fence's limits
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The limits along x
     /// do not apply to manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
@@ -172,8 +172,8 @@ impl FenceOwner {
         self.granted_m.max(separation_m - taken_m).min(separation_m)
     }
 
-    /// Returns the distance along x to the relay downstream that is certain, m. It is 0 near a lost relay, and before
-    /// the first fence is cleared. `taken_m` is the distance agreed with the neighbour upstream.
+    /// Returns the distance along x to the relay downstream that is certain, m. It is 0 near a lost relay, and until
+    /// the neighbour is beyond the first fence plane. `taken_m` is the distance agreed with the neighbour upstream.
     pub(super) fn kept_distance(&self, own: &Own, taken_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -258,8 +258,8 @@ impl FenceOwner {
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the neighbour downstream may still be closer than the separation after a start. The neighbour
-    /// has answered, but has not cleared a fence yet.
+    /// Returns true if the neighbour downstream may still be closer than the separation after a start. It has
+    /// answered, but has not reported yet that it is beyond a fence plane.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
@@ -269,7 +269,7 @@ impl FenceOwner {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the neighbour has received and cleared the newest fence.
+    /// Returns true if the neighbour has received the newest fence plane and reported that it is beyond it.
     pub(super) fn is_agreed(&self) -> bool {
         self.clear && self.answered && self.counted_m >= self.fence_m
     }
@@ -288,9 +288,9 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the best current x of the fence, m, the step to request, m, and true if that x is final. `None` if the
-    /// neighbour is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays upstream,
-    /// m.
+    /// Returns the best x of the fence plane now, m, the step to request, m, and true if the x is final. `None` if
+    /// the neighbour is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays
+    /// upstream, m.
     #[inline(never)] // called from several places
     fn proposed_fence(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -314,8 +314,8 @@ impl FenceOwner {
         Some((goal.max(nearest), ask, goal >= nearest))
     }
 
-    /// Schedules a message if the best fence has changed. A final fence is sent at once. While this relay moves,
-    /// another one waits for the next reminder.
+    /// Schedules a message if the best position of the fence plane has changed. A final one is sent at once. While
+    /// this relay moves, another one waits for the next reminder.
     pub(super) fn settle(&mut self, own: &Own, taken_m: f32, upstream_m: f32) {
         if let Some((x_m, ask, last)) = self.proposed_fence(own, taken_m, upstream_m) {
             let stays = last || own.reachable.is_still();
@@ -328,8 +328,8 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (ask - asked).abs() > 0.0
     }
 
-    /// Returns the pending message to the neighbour downstream. The fence moves only here and if `moves` is true, so
-    /// an unsent fence uses no number.
+    /// Returns the pending message to the neighbour downstream. The fence plane moves only here and if `moves` is
+    /// true, so an unsent fence uses no number.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

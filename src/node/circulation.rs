@@ -46,11 +46,11 @@ const MEMORY: u8 = 8;
 /// Progress of a message along the chain, as seen by one relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Stage {
-    /// No message, or this relay has not forwarded it yet.
+    /// No message is known, or this relay has not forwarded it yet.
     Idle,
-    /// Forwarded or about to be; its result is not known yet.
+    /// The message has been forwarded, or is about to be; its result is not known yet.
     Outstanding,
-    /// The result is known.
+    /// The result of the message is known.
     Completed,
     /// The message was cancelled after sending. This is like `Completed`, but its times are not used as a sign of
     /// life of a neighbour.

@@ -56,7 +56,7 @@ pub(crate) enum Sender {
     Itself,
     /// Another node, which has not stated its claim number; with a key, perhaps a forger.
     Unknown,
-    /// Another node, with its claim to this relay's number.
+    /// Another node, with its claim to this relay's index.
     Rival(Rival),
 }
 
@@ -68,7 +68,8 @@ pub(crate) struct Rival {
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and takes part in nothing.
     pub(crate) passive: bool,
-    /// True if the claim was sent after this relay's start, as this relay's claim in it or a key proves.
+    /// True if the claim is known to be sent after this relay's start. It names this relay's claim number, or a key
+    /// proves it.
     pub(crate) is_current: bool,
 }
 
@@ -81,10 +82,10 @@ const FIRST_CLAIM: Duration = Duration::from_millis(250);
 /// Time from the start until unprompted claims begin. A hundred relays take about as long to agree.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum interval between unprompted claims, before they continue every `dead_after`.
+/// Maximum interval between the first unprompted claims. Later ones follow every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims, [`least_interval`] apart, after a claim of an active node to the same index.
+/// Number of claims, [`least_interval`] apart, that answer an active node's claim to the same index.
 const DEFENCES: u8 = 32;
 
 /// Number of claims after a frame from another node with this index that is no claim.
@@ -92,22 +93,23 @@ const DEFENCES: u8 = 32;
 /// With a key it is the number of claims after this relay has raised its claim number.
 const QUESTIONS: u8 = 8;
 
-/// Returns the minimum interval between claims. Claims of two relays and their echoes do not fill the channel then.
+/// Returns the minimum interval between claims to this relay's index. Claims of two relays and their echoes do not
+/// fill the channel then.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Returns the interval between claims of a passive relay, a quarter of `probe_after`. Many claims fit into the time
-/// after which it becomes active.
+/// Returns the interval between claims of a passive relay to its index, a quarter of `probe_after`. Many claims fit
+/// into the time after which it becomes active.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
 
-/// Claims of this relay to its index, and the other node that uses it.
+/// State of this relay's claims to its index, and of another node that uses the same index.
 #[derive(Clone, Debug)]
 pub(crate) struct IndexClaims {
     number: u32,
-    /// Largest claim number of another node of this epoch.
+    /// Largest claim number received from another node with this index and epoch.
     rival: u32,
     /// Claim number of the other node with this index, as received last; 0 before any.
     heard: u32,
@@ -120,12 +122,12 @@ pub(crate) struct IndexClaims {
     echoed: Option<Instant>,
     /// Time when a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next unprompted claim. `interval` is the time from there to the one after it.
+    /// Time of the next unprompted claim to this index. `interval` is the time from there to the one after it.
     next_claim: Option<Instant>,
     interval: Duration,
     /// Number of claims still to send because another active node uses this index.
     defences: u8,
-    /// Earliest time of the next claim.
+    /// Earliest time of the next claim to this index.
     quiet_until: Instant,
     claim_due: bool,
     /// True if all sessions with other nodes must be restarted under the current claim number.
@@ -201,7 +203,7 @@ impl IndexClaims {
         self.heard
     }
 
-    /// Returns true if this relay had a position before it first received the other node.
+    /// Returns true if this relay has held a position since before it first received the other node.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -361,7 +363,7 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Removes the other node, which is gone; returns true if this relay becomes active.
+    /// Handles the report that the other node with this index is gone. Returns true if this relay becomes active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {
@@ -577,8 +579,8 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// Checks that a relay claims its index after a claim of an active node. It does so for four seconds, or until that node is
-    /// passive.
+    /// Checks that a relay repeats its claim to its index after a claim of an active node. It does so for four
+    /// seconds, or until that node is passive.
     #[test]
     fn a_number_is_defended_for_four_seconds_or_until_the_other_is_passive() {
         let settings = Settings::default();

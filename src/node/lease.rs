@@ -109,7 +109,7 @@ impl Lease {
         }
     }
 
-    /// Returns true until this relay knows of an agreement in this view.
+    /// Returns true until the first lease of this view is granted.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, LeaseState::Open)
     }

@@ -117,7 +117,7 @@ struct Uploads {
     loaded_band: Band,
     /// Identifier of the last mission that this relay, or one beyond a neighbour, has refused.
     refused: Option<MissionId>,
-    /// Number that this relay's hellos bear now, and the previous one. An offer must answer either.
+    /// Number that this relay's hellos bear now, and the previous one. A mission offer must contain one of them.
     asked: [Asked; 2],
     /// State of the mission offers toward Tx and toward Rx.
     offering: [Offering; 2],

@@ -17,7 +17,7 @@ const FIELD: bool = cfg!(feature = "field");
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
-    /// Interference power at the setpoint, in a field.
+    /// Interference power at the setpoint of a relay, in a field of interference.
     Interference {
         /// Received power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,

@@ -100,7 +100,7 @@ impl Steering {
         }
     }
 
-    /// Sets whether the drone flies to the setpoints from `now` on. Returns true if the guard did not know it.
+    /// Sets whether the drone flies to the setpoints from `now` on. Returns true if the guard did not know this.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {

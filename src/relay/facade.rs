@@ -158,8 +158,8 @@ impl Relay {
 
     /// Processes bytes received at `port`, in pieces of any length. Bytes at a port that `Settings::wiring` lacks are dropped.
     ///
-    /// Takes a dozen instructions per byte; a CRC for at most one frame per 16 bytes; a message of at most 16 reaches, with a tag
-    /// if frames are signed, for at most one per 19 bytes. Longer work is left to [`handle_timeout`](Self::handle_timeout).
+    /// Takes a dozen instructions per byte; a CRC for at most one frame per 16 bytes; the positions for 16 target SIRs, with a
+    /// tag if frames are signed, for at most one message per 19 bytes. Longer work is left to [`handle_timeout`](Self::handle_timeout).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -196,8 +196,8 @@ impl Relay {
 
     /// Handles timers that have expired by `now`, and one portion of a computation.
     ///
-    /// The portion is bounded: 256 reaches while the leader predicts, the chain's hops over ten relays (over forty where nothing
-    /// changes) of the joint method, 624 positions of Algorithm 2; almost nothing otherwise.
+    /// The portion is bounded: 256 positions of relays while the leader predicts, the chain's hops over ten relays (over forty
+    /// where nothing changes) of the joint method, 624 positions of Algorithm 2; almost nothing otherwise.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -348,7 +348,9 @@ impl Relay {
         self.node.persisted(record);
     }
 
-    /// Passes a record that is [not stored](Self::unpersisted) to `store`, and confirms it if that returns true.
+    /// Passes a record that is not stored to `store`, and confirms it if that returns true.
+    ///
+    /// See [`unpersisted`](Self::unpersisted).
     pub fn persist(&mut self, mut store: impl FnMut(&ViewRecord) -> bool) {
         if let Some(record) = self.unpersisted()
             && store(&record)
@@ -564,7 +566,8 @@ impl Relay {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns the reason why the last collected measurements gave no estimate, at the leader.
+    /// Returns the reason why the last collected measurements gave no estimate. `None` if they gave one, and except
+    /// at the leader.
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
@@ -582,7 +585,8 @@ impl Relay {
 }
 
 impl Relay {
-    /// Processes one measurement of the interference, W or linear SIR. It is used if `Settings::measure` requires measurements.
+    /// Processes one measurement of the interference, W or linear SIR. `Settings::measure` or `Settings::listen` must request its
+    /// kind.
     ///
     /// Takes constant time. Unusable samples are counted as [`Stats::samples_rejected`](crate::Stats::samples_rejected).
     ///

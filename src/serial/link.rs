@@ -263,23 +263,25 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SerialStats {
-    /// Bytes lost because they were not read in time.
+    /// Number of bytes lost because they were not read in time.
     pub overrun: u32,
-    /// Bytes without a stop bit.
+    /// Number of bytes received without a stop bit.
     pub framing: u32,
-    /// Bytes with the wrong parity.
+    /// Number of bytes received with the wrong parity.
     pub parity: u32,
     /// Number of bytes received with noise on the line.
     pub noise: u32,
-    /// Reads that failed for another reason.
+    /// Number of reads that failed for another reason.
     pub other: u32,
-    /// Failed writes, and failed queries for the last byte's departure; the bytes are offered again.
+    /// Number of failed writes, and of failed queries if the last byte has left. The bytes are offered again.
     pub write: u32,
-    /// Failed attempts to set the driver-enable pin. Each is repeated.
+    /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,
-    /// Frames that did not fit into the transmit queue, because the port accepts nothing. The relay repeats what matters.
+    /// Number of frames that did not fit into the transmit queue, because the port accepts nothing. The relay repeats
+    /// what matters.
     pub dropped: u32,
-    /// Frames for a port that does not exist. The relay's [`Wiring`](crate::Wiring) does not match this driver.
+    /// Number of frames for a port that does not exist. The relay's [`Wiring`](crate::Wiring) does not match this
+    /// driver.
     pub unrouted: u32,
 }
 

@@ -125,7 +125,7 @@ pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
 }
 
 impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, UPin, DPin> {
-    /// Creates the links of a relay with [`Wiring::Pair`](crate::Wiring::Pair).
+    /// Creates the ports of a relay with [`Wiring::Pair`](crate::Wiring::Pair), from its two links.
     pub const fn new(upstream: SerialLink<U, UPin>, downstream: SerialLink<D, DPin>) -> Self {
         Self {
             upstream,

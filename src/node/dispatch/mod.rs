@@ -366,7 +366,7 @@ pub(super) struct Telemetry {
 const FIRST: u32 = 3;
 const MOST: u32 = 4;
 
-/// Timer for dropping the links of a part without a quorum.
+/// Timer after which a part of the chain without a quorum drops its links and searches again.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NoQuorumTimer {
     /// Expiry of the timer; `None` while there is a quorum.
@@ -386,7 +386,7 @@ impl NoQuorumTimer {
 }
 
 impl Node {
-    /// Starts the timer if this part of the chain has no quorum, and stops it otherwise.
+    /// Starts the timer for dropping links if this part of the chain has no quorum, else stops it.
     pub(super) fn update_no_quorum_timer(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
             self.no_quorum_timer = NoQuorumTimer::NONE;
@@ -407,7 +407,7 @@ impl Node {
         settings.dead_after.times(times).max(pass)
     }
 
-    /// Drops the links to both neighbours if the timer has expired.
+    /// Drops the links to both neighbours if there has been no quorum for too long.
     pub(super) fn drop_links_if_expired(&mut self, now: Instant) {
         if self.no_quorum_timer.at.is_none_or(|at| now < at) {
             return;

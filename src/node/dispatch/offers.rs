@@ -12,7 +12,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// Handles a message from the ground station at `side`; returns false if it may not send it.
+    /// Handles a message from the ground station at `side`. Returns false if a ground station may not send this kind
+    /// of message.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,
@@ -158,7 +159,7 @@ impl Node {
         Ok(())
     }
 
-    /// Restores the active `upload` after a start.
+    /// Restores the stored mission `upload` after a start, as the active mission.
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         let untouched = self.layers.view.is_untouched() && self.layers.round.is_untouched();
         let mission = self.layers.update.resume(&self.member, upload, untouched)?;

@@ -104,7 +104,7 @@ pub(crate) struct Silence {
 }
 
 impl Liveness {
-    /// Value before the start: zeros.
+    /// State before the relay starts: all zeros.
     pub(super) const NONE: Self = Self {
         longest: 0,
         ..Self::new(Instant::ZERO)

@@ -26,13 +26,13 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// Value before the start.
+    /// State of both sides before the relay starts.
     pub(crate) const NONE: Self = Self {
         upstream: Neighbour::NONE,
         downstream: Neighbour::NONE,
     };
 
-    /// Starts node `node` of a chain of `all` relays at `now`.
+    /// Starts both sides of node `node`, in a chain of `all` relays, at time `now`.
     pub(crate) fn begin(
         &mut self,
         node: u16,

@@ -73,13 +73,14 @@ pub(crate) struct Neighbour {
     pub(super) both_ways: Hearing,
     /// Neighbour that each node on this side has selected toward this relay, nearest node first. 0 for none.
     pub(super) taken_by: [u16; CANDIDATES as usize],
-    /// Time of the last frame from a node that is not selected.
+    /// Time of the last frame from a node on this side that is not selected.
     near: Option<Instant>,
     /// Nodes that were heard recently.
     pub(super) hearing: Hearing,
-    /// Number of reports in a row, for each node, that it does not hear this relay.
+    /// Number of consecutive reports of each node on this side that it does not receive this relay.
     pub(super) unheard: ConsecutiveCounts,
-    /// Nodes reported as found since another node was linked or lost: bit 0 is the nearest one.
+    /// Nodes that were reported to the firmware as found since another node was linked or lost. Bit 0 is the nearest
+    /// node.
     found: u8,
     /// Limiter of reports about nodes on this side that have another mission.
     pub(super) mismatches: ReportLimiter,
@@ -99,7 +100,7 @@ pub(crate) struct Neighbour {
 }
 
 impl Neighbour {
-    /// Value before the start. It is all zeros; any other value would be copied from flash.
+    /// State of a side before the relay starts: all zeros. Any other value would be copied from flash.
     pub(super) const NONE: Self = Self {
         node: 0,
         agreed: AgreedNodes::on(0),
@@ -128,7 +129,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts the side at `now` with neighbour `node`, 0 for none.
+    /// Starts this side of the relay at `now`, with the neighbour `node`, 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -340,7 +341,7 @@ impl Neighbour {
             .is_some_and(|near| now.since(near) <= settings.dead_after)
     }
 
-    /// Records a frame of a node that is not selected. If this side has no neighbour, its next hellos are soon.
+    /// Records a frame of a node that is not selected. If this side has no neighbour, it sends its next hellos soon.
     pub(crate) fn record_unselected(&mut self, now: Instant, settings: &Settings) {
         if self.has_no_peer() && !self.is_near(now, settings) {
             self.look_at = Some(now + self.tick);

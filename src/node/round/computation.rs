@@ -47,7 +47,7 @@ pub(super) struct JointPlace {
     pub(super) cross_section: CrossSection,
     /// Largest x of this relay that leaves the relays after it their separation, m.
     pub(super) end_m: f32,
-    /// True if no relay stops short of its reach to help the next hop (a plain pass).
+    /// True if no relay stops short of its farthest x to help the next hop (a plain pass).
     pub(super) plain: bool,
 }
 
@@ -57,7 +57,7 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True after this relay has started a pass, until the start is reported.
+    /// True after this relay has started a pass along the chain, until the start is reported.
     pub(super) began: bool,
     /// Configured altitude and power of this relay.
     pub(super) profile: Profile,
@@ -70,7 +70,7 @@ pub(crate) struct Computation {
     /// Last reported position of the neighbour toward Rx.
     pub(super) after: Option<Placement>,
     pub(super) agreed_place: Option<Placement>,
-    /// Measured interference at the agreed position, in a field.
+    /// Meter of the interference at the agreed position, in a field of interference.
     pub(super) meter: Meter,
     /// Measurements of the interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
@@ -106,7 +106,7 @@ impl Computation {
         }
     }
 
-    /// Returns true until this relay has its first task, pass or agreed position.
+    /// Returns true until this relay has its first task, pass along the chain, or agreed position.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::Idle) && self.agreed_place.is_none()
@@ -141,7 +141,7 @@ impl Computation {
         self.state.answer();
     }
 
-    /// Starts a new view, in which no pass has been received yet.
+    /// Starts a new view, in which no pass along the chain has been received yet.
     pub(crate) fn renew(&mut self, leads: bool) {
         self.task.clear();
         self.after = None;
@@ -193,7 +193,8 @@ impl Computation {
         }
     }
 
-    /// Returns the pass to forward to the next relay. `None` if its result is known or this relay still computes.
+    /// Returns the message of the current pass along the chain, for the next relay. `None` if its result is known or
+    /// this relay still computes.
     pub(crate) fn onward(&self, context: &Context<'_>) -> Option<Message> {
         if self.state.phase() != Phase::Waiting {
             return None;
@@ -227,7 +228,7 @@ impl Computation {
         }
     }
 
-    /// Returns true if relays compute before they forward the current pass.
+    /// Returns true if relays compute before they forward the current pass along the chain.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
@@ -306,7 +307,7 @@ impl Computation {
 /// Solver of the joint method for a whole chain.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
-/// Current task of the leader.
+/// Current task of the leader: prediction, joint method, search for the target SIR, or Algorithm 2.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -415,15 +416,16 @@ impl LeaderTask {
 }
 
 /// Maximum number of hops that the prediction computes in one call of [`Computation::work`]. Each takes 16 targets.
-/// In an uneven field a call computes a part of one hop.
+/// In a field of interference that is not uniform a call computes a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts in an even field. A hop costs twice as much
-/// there.
+/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A hop costs twice as
+/// much in a field of interference.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Computation {
-    /// Continues the leader's computation; returns true if the next pass can start.
+    /// Continues the leader's computation before a pass. Returns true if the pass can start, and `Infeasible` if
+    /// there is no feasible target SIR.
     pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
         if self.must_distribute(context) || self.must_gather(context) {
             return Ok(true);
@@ -521,7 +523,7 @@ impl Computation {
         Ok(())
     }
 
-    /// Starts the pass that the leader has planned.
+    /// Starts the pass along the chain that the leader has planned.
     pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
         let mission = context.mission();
         if self.must_distribute(context) {

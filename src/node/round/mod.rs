@@ -129,7 +129,7 @@ impl Round {
         }
     }
 
-    /// Calls [`proceed`](Self::proceed), and adds changes of the sensing results since `before`.
+    /// Calls [`proceed`](Self::proceed), and adds to its effects what sensing has changed since `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -213,14 +213,14 @@ impl Round {
         self.proceed(context, Action::Work)
     }
 
-    /// Stops the current pass, because a new view is proposed.
+    /// Stops the current pass along the chain, because a new view is proposed.
     pub(crate) fn suspend(&mut self) {
         self.computation.suspend();
         self.circulation.cancel();
         self.work_at = None;
     }
 
-    /// Starts a new view. `leads` is true at the leader, `works` at a relay that computes at once.
+    /// Starts a new view at time `now`. `leads` is true at the leader, `works` at a relay that computes at once.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -238,13 +238,13 @@ impl Round {
         self.computation.discard_agreed_place();
     }
 
-    /// Schedules an outstanding pass again, because the next relay can be reached again.
+    /// Schedules an outstanding pass along the chain again, because the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
 
-    /// Returns the pending message of a pass and starts its retransmission timer. `None` if the next relay is not
-    /// `reachable`.
+    /// Returns the pending message of a pass along the chain, and starts its retransmission timer. `None` if the next
+    /// relay is not `reachable`.
     pub(crate) fn poll_onward(
         &mut self,
         context: &Context<'_>,
@@ -283,7 +283,7 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true until this relay takes part in its first pass or view.
+    /// Returns true until this relay takes part in its first pass along the chain or its first view.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }

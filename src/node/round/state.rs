@@ -22,13 +22,13 @@ use crate::node::circulation::LateMessages;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
-    /// Idle: this relay has not received a pass yet.
+    /// Idle: this relay has not received a pass (message along the chain) yet.
     Idle,
     /// The leader computes the targets of its next pass.
     Planning,
     /// A message along the chain (pass or view proposal) has been forwarded; its result is not known yet.
     Waiting,
-    /// The last pass of the leader has completed without an agreement.
+    /// The last pass (message along the chain) has completed without an agreement.
     Answered,
     /// The chain has agreed; the relay holds its position.
     Holding,
@@ -50,7 +50,7 @@ pub(crate) enum Action {
     Work,
     /// Continue the computation after a pause; pending messages stay.
     Think,
-    /// Forward the pass, with retransmission.
+    /// Forward the pass along the chain, with retransmission.
     Forward,
     /// Reply to a duplicate of the current pass.
     Repeat,
@@ -59,26 +59,26 @@ pub(crate) enum Action {
         /// True if the chain has agreed on its positions.
         agreed: bool,
     },
-    /// Complete the pass at the leader, which has no next pass to start.
+    /// Complete the pass along the chain at the leader, which has no next one to start.
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view, because this relay cannot take part in the pass.
+    /// Request a new view, because this relay cannot take part in the pass along the chain.
     Foreign,
 }
 
-/// Classification of a received pass by its number and its content.
+/// Classification of a received pass along the chain, by its number and its content.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Pass of a restarted leader, or one that follows missed passes.
+    /// Pass of a restarted leader, or one that follows passes which this relay has missed.
     Foreign,
 }
 
 impl Arrival {
-    /// Returns the action for a pass that is not new; `None` for a new one.
+    /// Returns the action for a pass along the chain that is not new; `None` for a new one.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -96,12 +96,13 @@ const STRAGGLERS: u16 = 32;
 /// Divisor of pass numbers: only the first pass of a leader's start or of a view has a multiple of it.
 const INCARNATION: u16 = 64;
 
-/// Phase and number of the current pass.
+/// Phase of the relay, and number of the current pass along the chain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass was started or received in this view; in the loaded view, since the relay's start.
+    /// True once a pass along the chain was started or received in this view. In the loaded view it counts from the
+    /// relay's start.
     begun: bool,
     late_messages: LateMessages,
 }
@@ -132,7 +133,7 @@ impl RoundState {
         self.phase = Phase::Waiting;
     }
 
-    /// Sets the phase to `Answered`: the pass has completed without an agreement, or was given up.
+    /// Sets the phase to `Answered`: a pass along the chain has ended without an agreement.
     pub(crate) const fn answer(&mut self) {
         self.phase = Phase::Answered;
     }
@@ -155,7 +156,7 @@ impl RoundState {
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Increments the number for a new pass of the leader.
+    /// Increments the number for a new pass along the chain, at the leader.
     pub(crate) const fn begin(&mut self) {
         self.number = if self.begun {
             self.next()
@@ -174,14 +175,15 @@ impl RoundState {
         }
     }
 
-    /// Accepts a new pass with `number` as the current one.
+    /// Accepts a new pass along the chain, with `number`, as the current one.
     pub(crate) const fn accept(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a received pass by its `number`. `same` is true if its content equals that of the current pass.
+    /// Classifies a received pass along the chain by its `number`. `same` is true if its content equals that of the
+    /// current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
             // A relay that has missed the first pass cannot join later ones; it requests a new view.
@@ -200,7 +202,7 @@ impl RoundState {
         }
     }
 
-    /// Counts a late pass; too many in a row are classified as foreign.
+    /// Counts a late pass along the chain; too many in a row are classified as foreign.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign
@@ -214,7 +216,7 @@ impl RoundState {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Returns true if the result of the pass has been received since the earlier state `before`.
+    /// Returns true if the result of the current pass has been received since the earlier state `before`.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number

@@ -179,7 +179,7 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes of the joint method.
     pub(crate) chosen: bool,
-    /// True if a later relay of the pass has its own profile.
+    /// True if a later relay of the pass has an altitude or power of its own.
     pub(crate) own: bool,
     behind: Option<Behind>,
     /// Farthest x that the previous relay can take for each target (its reaches), m.

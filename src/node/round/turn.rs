@@ -148,7 +148,7 @@ pub(crate) struct TurnPass {
     pub(crate) before: HopEnd,
     pub(crate) gain_in: PowerRatio,
     search: Option<LocalSearch>,
-    /// True if this relay or a later relay of the pass has moved.
+    /// True if this relay or a later relay has moved in this pass of Algorithm 2.
     pub(crate) any: bool,
     /// Worst SIR of the hops from this relay to Rx, linear.
     pub(crate) worst: f32,

@@ -182,7 +182,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
 }
 
-/// Event of the model.
+/// Event that the model check may let happen next.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Happens {
     Part(usize),

@@ -24,7 +24,7 @@ fn count(nodes: &[u16]) -> u16 {
     u16::try_from(nodes.len()).unwrap()
 }
 
-/// Acceptor states of nodes 1 to N.
+/// Voting states (acceptors) of nodes 1 to N.
 struct Chain(Vec<Electorate>);
 
 impl Chain {
@@ -258,7 +258,7 @@ fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Relays that vote before one that knows the newer view vote in the older view. Their votes do not count.
+/// A relay that votes before one that knows the newer view votes in the older view. Its vote does not count.
 #[test]
 fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
     let mut chain = Chain::of(3);
