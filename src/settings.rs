@@ -141,8 +141,8 @@ pub struct Settings {
     pub quorum: bool,
     /// Behaviour of the relay without a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Guard that limits setpoints to the room that the neighbours have cleared and to a geofence. `None` for no guard. With it the
-    /// firmware has to report the drone's position: `Relay::handle_position`.
+    /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
+    /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
     /// True if the firmware converts positions to latitude and longitude, by two configured sites. An upload without
     /// sites is then rejected if its distance differs from theirs. Set it on all relays of a chain, or on none.
@@ -263,7 +263,7 @@ pub enum SetupError {
     /// `method` cannot be used. It chooses altitudes in a field, is the joint method for more than 100 relays, or needs a feature
     /// that the crate was built without.
     Method,
-    /// The mission's `reverse` is above 0, and `method` is not Align, or `listen` is set.
+    /// The mission's `reverse` is above 0, but `method` is not Align, or `listen` is set.
     Reverse,
     /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
     Adjust,

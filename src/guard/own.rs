@@ -50,13 +50,13 @@ pub(super) struct ReachableInterval {
 }
 
 impl ReachableInterval {
-    /// Returns the interval before the first setpoint: the relay's x is not known.
+    /// Returns the interval in which the relay may be before its first setpoint: its x is not known.
     pub(super) const fn unknown(now: Instant) -> Self {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval for the first setpoint, at `x_m`. Until that takes effect, the relay may still fly to an
-    /// earlier one.
+    /// Returns the interval in which the relay may be after the first setpoint, at `x_m`. Until that takes effect,
+    /// the relay may still fly to an earlier one.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             at_m: x_m,

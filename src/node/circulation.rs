@@ -37,7 +37,8 @@ const SLOW: u32 = 4;
 /// Maximum of the exponent n in the wait of 2 << n hop times between retransmissions: eight hop times.
 const LOG_MOST: u32 = 2;
 
-/// Hop times until the first retransmission on a lossy channel. In this time the neighbour has also replied to a duplicate.
+/// Wait before the first retransmission on a lossy channel, in hop times. In this time the neighbour has also replied
+/// to a duplicate.
 const SOON: u32 = 4;
 
 /// Number of messages after a loss for which the channel counts as lossy.
@@ -100,7 +101,7 @@ pub(crate) struct Circulation {
 }
 
 impl Circulation {
-    /// Creates the state without a message; `seed` sets the random part of the waits.
+    /// Creates the state of a relay that has no message yet; `seed` sets the random part of the waits.
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             stage: Stage::Idle,

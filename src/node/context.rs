@@ -226,7 +226,7 @@ pub(crate) enum Peer {
     Previous,
 }
 
-/// Result of a layer for the other layers or the firmware.
+/// Result of one protocol layer for the other layers or the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
     /// The chain has agreed on its positions.

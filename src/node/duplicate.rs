@@ -54,7 +54,7 @@ use crate::wire::message::Claim;
 pub(crate) enum Sender {
     /// The frame is this relay's own.
     Itself,
-    /// Another node, which has not stated its claim number; with a key, perhaps a forger.
+    /// Another node, whose claim to the index is not known; with signed frames perhaps a forger.
     Unknown,
     /// Another node, with its claim to this relay's index.
     Rival(Rival),

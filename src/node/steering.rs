@@ -130,7 +130,8 @@ impl Steering {
         }
     }
 
-    /// Removes the limits by lost relays at `side`; `others` states that the view has more relays there.
+    /// Removes the setpoint limits that lost relays at `side` cause. `others` states that the view has more relays
+    /// there.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);

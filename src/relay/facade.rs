@@ -503,7 +503,7 @@ impl Relay {
 
     /// Returns the relay's index in the agreed view: 1 (next to the transmitter) to the number of relays.
     ///
-    /// That number is that of [`mission`](Self::mission).
+    /// The number of relays is that of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
         self.node.member().index
     }

@@ -107,8 +107,8 @@ impl Node {
 
     /// Returns true if a handshake accompanies `message`.
     ///
-    /// It does with each lease renewal, on a shared channel. Another relay with this number then detects this one even if the chain
-    /// sends nothing else.
+    /// It does with each lease renewal, on a shared channel. Another relay with the same index then detects this one
+    /// even if the chain sends nothing else.
     pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
         let renews = match message {
             Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
@@ -122,12 +122,12 @@ impl Node {
         self.duplicate.rival(claim)
     }
 
-    /// Returns true while this relay is passive, because another node uses its number.
+    /// Returns true while this relay is passive, because another node uses its index.
     pub(crate) const fn is_passive(&self) -> bool {
         self.duplicate.is_passive()
     }
 
-    /// Handles the report that the other relay with this number has been removed.
+    /// Handles the report that the other relay with this relay's index has been removed.
     pub(crate) fn clear_duplicate(&mut self, now: Instant) {
         if self.duplicate.clear(now, &self.member.settings) {
             self.become_active(now);

@@ -142,7 +142,7 @@ impl Node {
         self.telemetry.events.raise_about(about, side, node);
     }
 
-    /// Applies the effects of one layer to the other layers, the events and the counters.
+    /// Applies the effects of one protocol layer to the other layers, the events and the counters.
     pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
         let stats = &mut self.telemetry.stats;
         for (happened, counter) in [
@@ -324,7 +324,8 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Returns the state that a layer receives. It borrows only `member`, so that each layer can be borrowed mutably meanwhile.
+    /// Returns the state that a protocol layer receives. It borrows only `member`, so that each layer can be borrowed
+    /// mutably meanwhile.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {

@@ -9,7 +9,7 @@ use crate::side::Side;
 use crate::time::Instant;
 
 impl Node {
-    /// Handles expired timers, each layer once. Work: at most one portion of a long computation.
+    /// Handles expired timers, each protocol layer once. Work: at most one portion of a long computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.duplicate.handle_timeout(now, &self.member.settings) {
             self.become_active(now);

@@ -161,7 +161,7 @@ impl Damping {
 
     /// Records the loss of the link to the node `distance` relays away. `counts` is false if many frames are lost on
     /// the channel: the loss is then added only if the link has flapped before. If another link on this side flaps,
-    /// this link inherits its losses, because both cross the same gap.
+    /// this link inherits its losses, because both cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -216,7 +216,7 @@ impl Damping {
     }
 
     /// Raises the number of losses of every link to that of the link that was lost last. The cause is the same,
-    /// because all links cross the same gap.
+    /// because all links cross the same gap in the chain.
     fn share(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

@@ -80,7 +80,8 @@ pub(crate) struct Computation {
 }
 
 impl Computation {
-    /// Creates the state after a start. `number` seeds the pass numbers of the leader, which has work to do at once.
+    /// Creates the state of the placement algorithms after a start. `number` seeds the pass numbers of the leader,
+    /// which has work to do at once.
     pub(crate) const fn new(
         leader: bool,
         number: u16,

@@ -45,7 +45,8 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// Creates the state after a start. `number` seeds the pass numbers of the leader, which has work to do at once.
+    /// Creates the state of the agreement on positions after a start. `number` seeds the pass numbers of the leader,
+    /// which has work to do at once.
     pub(crate) const fn new(
         leads: bool,
         number: u16,

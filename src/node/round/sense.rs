@@ -56,13 +56,13 @@ impl Computation {
                 .is_some_and(|sensor| !sensor.is_distributed)
     }
 
-    /// Returns true at a leader that may start a sensing pass: no other pass is due.
+    /// Returns true at a leader that may start a pass that collects measurements: no other pass is due.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::is_sensing_enabled(context) && context.leads() && settled
     }
 
-    /// Starts the timer of the next sensing pass, if this relay may start one.
+    /// Starts the timer of the next pass that collects measurements, if this relay may start one.
     pub(super) fn schedule_sensing(&mut self, context: &Context<'_>) {
         if let Some(listen) = context.settings().listen
             && self.may_sense(context)
@@ -73,7 +73,7 @@ impl Computation {
         }
     }
 
-    /// Starts a sensing pass at the leader.
+    /// Starts a pass along the chain that collects the measurements of all relays, at the leader.
     pub(super) fn begin_sense(&mut self, context: &Context<'_>) -> Action {
         let Some(sensor) = self.sensing.sensor_mut() else {
             return Action::Nothing;
@@ -93,7 +93,7 @@ impl Computation {
         self.sense(context, hearing, holds)
     }
 
-    /// Handles a sensing pass from the previous relay.
+    /// Handles a pass that collects measurements (sensing pass), received from the previous relay.
     pub(crate) fn on_sense(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         let same = matches!(&self.pass, PassKind::Sense(known)
             if known.hearing.estimate == hearing.estimate && known.from == hearing.sums);
@@ -157,7 +157,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// Handles the result of a sensing pass from the next relay.
+    /// Handles the result of a pass that collects measurements (sensing pass), from the next relay.
     pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         if let (PassKind::Sense(known), Some(sensor)) = (&mut self.pass, self.sensing.sensor_mut())
             && self.state.is_awaited(hearing.number)
@@ -529,7 +529,7 @@ impl SensorState {
     }
 }
 
-/// State of a sensing pass at one relay.
+/// State of a pass that collects measurements (sensing pass), at one relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,

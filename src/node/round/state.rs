@@ -93,7 +93,8 @@ impl Arrival {
 /// foreign: from a restarted leader, or after missed passes.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of pass numbers: only the first pass of a leader's start or of a view has a multiple of it.
+/// Divisor of pass numbers: only the first pass of a leader's start or of a view has a multiple of it. By that a
+/// relay recognises a first pass, which it can join without knowing earlier ones.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.

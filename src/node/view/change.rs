@@ -47,7 +47,8 @@ pub(crate) struct ViewChange {
 }
 
 impl ViewChange {
-    /// Creates the state for a chain of `relays` relays whose initial leader is node `initial_leader`.
+    /// Creates the state of the view change in a chain of `relays` relays. `initial_leader` is the node number of the
+    /// first leader.
     pub(crate) const fn new(relays: u16, initial_leader: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, initial_leader),
@@ -591,7 +592,7 @@ impl ViewRequest {
         self.refusals = self.refusals.saturating_add(1);
     }
 
-    /// Ends the request, because a view has been decided.
+    /// Ends the view request, because a view has been decided.
     pub(super) const fn stop(&mut self) {
         self.asks = false;
         self.at = None;

@@ -61,7 +61,7 @@ pub(crate) struct Electorate {
 }
 
 impl Electorate {
-    /// Creates the initial state for a chain of `relays` relays with this initial leader.
+    /// Creates the initial voting state for a chain of `relays` relays with this initial leader.
     pub(crate) const fn new(relays: u16, initial_leader: u16) -> Self {
         Self {
             agreed: View {

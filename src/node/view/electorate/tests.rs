@@ -170,7 +170,8 @@ fn what_may_be_agreed_on_is_decided_on_again() {
     );
 }
 
-/// Checks that a view of all relays is accepted. Otherwise a chain with most relays restarted would never fly again.
+/// Checks that a view of all relays is accepted even if most of them have lost their votes. Otherwise a chain with
+/// most relays restarted would never fly again.
 #[test]
 fn all_of_the_mission_are_a_view_whatever_they_remember() {
     let mut chain = Chain::of(3);
