@@ -87,8 +87,8 @@ impl Association {
         }
     }
 
-    /// Returns true if no flown neighbour is on this side. The chain ends here, or the neighbour's drone is not flown
-    /// to setpoints.
+    /// Returns true if no neighbour follows setpoints on this side. The chain ends here, or the neighbour's drone is
+    /// not flown to setpoints.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
@@ -286,7 +286,7 @@ impl Association {
         self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
-    /// Returns the message of a relay that is not flown or has just started, if it is due.
+    /// Returns the message of a relay that does not follow setpoints or has just started, if it is due.
     ///
     /// The message contains the relay's position, and a halt request to forward. It needs no association.
     pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
@@ -309,14 +309,14 @@ impl Association {
     }
 }
 
-/// Obstacles on one side: a lost relay that may still hover, and a drone that is not flown. They limit this relay's
-/// x.
+/// Obstacles on one side that limit this relay's x. They are a lost relay that may still hover, and a drone that is
+/// not flown to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Nearest lost node on this side, and the limit of this relay's x because of that node, m.
     lost: Option<(u16, f32)>,
     /// x at which this relay is the separation away from a nearby lost relay, m; NaN if none is nearby. Until this
-    /// relay has reached it, perhaps only the distance across the line separates the two.
+    /// relay has reached it, perhaps only lateral offset and altitude separate the two.
     near_m: f32,
     /// True if a lost relay was on the wrong side of this one along x, by the last messages.
     disordered: bool,
@@ -383,7 +383,7 @@ impl KeepOut {
         self
     }
 
-    /// Returns `HoldReason::NotFlown` if the drone of the neighbour `node` is not flown, else `otherwise`.
+    /// Returns `HoldReason::NotFlown` if the neighbour `node` does not follow setpoints, else `otherwise`.
     pub(super) fn reason(&self, node: u16, otherwise: HoldReason) -> HoldReason {
         if self.unflown.is_some_and(|(unflown, _)| unflown == node) {
             HoldReason::NotFlown
@@ -392,16 +392,16 @@ impl KeepOut {
         }
     }
 
-    /// Returns true if a drone that is not flown blocks this relay's path to its agreed position.
+    /// Returns true if a drone without setpoints blocks this relay's path to its agreed position.
     pub(super) fn blocks(&self, own: &Own) -> bool {
         let ways = own.setpoint.zip(own.target);
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
-    /// Returns the last position on the path from `from` to `to` that keeps clear of the unflown drone. It keeps the
-    /// separation; if `from` is closer than that, the path comes no nearer. Along x the path ends before that drone,
-    /// unless the two are the separation apart across the line. Within the separation along x only moves across the
-    /// line away from the drone remain.
+    /// Returns the last position on the path from `from` to `to` that keeps clear of the obstructing drone. That
+    /// drone does not follow setpoints. The path keeps the separation from it; if `from` is closer, the path comes no
+    /// nearer. Along x the path ends before that drone, unless lateral offset and altitude separate the two. Within
+    /// the separation along x only moves to the side, or up or down, away from the drone remain.
     pub(super) fn path_end(
         &self,
         from: Placement,
@@ -515,11 +515,11 @@ pub struct Fence {
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
-    /// Setpoint of the sender across the line: lateral offset and altitude, m, each -1e7 to 1e7. If the sender is not
-    /// flown to setpoints: its reported position there.
+    /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
+    /// setpoints: those of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the owner (upstream) requests to keep from the fence (step), m, 0 to 1e5. If it is less
-    /// than the separation, the follower must not move across the line.
+    /// Distance along x that the owner (upstream) requests to keep from the fence plane, m, 0 to 1e5. If it is less
+    /// than the separation, the follower must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -531,19 +531,20 @@ impl Fence {
     /// Flag of the follower (downstream): it agrees to `apart_m`, the step of the newest fence.
     pub const AGREES: u8 = 2;
     /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
-    /// beyond it, needs that to move across the line.
+    /// beyond it, needs that to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
     /// Flag: echo of the last [`REQUESTS_OPENING`](Self::REQUESTS_OPENING) received from the destination.
     pub const OPENING_RECEIVED: u8 = 8;
     /// Flag: the sender has left this association. It does not fly to its setpoints, or did not for a time. Positions and the
     /// number of the fence are not valid.
     pub const LEFT: u8 = 16;
-    /// Flag: request to halt the chain. The sender, or a relay beyond it, is not in order along x with its
-    /// neighbours. All relays hold their positions. It is repeated every second, and valid in any association.
+    /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond it, is
+    /// on the wrong side of a neighbour along x, or does not know. The request is repeated every second, and valid in
+    /// any association.
     pub const HALTS: u8 = 32;
-    /// Flag: the position only shows the order along x, and allows the neighbour no move. From the follower: it is
-    /// not in order with its neighbour downstream. With [`LEFT`](Self::LEFT): the sender is not flown, and `x_m` is
-    /// its last reported x.
+    /// Flag: the position only shows the order along x, and allows the neighbour no move. From the follower: its own
+    /// order with its neighbour downstream is not confirmed. With [`LEFT`](Self::LEFT): the sender does not follow
+    /// setpoints, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
     pub(super) const fn without_place(association: u16, echo: u16) -> Self {
@@ -582,7 +583,7 @@ pub enum HoldReason {
     Unheard,
     /// The neighbour is on the wrong side of this relay along the line, or too close to tell. Neither moves.
     Order,
-    /// The agreed positions are closer along x than the two relays' positions across the line allow.
+    /// The agreed positions are closer along x than lateral offsets and altitudes of the two relays allow.
     Close,
     /// A lost relay may still hover between this relay and its agreed position.
     Lost,
@@ -590,6 +591,6 @@ pub enum HoldReason {
     NotFlown,
     /// The setpoint has not moved for at least five seconds, because the neighbour has not made room.
     Pending,
-    /// Another relay of the chain is not in order with its neighbours, so all relays hold their positions.
+    /// Another relay is, or may be, on the wrong side of a neighbour. All relays therefore hold their positions.
     Halted,
 }

@@ -181,8 +181,8 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.fence.most_x_m)
     }
 
-    /// Returns the minimum distance along x, m, at which two relays are the separation apart in space. They are at
-    /// `one` and `other` across the line.
+    /// Returns the minimum distance along x, m, at which two relays are the separation apart in space. `one` and
+    /// `other` are their lateral offsets and altitudes.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))

@@ -18,9 +18,9 @@ pub(super) struct FenceFollower {
     number: u16,
     /// x of the newest fence plane that the neighbour has announced, m.
     fence_m: f32,
-    /// Distance along x (step) that the neighbour requests to keep, m; infinite before its first fence.
+    /// Distance along x that the neighbour requests to keep from this relay, m; infinite before its first.
     asked_m: f32,
-    /// Distance along x (step) to the neighbour that this relay has agreed to, m; infinite before any.
+    /// Distance along x to the neighbour that this relay has agreed to, m; infinite before any.
     taken_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
@@ -99,8 +99,8 @@ impl FenceFollower {
         };
     }
 
-    /// Handles a notice that the neighbour upstream is no longer flown. This relay comes no nearer to it. If the two
-    /// were in order along x, this side sets no other limit.
+    /// Handles a notice that the neighbour upstream does not follow setpoints any more. This relay comes no nearer to
+    /// it. If the order of the two along x was right, this side sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -255,8 +255,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. A relay that is not `placed`
-    /// (in order with its neighbour downstream) only sends a halt request.
+    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. If `placed` is false (the
+    /// order with its neighbour downstream is not confirmed), a relay only sends a halt request.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

@@ -128,7 +128,7 @@ pub struct Guard {
     refused: u32,
 }
 
-/// Number of reminders, one per second, between two messages of a relay that is not flown.
+/// Number of reminders, one per second, between two messages of a relay that does not follow setpoints.
 const ALONE_EVERY: u8 = 4;
 
 /// Number of consecutive reminders with an unknown order along x after which the chain halts.
@@ -357,7 +357,8 @@ impl Guard {
     }
 
     /// Decides if this relay needs an open chain: all relays the separation apart along x. Requests of one neighbour
-    /// for that are forwarded to the other one. `clear` is true if this relay may move across the line.
+    /// for that are forwarded to the other one. `clear` is true if this relay may change its lateral offset and
+    /// altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let waits = !clear && !own.has_agreed_cross_section();
@@ -376,8 +377,9 @@ impl Guard {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. Each neighbour may
-    /// be in order with this relay by the error of the reports only, although the two are not with each other.
+    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. Within the errors of
+    /// the reports, each neighbour may be on the right side of this relay although the two neighbours are not in
+    /// order.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -499,8 +501,9 @@ impl Guard {
     /// Returns the reason that keeps this relay from its agreed position, on the given side. `None` if there is none,
     /// or no agreed position.
     ///
-    /// While a new agreement spreads it may refer to positions of the previous one. While the relay is not flown only
-    /// [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown.
+    /// While a new agreement spreads it may refer to positions of the previous one. While the drone is not flown to
+    /// setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown
+    /// to them.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         if !self.flown {

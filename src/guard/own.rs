@@ -82,8 +82,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Extends the interval by a new setpoint `x_m`. The relay may first fly on toward the last setpoint, and then
-    /// turn.
+    /// Extends the interval of the relay's possible x by a new setpoint `x_m`. The relay may first fly on toward the
+    /// last setpoint, and then turn.
     pub(super) fn go(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.at_m).abs() > 0.0 {
             self.at_m = x_m;
@@ -93,8 +93,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Updates the interval by a position report of time `at`. The relay is between the reported x and its recent
-    /// setpoints.
+    /// Updates the interval of the relay's possible x by a position report of time `at`. The relay is between the
+    /// reported x and its recent setpoints.
     pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
         let hovers = (x_m - self.at_m).abs() <= config.hover_m + config.rounding();
         let here = Span::at(if hovers { self.at_m } else { x_m });
@@ -142,7 +142,7 @@ pub(super) struct Own {
     pub(super) still: bool,
     /// True while the chain is open here, on request: neighbours are the separation apart along x.
     pub(super) open: bool,
-    /// True while this relay holds its position: it, or another relay, is not in order along x.
+    /// True while this relay holds its position, because the order of relays along x is wrong or unknown.
     pub(super) halted: bool,
     pub(super) reported: Option<Placement>,
     /// Position in the last message to a neighbour while the drone was not flown to setpoints.
@@ -202,8 +202,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint is short of the agreed position and has not moved for five reminders. The rest of
-    /// the way leads toward `side`, or across the line although this side is not `clear` for that.
+    /// Returns true if the setpoint is short of the agreed position and has not moved for five reminders. The agreed
+    /// position is then farther toward `side`. Or it has another lateral offset or altitude, and `clear` is false:
+    /// this side forbids that move.
     pub(super) fn waits(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -216,7 +217,7 @@ impl Own {
         self.reminders >= MAX_REMINDERS_STILL && wants
     }
 
-    /// Returns true if the relay, while not flown, has moved away from the last position that it has sent.
+    /// Returns true if the relay has moved away from the last position that it has sent without setpoints.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.sent_place.cross_section())
@@ -258,8 +259,8 @@ impl Own {
         self.set_setpoint(place, now);
     }
 
-    /// Handles a position report, measured at time `at`. The relay has arrived across the line if `at` is long enough
-    /// after the last change there.
+    /// Handles a position report, measured at time `at`. The relay has arrived at its lateral offset and altitude if
+    /// `at` is long enough after their last change.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.still |= at >= self.turned + self.config.lag
             && self.is_near(place.cross_section(), self.cross_section());
@@ -268,7 +269,7 @@ impl Own {
         }
     }
 
-    /// Returns true if two positions across the line, `is` and `to_be`, agree within the hover error.
+    /// Returns true if lateral offset and altitude of `is` and `to_be` agree within the hover error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most

@@ -16,10 +16,10 @@ pub(super) struct FenceOwner {
     number: u16,
     /// x of the newest fence plane that this relay has announced, m; infinite before the first.
     fence_m: f32,
-    /// Distance along x (step) that this relay requests to keep from the fence plane, m; infinite at first.
+    /// Distance along x that this relay requests to keep from the fence plane, m; infinite before any.
     asked_m: f32,
-    /// Distance along x (step) to which the neighbour has agreed, m. A larger one that this relay requests replaces
-    /// it at once. Infinite for the separation.
+    /// Distance along x to which the neighbour has agreed, m. A larger one that this relay requests replaces it at
+    /// once. Infinite stands for the separation.
     granted_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     counted_m: f32,
@@ -100,8 +100,8 @@ impl FenceOwner {
         };
     }
 
-    /// Handles a notice that the neighbour downstream is no longer flown. This relay comes no nearer to it. If the
-    /// two were in order along x, this side sets no other limit.
+    /// Handles a notice that the neighbour downstream does not follow setpoints any more. This relay comes no nearer
+    /// to it. If the order of the two along x was right, this side sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -139,9 +139,10 @@ impl FenceOwner {
 
     /// Returns true if the neighbour is known to be beyond this relay along x.
     ///
-    /// Each report has an error of up to `hover_m`. Before the first fence is cleared, two relays whose reports are closer than
-    /// the errors along x are in order only if they may pass each other: they are then the separation apart across the line. A
-    /// pair that was in order may have moved by the errors once more since then, each time that one of them halts or is rebooted.
+    /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence plane, two relays
+    /// whose reports are closer than the errors along x are in order only if they may pass each other: lateral offset
+    /// and altitude then keep them the separation apart. A pair that was in order may have moved by the errors once
+    /// more since then, each time that one of them halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
@@ -274,8 +275,8 @@ impl FenceOwner {
         self.clear && self.answered && self.counted_m >= self.fence_m
     }
 
-    /// Returns the distance along x (step) that the agreed positions need, m. It is below the separation only if both
-    /// relays have arrived across the line and the agreed positions are that close.
+    /// Returns the distance along x that the agreed positions need, m. It is below the separation only if both relays
+    /// have arrived at their lateral offsets and altitudes and the agreed positions are that close.
     fn best_apart(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();

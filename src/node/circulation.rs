@@ -34,7 +34,7 @@ use crate::time::{Duration, Instant, Jitter};
 /// may take thirty work portions.
 const SLOW: u32 = 4;
 
-/// Maximum of the exponent n in the wait of 2 << n hop times between retransmissions: eight hop times.
+/// Maximum exponent n of the wait between retransmissions, 2 << n hop times: at most eight hop times.
 const LOG_MOST: u32 = 2;
 
 /// Wait before the first retransmission on a lossy channel, in hop times. In this time the neighbour has also replied

@@ -71,7 +71,7 @@ fn a_start_outside_the_box_goes_no_farther_out() {
 }
 
 /// Two relays closer along x than the errors of their reports are in order only if they may pass. They may pass each
-/// other if they are the separation apart across the line.
+/// other if lateral offset and altitude keep them the separation apart.
 #[test]
 fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
@@ -109,8 +109,8 @@ fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     }
 }
 
-/// Two neighbours may each be in order with the relay between them only by the error of the reports. They need not be
-/// in order with each other; the relay between them then halts.
+/// Two neighbours halt the relay between them if they are in the wrong order. Each may be on the right side of that
+/// relay within the errors of the reports.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -275,7 +275,7 @@ fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
     }
 }
 
-/// A relay that is not flown, or has just started, also forwards a halt.
+/// A relay that does not follow setpoints, or has just started, also forwards a halt request.
 #[test]
 fn a_halt_passes_a_relay_that_is_not_flown() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -326,8 +326,8 @@ fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
-/// A relay that started beside a silent one moves away to the separation, then across the line. It stays so far away
-/// until an operator clears the silent one, and reports the reason meanwhile.
+/// A relay that started beside a silent one first moves away along x, then changes its altitude. It keeps the
+/// separation along x until an operator clears the silent one, and reports the reason meanwhile.
 #[test]
 fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     let mut one = One {
@@ -361,7 +361,7 @@ fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
 }
 
-/// A relay out of order with a neighbour that becomes silent stays where it is. The chain halts until an operator
+/// A relay on the wrong side of a neighbour that becomes silent stays where it is. The chain halts until an operator
 /// clears the silent neighbour.
 #[test]
 fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
@@ -391,7 +391,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     }
 }
 
-/// A relay beside one that is not flown does not halt the chain if their positions are in order.
+/// A relay beside one without setpoints does not halt the chain if their positions are in order.
 #[test]
 fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
@@ -419,8 +419,8 @@ fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     }
 }
 
-/// A fence number marks the x as that of a fence, which may be far from its owner's position. A fence of an
-/// association from before a reboot thus does not show that its owner is out of order.
+/// A fence plane from before a reboot does not show its owner on the wrong side. A message with a fence number
+/// contains the x of the fence plane, which may be far from the position of its owner.
 #[test]
 fn an_old_fence_says_nothing_of_where_its_owner_is() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -492,8 +492,9 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Relay 1 starts beside relay 2 after relay 3 has cleared the first fence of relay 2. Relays 1 and 2 are in order
-/// only by the error of the reports. Each next fence is then the separation beyond relay 1, too (rule 7).
+/// Relay 1 starts beside relay 2 after relay 3 has gone beyond the first fence plane of relay 2. Relays 1 and 2 are
+/// in order only by the error of the reports. Each next fence plane is then the separation beyond relay 1, too (rule
+/// 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

@@ -193,7 +193,7 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// A relay keeps clear of relays beyond a cleared neighbour until it hears one of them.
+/// A relay keeps clear of relays beyond a removed neighbour until it hears one of them.
 #[test]
 fn a_relay_keeps_clear_of_those_beyond_a_cleared_one_until_it_hears_them() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
@@ -502,8 +502,8 @@ fn a_new_life_is_told_from_an_old_one() {
     );
 }
 
-/// A relay out of order with its neighbour downstream gives the one upstream no valid position. It requests a halt,
-/// with an x that does not count.
+/// A relay on the wrong side of its neighbour downstream gives the one upstream no valid position. It requests a
+/// halt, with an x that does not count.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);

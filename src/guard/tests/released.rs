@@ -151,7 +151,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// A relay beside a drone in manual control moves across the line only away from it.
+/// A relay beside a drone in manual control moves to the side, up or down only away from it.
 ///
 /// Beside means within the separation along x.
 #[test]
@@ -233,8 +233,8 @@ fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// A flown neighbour that is silent makes no room. This is reported after five reminders, and not while the relay
-/// moves.
+/// A neighbour that follows setpoints but is silent makes no room. This is reported after five reminders, and not
+/// while the relay moves.
 #[test]
 fn a_relay_that_stands_for_long_says_that_it_waits_for_room() {
     let mut row = Row::new();

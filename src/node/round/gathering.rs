@@ -29,7 +29,8 @@ impl Computation {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Returns true at a leader whose next pass collects profiles: some differ, and not all are known.
+    /// Returns true if the leader's next pass has to collect the relays' profiles. Some differ from the common one,
+    /// and not all are known.
     pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
