@@ -95,7 +95,8 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Maximum backward step of the caller's time that counts as out-of-order calls. A larger one is a clock step.
+/// Maximum backward step of the caller's time that is taken for calls in the wrong order. A larger step is taken for
+/// a changed clock.
 const DISORDER: Duration = Duration::from_millis(100);
 
 /// Maximum advance of internal time in one call, some 140 years. A wrong reading does not take internal time to its

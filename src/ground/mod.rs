@@ -74,7 +74,7 @@ pub struct Ground {
     base: u16,
     end: Side,
     node: u16,
-    /// Number of relays that the station can reach: one over a wire, four over a shared channel.
+    /// Number of relays that the station can reach: one over a wire, up to four over a shared channel.
     within: u16,
     upload: Option<Upload>,
     progress: Progress,

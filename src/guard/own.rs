@@ -39,10 +39,10 @@ pub(super) struct ReachableInterval {
     pub(super) high_m: f32,
     /// Time of the last change of the setpoint's x.
     changed: Instant,
-    /// Interval that contains the x of all setpoints since `since`.
+    /// Interval that contains the x of all setpoints since the time `since`.
     late: Span,
     since: Instant,
-    /// Interval of earlier setpoints along x that may still have had an effect at the last report.
+    /// Interval of the x of earlier setpoints, which may still have had an effect at the last report.
     before: Span,
     reported: Instant,
     /// True once a position report shows the effect of the first setpoint.

@@ -83,7 +83,8 @@ impl Offering {
 pub(crate) enum Offered {
     /// The mission is newer and has been stored.
     Stored,
-    /// The mission is rejected: no valid line on earth, or outside the geofence. `is_new` is true for the first time.
+    /// The mission is rejected: no valid line on earth, or outside the geofence. `is_new` is true the first time that
+    /// this mission is rejected.
     Refused { why: LineError, is_new: bool },
     /// The mission is ignored: not newer than the stored one, or for other relays.
     Passed,
@@ -416,7 +417,7 @@ impl MissionUpdate {
     }
 }
 
-/// Line between Tx and Rx along which positions of the active mission are measured.
+/// Methods for the line between Tx and Rx along which positions of the active mission are measured.
 impl MissionUpdate {
     /// Returns the geographic sites of Tx and Rx of the active mission, if it has its own.
     pub(crate) fn sites(&self) -> Option<Sites> {

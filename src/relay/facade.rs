@@ -216,7 +216,7 @@ impl Relay {
         self.node.handle_timeout(self.clock.advance(now));
     }
 
-    /// Restarts the method from its beginning: use it in a closed loop after measuring the actual position.
+    /// Restarts the placement method from its beginning. A closed loop calls it after measuring the actual position.
     ///
     /// Only the leader (relay 1; in a field relay N) restarts; at other relays the call has no effect.
     ///

@@ -154,7 +154,7 @@ pub struct InterruptEnd<'q> {
     received: Filler<'q, AtomicU16>,
     outgoing: Emptier<'q, AtomicU8>,
     lost: &'q AtomicU32,
-    /// True while bytes were lost that the queue does not show by a [`Fault::Overrun`] yet.
+    /// True after bytes were lost, until a [`Fault::Overrun`] is queued in their place.
     gap: bool,
 }
 

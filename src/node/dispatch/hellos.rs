@@ -98,7 +98,7 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay could be inserted between node `other` at `side` and its neighbour.
+    /// Returns true if this relay could be inserted between `other` (at `side`) and its neighbour.
     ///
     /// For that, this relay and the neighbour of `other` receive each other, or a nearer linked neighbour of this
     /// relay is inserted, too.

@@ -295,7 +295,7 @@ impl Node {
         Ok(())
     }
 
-    /// Handles a measurement of the firmware; counts it if it is rejected.
+    /// Handles a measurement from the firmware; counts it if it is rejected.
     pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
         if !self.layers.round.handle_sample(now, &self.member, sample) {
             bump(&mut self.telemetry.stats.samples_rejected);

@@ -23,8 +23,8 @@ use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum number of doublings of a flapping link's hold-down. `LONGEST` is the longest hold-down, in units of
-/// `dead_after`.
+/// Maximum number of doublings of a flapping link's hold-down, the time for which it is not used. `LONGEST` is the
+/// longest hold-down, in units of `dead_after`.
 const DOUBLINGS: u8 = 3;
 const LONGEST: u32 = 6;
 
@@ -208,8 +208,8 @@ impl Damping {
         link.back = Some(Heard::again(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered since `since`, when the search for a neighbour began. It began at least
-    /// `probe_after` ago.
+    /// Returns true if no node has answered the search for a neighbour since `since`, when it began. The search must
+    /// have begun at least `probe_after` ago.
     fn is_gap(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)

@@ -26,8 +26,8 @@ use crate::wire::message::{AdjustStep, Answer, Message, Moved, Roster, Sweep, To
 /// row, up to 24 more, may be added.
 pub(super) const PLACES_AT_ONCE: u16 = 600;
 
-/// True with the feature `altitude`, `ADJUST` with the feature `adjust`. Without a feature the code of its method is
-/// unreachable.
+/// True if the feature `altitude` is on; `ADJUST` is the same for `adjust`. Without a feature the code of its method
+/// is unreachable.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
