@@ -8,15 +8,15 @@ use core::f64::consts::PI;
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Model of the link between a drone and the ground, the paper's eta.
+/// Path-loss model of the links between drones and the ground. It selects the factor that the paper calls eta.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
-    /// Line of sight: eta = `mu_los`.
+    /// Links between drones and the ground have line of sight: eta = `mu_los`, as between drones.
     Los,
-    /// Obstructed: eta = `mu_nlos`.
+    /// Links between drones and the ground are obstructed: eta = `mu_nlos`, as between ground stations.
     Nlos,
-    /// Weighted mean with the weight w of line of sight in [0, 1]: eta = w `mu_los` + (1 - w) `mu_nlos`.
+    /// Weighted mean with the weight w of line of sight, 0 to 1: eta = w `mu_los` + (1 - w) `mu_nlos`.
     Weighted(f64),
 }
 
@@ -24,11 +24,11 @@ pub enum AirGround {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Channel {
-    /// Drone to drone.
+    /// Path-loss factor between two drones, which have line of sight, 1/m^2.
     mu_los: f64,
-    /// Interferer to ground receiver, both on the ground.
+    /// Path-loss factor from the interferer to the ground receiver, without line of sight, 1/m^2.
     mu_nlos: f64,
-    /// Drone to ground and ground to drone.
+    /// Path-loss factor between a drone and the ground, either way, 1/m^2.
     eta: f64,
 }
 
@@ -131,8 +131,8 @@ impl Channel {
         )
     }
 
-    /// Creates a channel from its path-loss factors. `None` unless `mu_los` is within 1e-3 to 1e30, `mu_nlos` within 1 to 1e20
-    /// times `mu_los`, and `eta` between the two.
+    /// Creates a channel from its path-loss factors, 1/m^2. Returns `None` unless `mu_los` is within 1e-3 to 1e30,
+    /// `mu_nlos` within 1 to 1e20 times `mu_los`, and `eta` between the two.
     pub(crate) fn from_factors(mu_los: f64, mu_nlos: f64, eta: f64) -> Option<Self> {
         let sound = (1e-3..=1e30).contains(&mu_los)
             && (mu_los..=1e20 * mu_los).contains(&mu_nlos)

@@ -20,35 +20,38 @@
 use crate::time::Duration;
 use crate::wire::MAX_SWEEP;
 
-/// Maximum number of frames that two neighbours exchange in `probe_after`.
+/// Maximum number of frames that two neighbours of an idle chain exchange in `probe_after`.
 const FRAMES: u64 = 8;
 
-/// Bytes of a frame: a lease renewal with a tag.
+/// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Fraction of the channel that these frames may take: 3 of 20.
+/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3 / 20.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Maximum number of relays in range without waits: radios reach four relays far on either side.
+/// Number of relays in range up to which a relay is assumed not to wait for the channel.
+///
+/// Radios that reach four relays far on either side have nine relays in range.
 const NEAR: u16 = 9;
 
-/// Maximum wait for the channel, in frame times.
+/// Maximum time for one transmission including its wait for the channel, in frame times.
 const MOST_TURNS: u32 = 4;
 
-/// Number of relays that share a channel, and the overhead of a frame.
+/// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelLoad {
     /// Number of relays in range of each other, 1 to 1000.
     pub in_range: u16,
-    /// Cost of a frame beyond its bytes, in bytes.
+    /// Channel time of a frame beyond its bytes (preamble, turnaround), in bytes.
     pub overhead: u16,
 }
 
 impl ChannelLoad {
-    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4. An overhead of 12 bytes per frame.
+    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4. The overhead is 12 bytes per
+    /// frame.
     pub const fn of_radios(in_range: u16) -> Self {
         Self {
             in_range,
@@ -56,9 +59,9 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the required capacity times 1e6, bits: keep-alive bits over their allowed fraction.
+    /// Returns the capacity that the idle chain needs in one `probe_after`, in millionths of a bit.
     ///
-    /// The bits are those of one `probe_after`.
+    /// It is the number of bits sent in that time, divided by the fraction of the channel that they may take.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
@@ -156,7 +159,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the duration of a transmission with its wait for the channel, in frame times.
+    /// Returns the time for one transmission including its wait for the channel, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -166,19 +169,19 @@ impl ChannelLoad {
     }
 }
 
-/// Reasons why a channel is overloaded, and three ways to reduce its load.
+/// Error of [`ChannelLoad::carried`]: the channel is overloaded. Contains three ways to reduce the load.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
-    /// Number of relays in range of each other.
+    /// Number of relays in range of each other that overload the channel.
     pub in_range: u16,
-    /// Minimum data rate, bit/s.
+    /// Minimum data rate that would carry these relays, bit/s.
     pub least_baud: u32,
-    /// Minimum [`Settings::probe_after`](crate::Settings::probe_after), in whole milliseconds.
+    /// Minimum [`Settings::probe_after`](crate::Settings::probe_after) for these relays, in whole ms.
     ///
     /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times that.
     pub least_probe_after: Duration,
-    /// Maximum number of relays in range.
+    /// Maximum number of relays in range that the channel carries as it is.
     pub most_in_range: u16,
 }
 

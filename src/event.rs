@@ -4,7 +4,7 @@
 use crate::geodetic::LineError;
 use crate::side::Side;
 
-/// Event that a firmware may react to. The state behind it is read from the relay.
+/// Event that a firmware may react to. The firmware reads the changed state from the relay.
 ///
 /// A *node* is a relay's index before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -17,18 +17,20 @@ pub enum Event {
     /// Every allowed target SIR is infeasible (raised at the leader: relay 1; in a field relay N). All relays keep their positions.
     /// `Relay::restart`, a new view or a new mission makes the leader try again.
     Infeasible,
-    /// The neighbour at that side has been silent for `Settings::dead_after` (15 s by default). With two links the relay keeps
-    /// sending heartbeat requests to it; on a shared channel it searches for another node at that side. An operator looks for
-    /// that drone; once it has landed, `Relay::clear_lost` frees its room.
+    /// The neighbour at `side` has been silent for `Settings::dead_after` (15 s by default). With two links the relay
+    /// keeps sending heartbeat requests to it; on a shared channel it searches for another node at that side. An
+    /// operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space around its last
+    /// position.
     NeighbourLost {
-        /// Side of the neighbour.
+        /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
         /// Index of the neighbour.
         node: u16,
     },
-    /// A lost neighbour is received again, or another node has replaced it. `node` then differs from that of the loss.
+    /// A lost neighbour is received again, or another node has replaced it. `node` is then another one than in the
+    /// report of the loss.
     NeighbourBack {
-        /// Side of the neighbour.
+        /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
         /// Index of the neighbour.
         node: u16,
@@ -45,28 +47,30 @@ pub enum Event {
         /// Index of the node.
         node: u16,
     },
-    /// Three handshakes in a row under a node's index are signed with another key. None between them has the right key. An operator
-    /// gives both nodes the same key. A single forged frame does not raise it, but an attacker without the key who sends three in a
-    /// row does: if that node is received at the same time, it is an attack and the node is fine.
+    /// Three handshakes in a row from a node are signed with another key than this relay's. None in between has the
+    /// right key. An operator gives both nodes the same key. A single forged frame does not raise it, but an attacker
+    /// without the key who sends three in a row does: if that node is received at the same time, it is an attack and
+    /// the node is fine.
     KeyMismatch {
         /// Index of the node.
         node: u16,
     },
-    /// Five handshakes in a row under a node's index have an epoch that is not newer than the known one. Their key is right. The
-    /// epoch is older, or the same with the same seed, and none between them is newer: the node did not increase its epoch at its
-    /// last start, and its frames are rejected. An operator increases that node's epoch and restarts it, or restarts this relay and
-    /// its other neighbours. A replay of one recorded frame does not raise it, but a replay in order of five handshakes of one
-    /// start does. If `node` is this relay, its neighbours know a newer epoch, and it becomes passive ([`Event::DuplicateIndex`]).
+    /// Five handshakes in a row from a node have an epoch that is not newer than the known one. The key is right, but
+    /// the node did not increase its epoch at its last start, so its frames are rejected. The epoch is older, or the
+    /// same with the same seed, and none in between is newer. An operator increases that node's epoch and restarts
+    /// it, or restarts this relay and its other neighbours. A replay of one recorded frame does not raise it, but a
+    /// replay in order of five handshakes of one start does. If `node` is this relay, its neighbours know a newer
+    /// epoch, and it becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
         /// Index of the node.
         node: u16,
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
-    /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of the two and
-    /// gives it the right index. Raised once until the other node has been silent for twice `dead_after`. With signed frames, an
-    /// attacker without the key can raise it, but cause nothing else.
+    /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of
+    /// the two nodes and gives it the right index. Raised once until the other node has been silent for twice
+    /// `dead_after`. With signed frames, an attacker without the key can raise it, but cause nothing else.
     DuplicateIndex {
-        /// Duplicate index.
+        /// Index that two nodes use.
         node: u16,
     },
     /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
@@ -84,7 +88,7 @@ pub enum Event {
     /// mission, and the ground station is informed. Raised once for each such mission. Upload one whose sites are as far apart as
     /// its distance, and within the geofence.
     UploadRefused {
-        /// Reason of the rejection.
+        /// Reason for which the mission was rejected.
         why: LineError,
     },
     /// The relay's estimate of the interference has changed (`Relay::interference_estimate`). New positions follow.
@@ -92,9 +96,9 @@ pub enum Event {
     /// The measurements do not fit a single source on the ground (raised at the leader). They may also be too few, or
     /// contradictory. `Relay::unfit` gives the reason.
     InterfererUnclear,
-    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit again. An operator checks its
-    /// receiver. Transmitter and receiver are reported by the leader only, a relay that measures nothing at all by itself only.
-    /// With four relays or fewer the faulty one cannot be identified
+    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit again. An operator
+    /// checks its receiver. Only the leader reports the transmitter and the receiver. A relay that measures nothing
+    /// at all is reported only by itself. With four relays or fewer the faulty one cannot be identified
     /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
@@ -105,7 +109,7 @@ pub enum Event {
     Adopted,
 }
 
-/// Events without a node, in polling order: `FIRST`, then events with a node, then `LAST`.
+/// Events without a node that are polled first. Events with a node follow, then those of `LAST`.
 const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const LAST: &[Event] = &[
     Event::ViewAccepted,
@@ -132,7 +136,7 @@ const LAST: &[Event] = &[
     Event::InterfererUnclear,
 ];
 
-/// Kind of event about one node on one side of this relay.
+/// Kind of event that concerns one node on one side of this relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum About {
     Lost,
@@ -141,9 +145,9 @@ pub(crate) enum About {
     Mission,
     Key,
     Epoch,
-    /// Duplicate index; for this relay's own index, at either side.
+    /// Two nodes use the same index. If it is this relay's index, the side of the event has no meaning.
     Index,
-    /// Faulty measurements.
+    /// Measurements of the node do not fit those of the others.
     Sensor,
 }
 
@@ -173,11 +177,11 @@ impl About {
     }
 }
 
-/// Raised events that the firmware has not polled: one bit each, and the node.
+/// Raised events that the firmware has not polled yet, with the nodes that they concern.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     plain: u16,
-    /// Bits by side; bit i is `About::ALL[i]`.
+    /// Raised events that concern a node, upstream and downstream: bit i stands for `About::ALL[i]`.
     about: [u8; 2],
     nodes: [[u16; 8]; 2],
 }

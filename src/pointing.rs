@@ -74,7 +74,7 @@ impl Bearing {
     ///
     /// The interferer is on the ground. A directional antenna can steer a null toward it.
     ///
-    /// `None` if the relay is at the interferer's position, or the interference has no position.
+    /// The result is `None` if the relay is at the interferer's position, or the interference has no position.
     pub fn to_interferer(from: Placement, mission: &Mission) -> Option<Self> {
         let interferer = mission.interferer()?;
         Self::new(
@@ -85,7 +85,8 @@ impl Bearing {
     }
 }
 
-/// Returns sqrt(a^2 + b^2). The larger of a and b is factored out, so that no square overflows or underflows.
+/// Returns sqrt(a^2 + b^2), without overflow or underflow of the squares. For that the larger of |a| and |b| is
+/// factored out.
 fn length(a: f32, b: f32) -> f32 {
     let large = a.abs().max(b.abs());
     if large > 0.0 {

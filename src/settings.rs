@@ -11,7 +11,7 @@ use crate::time::Duration;
 use crate::wire::auth::Auth;
 use crate::without_quorum::WithoutQuorum;
 
-/// Time for computing and for the buffers of a link, in the `hop_time` of a preset.
+/// Part of the presets' `hop_time` for computing and for the buffers of a link.
 const LATENCY: Duration = Duration::from_millis(10);
 
 /// Identity of a relay in its network.
@@ -47,12 +47,13 @@ pub enum Wiring {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Method {
-    /// Optimal x at fixed altitudes: Algorithm 1, in a field Algorithm 4.
+    /// Best x at fixed lateral offsets and altitudes: Algorithm 1, in a field of interference Algorithm 4.
     #[default]
     Align,
-    /// Joint optimum of x, y and altitude within the mission's corridor. Not in a field; up to 100 relays.
+    /// Joint optimum of x, y and altitude within the mission's bands. Not in a field of interference; up to 100
+    /// relays.
     Joint,
-    /// Algorithm 1, followed by Algorithm 2. Not in a field.
+    /// Algorithm 1, followed by Algorithm 2, which moves one relay after the other. Not in a field of interference.
     Adjust(Adjust),
 }
 
@@ -60,7 +61,8 @@ pub enum Method {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
-    /// Maximum number of rounds, the paper's `Iter_max`. It ends earlier after a round in which no relay moves.
+    /// Maximum number of rounds, the paper's `Iter_max`. Algorithm 2 ends earlier after a round in which no relay
+    /// moves.
     pub rounds: u16,
     /// Maximum change of altitude of a relay in one turn, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
@@ -69,7 +71,7 @@ pub struct Adjust {
 }
 
 impl Default for Adjust {
-    /// 500 rounds, 10 m, [`Local::Fine`].
+    /// Returns the defaults: 500 rounds, 10 m of altitude change in a turn, [`Local::Fine`].
     fn default() -> Self {
         Self {
             rounds: 500,
@@ -79,13 +81,13 @@ impl Default for Adjust {
     }
 }
 
-/// Measurement of the interference by a relay in a field.
+/// Settings of a relay that measures the interference, in a field of interference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measure {
     /// Maximum interference power that can be received, W: 1e-30 to 1e6. Samples above it are rejected.
     pub i_max_w: f32,
-    /// Samples to take at one position before the estimate is used, 100 to 1 000 000.
+    /// Number of samples to take at one position before their estimate is used, 100 to 1 000 000.
     pub samples: u32,
 }
 
@@ -107,19 +109,22 @@ pub struct Measure {
 pub struct Settings {
     /// Altitude and power of this relay; `None` for the mission's common profile.
     pub profile: Option<Profile>,
-    /// True to keep this relay's altitude in methods that choose altitudes.
+    /// True to keep this relay's altitude while other altitudes are optimised.
     pub hold_altitude: bool,
     /// Method that the leader (relay 1; in a field relay N) runs; the other relays follow.
     pub method: Method,
-    /// Measurement of a field by this relay, used instead of the agreed field; `None` outside of a field.
+    /// Measurement of a field of interference by this relay, used in place of the mission's field. `None` outside of
+    /// a field.
     pub measure: Option<Measure>,
-    /// Estimation of an unknown interferer; `None` in a field. Set it on all relays of a chain, or on none.
+    /// Estimation of an unknown interferer from measurements; `None` in a field of interference. Set it on all relays
+    /// of a chain, or on none.
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first solves the chain from the mission (bracketed schedule). One round trip if the solution is right.
+    /// True if the leader first solves the chain from the mission (bracketed schedule). If that solution is right,
+    /// one round trip of messages is enough.
     pub predict: bool,
-    /// Two links or one shared channel.
+    /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
     /// Key and epoch for signing frames. With it the relay accepts signed frames only; without it, it accepts frames from any
     /// sender. Give the key to all relays of a network, or to none.
@@ -136,11 +141,11 @@ pub struct Settings {
     pub quorum: bool,
     /// Behaviour of the relay without a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Guard that limits setpoints to the room that the neighbours have cleared and to a geofence. `None` for no guard. With it the
-    /// firmware has to report the drone's position: `Relay::handle_position`.
+    /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
+    /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// True if the firmware converts positions to latitudes and longitudes, between two configured sites. An upload
-    /// without sites is then rejected if its distance differs from theirs. Set it on all relays of a chain, or on none.
+    /// True if the firmware converts positions to latitude and longitude, by two configured sites. An upload without
+    /// sites is then rejected if its distance differs from theirs. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
@@ -154,7 +159,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The default settings, for `const` functions.
+    /// Default settings, as a constant for `const` functions.
     const DEFAULT: Self = Self {
         profile: None,
         hold_altitude: false,
@@ -174,7 +179,7 @@ impl Settings {
         sited: false,
     };
 
-    /// Settings for a UART of `baud` bit/s to each neighbour. The defaults, with a longer `hop_time` below 57 600 bit/s.
+    /// Returns settings for a UART of `baud` bit/s to each neighbour. Below 57 600 bit/s `hop_time` is longer than the default.
     ///
     /// `hop_time` has 10 ms for computing and for the buffers on the way. Set it for a link that needs more, such as a USB adapter.
     ///
@@ -192,7 +197,7 @@ impl Settings {
         Self::DEFAULT.with_hop_time(alone, baud)
     }
 
-    /// Settings for one half-duplex radio channel of `baud` bit/s that `load` shares.
+    /// Returns settings for a half-duplex radio channel of `baud` bit/s, shared by the relays in `load`.
     ///
     /// `probe_after` is 5 s, or the least that lets the channel carry the relays ([`ChannelLoad::carried`]), and `dead_after` three times
     /// that. `hop_time` is at least 30 ms, and otherwise [`ChannelLoad::hop_time`] with a latency of 10 ms; set it for a radio that
@@ -231,7 +236,8 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with the longer of their own `hop_time` and that of the channel.
+    /// Returns the settings with a longer `hop_time` if the channel needs one. `load` and `baud` (bit/s) are those of
+    /// the channel.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {
@@ -243,12 +249,12 @@ impl Settings {
     }
 }
 
-/// Parameter of an [`Identity`] or of [`Settings`] that is rejected, and its range.
+/// Error: a parameter of an [`Identity`] or of [`Settings`] is out of its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SetupError {
-    /// `index` is not within 1 to the mission's N.
+    /// The identity's `index` is not within 1 to the mission's number of relays.
     Index,
     /// `profile.altitude_m` is not within 0.1 to 1e5, or `profile.power_w` not within 1e-6 to 1e6.
     Profile,
@@ -257,7 +263,7 @@ pub enum SetupError {
     /// `method` cannot be used. It chooses altitudes in a field, is the joint method for more than 100 relays, or needs a feature
     /// that the crate was built without.
     Method,
-    /// The mission's `reverse` is above 0, and `method` is not Align, or `listen` is set.
+    /// The mission's `reverse` is above 0, but `method` is not Align, or `listen` is set.
     Reverse,
     /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
     Adjust,

@@ -28,27 +28,27 @@ pub struct Duration {
 }
 
 impl Instant {
-    /// The epoch itself.
+    /// Instant of the epoch: 0 microseconds.
     pub const ZERO: Self = Self { micros: 0 };
 
-    /// The instant `micros` microseconds after the epoch.
+    /// Returns the instant `micros` microseconds after the epoch.
     pub const fn from_micros(micros: u64) -> Self {
         Self { micros }
     }
 
-    /// The instant `millis` milliseconds after the epoch.
+    /// Returns the instant `millis` milliseconds after the epoch.
     pub const fn from_millis(millis: u64) -> Self {
         Self {
             micros: millis.saturating_mul(1_000),
         }
     }
 
-    /// Microseconds since the epoch.
+    /// Returns the microseconds since the epoch.
     pub const fn as_micros(self) -> u64 {
         self.micros
     }
 
-    /// Returns the span from `earlier` to `self`; zero if `earlier` is later.
+    /// Returns the time from `earlier` to `self`; zero if `earlier` is later.
     #[inline(never)] // as `add`
     pub const fn since(self, earlier: Self) -> Duration {
         Duration {
@@ -58,12 +58,12 @@ impl Instant {
 }
 
 impl Duration {
-    /// A span of `micros` microseconds.
+    /// Returns a span of `micros` microseconds.
     pub const fn from_micros(micros: u64) -> Self {
         Self { micros }
     }
 
-    /// A span of `millis` milliseconds.
+    /// Returns a span of `millis` milliseconds.
     pub const fn from_millis(millis: u64) -> Self {
         Self {
             micros: millis.saturating_mul(1_000),
@@ -95,10 +95,12 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Maximum backward step of the caller's time that counts as out-of-order calls. A larger one is a clock step.
+/// Maximum backward step of the caller's time that is taken for calls in the wrong order. A larger step is taken for
+/// a changed clock.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum forward step, some 140 years. A wrong reading does not take internal time to its end, where no timer expires.
+/// Maximum advance of internal time in one call, some 140 years. A wrong reading does not take internal time to its
+/// end, where no timer expires.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
 /// Converts the caller's time to internal time, which never runs backward. The caller's time may step in either direction.
@@ -113,7 +115,7 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 /// Timers continue after a backward step, which extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
-    /// Latest time of the caller, and the internal time at that moment.
+    /// Latest time of the caller. `internal` is the internal time at that moment.
     latest: Instant,
     internal: Instant,
 }
@@ -160,7 +162,7 @@ fn shifted(at: Instant, from: Instant, to: Instant) -> Instant {
     Instant::from_micros((to + at.since(from)).as_micros().saturating_sub(back))
 }
 
-/// A xorshift generator (Marsaglia 2003, 13-17-5).
+/// Generator of pseudorandom numbers for timing and session numbers. It is xorshift (Marsaglia 2003, 13-17-5).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Jitter(u32);
 
@@ -176,7 +178,7 @@ impl Jitter {
         }
     }
 
-    /// Returns the next number, never 0.
+    /// Returns the next pseudorandom number, never 0.
     pub(crate) const fn draw(&mut self) -> u32 {
         let mut state = self.0;
         state ^= state << 13;
@@ -195,7 +197,7 @@ impl Jitter {
         Duration::from_micros(span.as_micros().saturating_add(random))
     }
 
-    /// Returns the next number, 1 to 65535.
+    /// Returns the next pseudorandom number, from 1 to 65535.
     pub(crate) const fn number(&mut self) -> u16 {
         let [_, a, b, _] = self.draw().to_le_bytes();
         match u16::from_le_bytes([a, b]) {

@@ -18,7 +18,9 @@ use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 use crate::serial::READ_LIMIT;
 use crate::time::Duration;
 
-/// Pause after an error or a full port.
+/// Pause before a port is used again after an error, the end of its stream or a full buffer.
+///
+/// Also the minimum time between two exchanges with the relay that no event has caused.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.
@@ -28,11 +30,11 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Signal: bytes were received, or an event occurred.
+    /// Signal to exchange data with the relay: raised after received bytes and after events of the relay.
     news: Signal,
-    /// Signal: there may be a frame to send.
+    /// Signal to the sending future: a frame for the autopilot may be pending.
     speech: Signal,
-    /// Waker of the task that waits for an event.
+    /// Waker of the task in `next_event`, which waits for an event of the autopilot link.
     listener: Cell<Option<Waker>>,
 }
 
@@ -45,7 +47,7 @@ impl fmt::Debug for AsyncAutopilot {
 }
 
 impl AsyncAutopilot {
-    /// Shares `link` between tasks.
+    /// Creates a link that several tasks can share, from the autopilot link `link`.
     pub const fn new(link: Autopilot) -> Self {
         Self {
             link: RefCell::new(link),
@@ -55,8 +57,9 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Processes an event of the relay. Events that matter in flight are sent to the operator, and a new setpoint is used at once.
-    /// Without this call the autopilot receives a new setpoint with the next target, within a second.
+    /// Passes an event of the relay to the autopilot link. Events that matter in flight are sent to the operator, and
+    /// a new setpoint is sent to the autopilot at once. Without this call the autopilot receives a new setpoint with
+    /// the next periodic target, within a second.
     ///
     /// Constant work.
     pub fn handle_event(&self, event: Event) {
@@ -85,12 +88,12 @@ impl AsyncAutopilot {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }
 
-    /// Exchanges bytes between the link and its port, and positions between the link and `relay`, for good. Join it with, or spawn
-    /// it beside, the future that runs the relay's ports.
+    /// Moves bytes between the link and its port, and positions between the link and `relay`, forever. Join it with,
+    /// or spawn it beside, the future that runs the relay's ports.
     ///
-    /// Each poll reads the port once ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that never completes
-    /// does not delay the reader. The future may be dropped at any `await`, and created again: the rest of a frame that was being
-    /// written is lost, which the autopilot detects by the checksum.
+    /// Each poll reads the port once ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that
+    /// never completes does not delay the reader. The future may be dropped at any `await`, and created again: the
+    /// rest of a frame that was being written is lost, which the autopilot detects by the checksum.
     pub async fn run(
         &self,
         relay: &AsyncRelay<'_>,
@@ -106,7 +109,7 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Processes received bytes, for good.
+    /// Passes bytes received from the autopilot's port to the link, forever.
     async fn hear(&self, clock: &impl Clock, rx: &mut impl Read) -> Infallible {
         let mut buffer = [0; READ_LIMIT];
         loop {
@@ -126,7 +129,7 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Exchanges data between the link and the relay, for good.
+    /// Exchanges positions, control state and setpoints between the link and the relay, forever.
     async fn drive(&self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
         loop {
             self.news.settle();
@@ -145,7 +148,7 @@ impl AsyncAutopilot {
         }
     }
 
-    /// Sends pending frames, for good.
+    /// Sends the link's pending frames to the autopilot's port, forever.
     async fn say(&self, clock: &impl Clock, tx: &mut impl Write) -> Infallible {
         loop {
             self.speech.settle();
@@ -163,7 +166,7 @@ impl AsyncAutopilot {
     }
 }
 
-/// Writes all of these bytes; `None` if the port fails or is full.
+/// Writes all `bytes` to the port; `None` if the port fails or is full.
 async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     while !bytes.is_empty() {
         match tx.write(bytes).await {
@@ -193,7 +196,7 @@ impl Signal {
         wake(&self.waits);
     }
 
-    /// Clears the signal; what was raised so far is being handled.
+    /// Clears the signal. The caller then handles everything for which the signal was raised before.
     fn settle(&self) {
         self.is_raised.set(false);
     }

@@ -17,13 +17,15 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
 
-/// Pause after a failure of a port, in byte times.
+/// Pause before a failed or ended port is used again, in byte times (11 ms at 115 200 baud).
 const PAUSE: u32 = 128;
 
-/// Time for which the pin stays high after the last byte, in byte times. One for the byte on the line, one for clock tolerance.
+/// Time for which the driver-enable pin stays high after the last byte should have left, in byte times.
+///
+/// One byte time for a byte that the port may still be sending, one for the tolerance of its clock.
 const HOLD: u32 = 2;
 
-/// Delimiter that ends a frame, also one that was cut short.
+/// Delimiter that ends every frame. Sent alone, it ends a frame that was cut short.
 const DELIMITER: [u8; 1] = [0];
 
 /// Link of a port: its reader and writer, the frame queue, and its driver-enable pin if it has one.
@@ -58,7 +60,7 @@ impl<R: Read, W: Write> AsyncLink<R, W> {
 }
 
 impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
-    /// Creates a link with a pin that is high while this relay sends.
+    /// Creates a link with a driver-enable pin, which is high while this relay sends.
     pub fn half_duplex(rx: R, tx: W, baud: u32, pin: D) -> Self {
         Self::with_pin(rx, tx, baud, Some(pin))
     }
@@ -77,7 +79,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// Returns the receiving future, the sending future, and the queue from the relay to the latter.
+    /// Returns the future that receives, the future that sends, and the queue of frames to send.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,
@@ -103,7 +105,7 @@ impl<R, W, D> AsyncLink<R, W, D> {
     }
 }
 
-/// Passes received bytes to the relay, forever.
+/// Reads bytes from a port and passes them to the relay, forever.
 async fn receive<R: Read>(
     rx: &mut R,
     port: Port,
@@ -139,7 +141,7 @@ async fn receive<R: Read>(
 }
 
 impl<W: Write, D: OutputPin> Sender<W, D> {
-    /// Sends queued frames, forever.
+    /// Sends the frames of the queue and drives the driver-enable pin, forever.
     async fn run(
         &mut self,
         port: Port,
@@ -199,7 +201,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         true
     }
 
-    /// Waits until every byte has left, if a pin depends on it.
+    /// Waits until every written byte has left the port. Does nothing without a driver-enable pin.
     async fn flush(&mut self, port: Port, relay: &AsyncRelay<'_>, clock: &impl Clock) {
         if self.pin.is_some() && self.quiet_at > Instant::ZERO {
             if self.tx.flush().await.is_err() {
@@ -210,7 +212,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the pin, if there is one; returns true on success. Pauses after a failure.
+    /// Sets the level of the driver-enable pin, if there is one. Returns true on success and without a pin; pauses
+    /// after a failure.
     async fn drive(
         &mut self,
         high: bool,
@@ -235,7 +238,8 @@ fn is_empty(waiting: &RefCell<Frames>) -> bool {
     waiting.try_borrow().is_ok_and(|waiting| waiting.is_empty())
 }
 
-/// Completes with the length of the first queued frame. The task that queues a frame wakes this task.
+/// Waits for a queued frame, moves the frame into `frame`, and completes with its length in bytes. The task that
+/// queues a frame wakes this task.
 fn next<'f>(
     waiting: &'f RefCell<Frames>,
     relay: &'f AsyncRelay<'_>,
@@ -259,7 +263,8 @@ fn next<'f>(
     })
 }
 
-/// Awaits `future`; returns its output, and true if it was pending at least once. If not, the caller must yield.
+/// Awaits `future`; returns its output, and true if the future was pending at least once. With false, the caller must
+/// yield to the executor, because a port that is always ready would block the other tasks.
 pub(super) async fn watched<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;
@@ -288,7 +293,7 @@ impl Frames {
         self.0.is_empty()
     }
 
-    /// Returns true if one more frame of any length fits.
+    /// Returns true if one more frame of any length fits into the queue.
     pub(super) fn has_room(&self) -> bool {
         ROOM.saturating_sub(self.0.len()) >= MAX_FRAME
     }
@@ -305,7 +310,7 @@ impl Frames {
         fits
     }
 
-    /// Moves the first frame into `frame` and returns its length; 0 if there is none.
+    /// Moves the first queued frame into `frame` and returns its length in bytes; 0 if there is none.
     pub(super) fn pop(&mut self, frame: &mut FrameBuf) -> usize {
         let mut len = 0;
         for place in frame {

@@ -133,7 +133,7 @@ use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::watched;
 
-/// Two links, one to each neighbour, full duplex unless a link has a pin.
+/// Ports of a relay with two links, one to each neighbour; full duplex unless a link has a pin.
 #[derive(Debug)]
 pub struct AsyncPair<UR, UW, DR, DW, UPin = NoPin, DPin = NoPin> {
     upstream: AsyncLink<UR, UW, UPin>,
@@ -149,7 +149,8 @@ where
     UPin: OutputPin,
     DPin: OutputPin,
 {
-    /// Creates the ports of a relay with [`Wiring::Pair`](crate::Wiring::Pair). Links toward transmitter and receiver.
+    /// Creates the ports of a relay with [`Wiring::Pair`](crate::Wiring::Pair). `upstream` leads toward the
+    /// transmitter, `downstream` toward the receiver.
     pub const fn new(
         upstream: AsyncLink<UR, UW, UPin>,
         downstream: AsyncLink<DR, DW, DPin>,
@@ -192,8 +193,9 @@ where
     }
 }
 
-/// Link to a channel that all neighbours receive. A radio modem, or a half-duplex bus with a driver-enable pin. Channel access is
-/// up to the modem; this crate only keeps relays from retransmitting in step.
+/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus
+/// with a driver-enable pin. The modem controls the access to the channel; this crate only keeps relays from
+/// retransmitting at the same times.
 #[derive(Debug)]
 pub struct AsyncShared<R, W, Pin = NoPin> {
     channel: AsyncLink<R, W, Pin>,
@@ -205,7 +207,7 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
         Self { channel }
     }
 
-    /// Runs like [`AsyncPair::run`].
+    /// Runs the relay on its port, forever, as [`AsyncPair::run`] does on two ports.
     pub async fn run(
         &mut self,
         relay: &AsyncRelay<'_>,
@@ -220,7 +222,7 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
         }
     }
 
-    /// Ends the task and returns the link, from which the port can be recovered.
+    /// Returns the link, to recover its reader, writer and pin.
     pub fn release(self) -> AsyncLink<R, W, Pin> {
         self.channel
     }
@@ -252,7 +254,8 @@ async fn drive(
     }
 }
 
-/// Runs one turn of the relay; returns the time of the next one.
+/// Handles a due timeout, stores the relay's record and queues its frames. Returns the time of the relay's next
+/// timeout; `None` if there is none.
 fn turn(
     of: &mut Relay,
     now: Instant,

@@ -15,11 +15,11 @@ use crate::serial::SerialStats;
 /// relay across an `await`. An interrupt passes its data through a channel to such a task.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// True if the firmware has changed an input since the task's last turn.
+    /// True if the relay has had new input since the ports' task last ran: received bytes or a call.
     changed: Cell<bool>,
-    /// Waker of the task that runs the ports.
+    /// Waker of the task that runs the relay's ports.
     runner: Cell<Option<Waker>>,
-    /// Waker of the task that waits for an event.
+    /// Waker of the firmware's task that waits for an event of the relay.
     listener: Cell<Option<Waker>>,
     /// Counters of the upstream or shared port, and of the downstream port.
     stats: [Cell<SerialStats>; 2],
@@ -35,7 +35,7 @@ impl fmt::Debug for AsyncRelay<'_> {
 }
 
 impl<'a> AsyncRelay<'a> {
-    /// Shares `relay` between tasks.
+    /// Creates a relay that several tasks can share, from `relay`.
     pub fn new(relay: &'a mut Relay) -> Self {
         Self {
             relay: RefCell::new(relay),
@@ -46,8 +46,9 @@ impl<'a> AsyncRelay<'a> {
         }
     }
 
-    /// Passes the relay to `work`, for a position, a sample or a mission. The ports run once this task waits. Returns `None`, and
-    /// does nothing, inside the `work` of another call, which already has the relay. Takes constant time beside that of `work`.
+    /// Passes the relay to `work`, for example to report a position or a sample, and wakes its ports. They run as
+    /// soon as the calling task waits. Returns `None`, and does nothing, inside the `work` of another call, which
+    /// already has the relay. Takes constant time beside that of `work`.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
         self.poke();
@@ -71,7 +72,7 @@ impl<'a> AsyncRelay<'a> {
         })
     }
 
-    /// Returns the counters of `port`. Upstream and shared have the same ones, since no relay has both.
+    /// Returns the counters of `port`. The upstream and the shared port use the same ones, since no relay has both.
     pub fn stats(&self, port: Port) -> SerialStats {
         self.counters(port).get()
     }
@@ -81,7 +82,7 @@ impl<'a> AsyncRelay<'a> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }
 
-    /// Wakes the task that runs the ports.
+    /// Notes new input and wakes the task that runs the relay's ports.
     pub(super) fn poke(&self) {
         self.changed.set(true);
         wake(&self.runner);
@@ -92,12 +93,12 @@ impl<'a> AsyncRelay<'a> {
         wake(&self.listener);
     }
 
-    /// Marks all inputs so far as handled.
+    /// Marks all inputs of the relay so far as handled.
     pub(super) fn settle(&self) {
         self.changed.set(false);
     }
 
-    /// Completes after the next input.
+    /// Completes once the relay has input that the ports' task has not handled, at once if there is some.
     pub(super) fn changes(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             keep(&self.runner, cx);

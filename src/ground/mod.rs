@@ -26,13 +26,13 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay after which another node with its index is accepted.
+/// Silence of a relay after which another node with its index is accepted: 15 s, as for relays.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
-/// Time after which an unanswered question is repeated.
+/// Time after which the ground station repeats a question that a relay has not answered.
 const PATIENCE: Duration = Duration::from_millis(1_000);
 
-/// Unanswered questions to one relay before the next relay is polled.
+/// Number of unanswered questions to one relay before the next relay is polled.
 const QUESTIONS: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
@@ -74,25 +74,25 @@ pub struct Ground {
     base: u16,
     end: Side,
     node: u16,
-    /// Number of relays in reach.
+    /// Number of relays that the station can reach: one over a wire, up to four over a shared channel.
     within: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last question about the flown mission; 0 before any.
+    /// Number of the last question to the relays which mission they fly; 0 before the first.
     question: u16,
     flown: Option<FlownMission>,
-    /// Distance of the polled relay, 1 for the nearest.
+    /// Distance of the polled relay, in relays along the chain: 1 for the nearest.
     distance: u16,
     unanswered: u8,
     /// Mission that the polled relay holds, once it has reported it.
     holds: Option<MissionId>,
-    /// True if the polled relay's next hello answers a question.
+    /// True after a question to the polled relay: its next hello is the answer.
     asked: bool,
-    /// Number of the hello that the next offer answers.
+    /// Number of the relay's hello that the pending offer of the mission answers; `None` without one.
     offer_number: Option<u16>,
     due: bool,
     again: Option<Instant>,
-    /// Clock, started by the first upload.
+    /// Clock that never runs backwards. Every upload and every question starts it again.
     clock: MonotonicClock,
     levels: Levels,
     deframer: Deframer,
@@ -142,7 +142,8 @@ impl Ground {
 
     /// Asks the chain which mission it flies; [`Ground::flown`] returns the answer. Ends an upload in progress.
     ///
-    /// The polled relay sends the upload that it holds, so that the ground station learns what earlier uploads have changed.
+    /// The polled relay also sends the upload that it holds, so that the ground station learns what earlier uploads
+    /// have changed.
     pub fn ask_flown(&mut self, now: Instant) {
         self.upload = None;
         self.progress = Progress::Idle;
@@ -173,7 +174,7 @@ impl Ground {
         Ok(())
     }
 
-    /// Sends the first hello of an upload or a question.
+    /// Schedules the first hello of an upload or a question, for the relay that is polled at present.
     fn start(&mut self, now: Instant) {
         self.holds = None;
         self.offer_number = None;
@@ -208,7 +209,8 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of rejected intact frames to this node: sender not in reach, invalid, replayed.
+    /// Returns the number of rejected intact frames. Their sender is not in reach, or they are forged, replayed or
+    /// malformed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -233,7 +235,7 @@ impl Ground {
         nodes.map(|node| (node, self.endpoint.knows(node)))
     }
 
-    /// Processes received bytes, split anywhere; checks at most one tag per 19 bytes.
+    /// Processes received bytes, in pieces of any length. Work: at most one tag check per 19 bytes.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             if let Some(decoded) = self.deframer.push(byte)
@@ -263,7 +265,7 @@ impl Ground {
         }
     }
 
-    /// Handles a message of relay `sender`; `None` if it is malformed.
+    /// Handles a message of relay `sender`. `message` is `None` if the frame's body is malformed.
     fn handle_message(&mut self, sender: u16, distance: u16, message: Option<&Message>) {
         let counter = match message {
             Some(Message::Hello(hello)) if hello.mission == self.base => {
@@ -283,19 +285,21 @@ impl Ground {
         bump(counter);
     }
 
-    /// Returns true while the question about the flown mission is unanswered.
+    /// Returns true while the question which mission the chain flies is unanswered.
     const fn is_asking(&self) -> bool {
         self.upload.is_none()
             && self.question != 0
             && !matches!(&self.flown, Some(flown) if flown.is_known())
     }
 
-    /// Returns true if `upload`, in an offer with the number `answer`, is the answer to the question.
+    /// Returns true if `upload` answers the question which mission the chain flies.
+    ///
+    /// `answer` is the number of the offer that contains it, which echoes the number of the question.
     fn is_answer(&self, upload: &Upload, answer: u16) -> bool {
         self.is_asking() && answer == self.question && upload.base() == self.base
     }
 
-    /// Records the upload that relay `by` has sent in answer to the question.
+    /// Records the upload that relay `by` has sent in answer to the question which mission it flies.
     fn on_upload(&mut self, by: u16, upload: Upload) {
         let flies = matches!(&self.flown, Some(flown) if flown.by == by && flown.flies && flown.version == upload.version());
         self.flown = Some(FlownMission {
@@ -308,7 +312,8 @@ impl Ground {
         self.again = None;
     }
 
-    /// Handles a hello of relay `by` that answers the question; an upload that the relay holds follows.
+    /// Handles a hello of relay `by` that answers the question which mission it flies. If the relay holds an upload,
+    /// it sends that in its next message.
     fn answered_question(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
@@ -388,7 +393,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Sends the next question, to the same relay or the next one, if it is due. Takes constant time.
+    /// Schedules the next question, to the same relay or the next one, if it is due. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if self.again.is_none_or(|again| again > now) {
@@ -415,7 +420,7 @@ impl Ground {
         self.at(self.distance)
     }
 
-    /// Returns the node number of the relay at `distance`.
+    /// Returns the node number of the relay at `distance` along the chain from this station.
     fn at(&self, distance: u16) -> u16 {
         match self.end {
             Side::Upstream => distance,
@@ -483,7 +488,7 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Sends the report to the next relay, or a handshake if that relay could not read it.
+    /// Writes the interference report to the next relay, or a handshake if that relay could not read it.
     fn next_level(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.levels.take(self.within)?;
         let message = Message::Level {
@@ -502,18 +507,18 @@ const fn is_under_way(progress: Progress) -> bool {
     )
 }
 
-/// The newest mission that a relay holds.
+/// Newest mission that a relay holds, as the relay has reported it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FlownMission {
     /// Node number of the relay that answered.
     pub by: u16,
-    /// Version of the mission: 0 for the one that was loaded before flight.
+    /// Version of the mission: 0 for the mission that was loaded before flight.
     pub version: u16,
-    /// True if the relay flies it; false while it only holds it.
+    /// True if the relay flies the mission; false while it only holds it.
     pub flies: bool,
-    /// Values of the mission. `None` for the one that was loaded before flight, and until the relay has sent them; older firmware
-    /// never sends them.
+    /// Values of the mission. `None` for the mission loaded before flight, and until the relay has sent them; older
+    /// firmware never sends them.
     pub upload: Option<Upload>,
 }
 
@@ -538,36 +543,39 @@ pub enum Progress {
         /// Node number of the relay that holds it.
         by: u16,
     },
-    /// A relay flies the mission, but not all relays of its view are known to.
+    /// A relay flies the mission, but the station does not know yet that all relays of its view do.
     Adopted {
         /// Node number of the relay that flies it.
         by: u16,
     },
-    /// The mission is active in all relays of a view. Relays outside the view take no part until they fly it, too.
+    /// The mission is active in all relays of a view (an agreed set of members). Relays outside the view take no part
+    /// until they fly it, too.
     Flown {
         /// Node number of the relay that reports it.
         by: u16,
-        /// Latest view known to that relay.
+        /// Latest view (agreed set of members) that the relay knows.
         view: ViewId,
-        /// Number of relays that fly the mission: that relay and all of its view beyond it.
+        /// Number of relays that fly the mission: the reporting relay and all of its view beyond it.
         relays: u16,
     },
-    /// A relay refuses the mission: no line on earth, or outside that relay's own geofence. The chain does not fly it.
+    /// A relay refuses the mission: no valid line on earth, or outside that relay's own geofence. The chain does not
+    /// fly it.
     Refused {
         /// Node number of the relay that reports it: it refuses the mission, or a relay beyond it does.
         by: u16,
     },
-    /// The chain has a newer mission.
+    /// The upload is outdated: a relay holds a newer mission.
     Outdated {
         /// Version of the newer mission.
         version: u16,
     },
 }
 
-/// Number of reports between handshakes. A relay that has restarted can read reports after the next handshake.
+/// Number of interference reports after which the station repeats its handshake. A relay that has restarted can read
+/// reports only after a handshake.
 const LEVELS_A_GREETING: u8 = 16;
 
-/// Last measured interference, and the relays to which its report is pending.
+/// Last interference that the station measured, and the relays to which its report is pending.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
     /// Last measured interference, W; 0 before the first.
@@ -578,7 +586,7 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// State before the first measurement.
+    /// State before the first measurement: no report is pending.
     pub(super) const NONE: Self = Self {
         power_w: 0.0,
         untold: 0,
@@ -593,7 +601,7 @@ impl Levels {
         self.measured == 0
     }
 
-    /// Schedules the report to the relay at `distance`, which has answered and may not have it.
+    /// Schedules the last report again for the relay at `distance`, which may have restarted and lost it.
     pub(super) fn owe(&mut self, distance: u16) {
         if self.power_w > 0.0 {
             self.untold |= bit(distance);
@@ -608,7 +616,7 @@ impl Levels {
     }
 }
 
-/// Returns the bit of the relay at `distance`, 1 to 8.
+/// Returns the bit mask of the relay at `distance`, 1 to 8, in the set of pending reports.
 const fn bit(distance: u16) -> u8 {
     match 1_u8.checked_shl(distance.saturating_sub(1) as u32) {
         Some(bit) => bit,

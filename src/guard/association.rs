@@ -12,7 +12,8 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association that prove a new one. Fewer may be late ones.
+/// Number of consecutive messages of another association (session) that prove a restart. Fewer of them may be late
+/// messages of an earlier association.
 const STRAYS: u8 = 3;
 
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
@@ -21,7 +22,8 @@ const HALT_REMINDERS: u8 = 15;
 /// Number of one-second reminders after which a neighbour's last x expires, unless it sends again.
 const SEEN_REMINDERS: u8 = 15;
 
-/// Association that this relay has left, until the neighbour starts a new one.
+/// Notice to a neighbour that this relay has left the association (session) with it. The relay is no longer flown to
+/// its setpoints. The notice is repeated until the neighbour starts a new association.
 #[derive(Clone, Copy, Debug)]
 struct LeaveNotice {
     own: u16,
@@ -29,7 +31,7 @@ struct LeaveNotice {
     due: bool,
 }
 
-/// Association with the neighbour on one side.
+/// Association (session) with the neighbour on one side: its numbers, pending messages and requests.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "flags of the messages, each for itself"
@@ -38,30 +40,30 @@ struct LeaveNotice {
 pub(super) struct Association {
     /// Node number of the neighbour, 0 for none.
     pub(super) node: u16,
-    /// Number of this relay's association.
+    /// Random number by which this relay identifies the association (session) with the neighbour.
     pub(super) own: u16,
-    /// Number of the neighbour's association, paired with `own`; 0 for none.
+    /// Number by which the neighbour identifies the association with this relay; 0 until it is known.
     pub(super) heard: u16,
-    /// Number of consecutive messages that belong to another association.
+    /// Number of consecutive messages that belong to another association (session) of the neighbour.
     strays: u8,
-    /// True if a message is pending.
+    /// True if a message to the neighbour is pending.
     pub(super) due: bool,
-    /// True if the neighbour has forwarded a request to open the chain.
+    /// True while the neighbour requests an open chain: all relays the separation apart along x.
     pub(super) opens: bool,
-    /// Value of that request in the last message to the neighbour.
+    /// True while the messages to the neighbour request an open chain.
     open_sent: bool,
-    /// Reminders until the neighbour's halt request expires, 0 for none.
+    /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without one.
     halt_reminders_left: u8,
-    /// True while a halt request is sent to the neighbour.
+    /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
-    /// Number of the association that the neighbour has left, 0 for none. A neighbour that has left one is absent: its drone does
-    /// not follow setpoints.
+    /// Number of the association that the neighbour has left, 0 for none. A neighbour that has left one is absent:
+    /// its drone does not follow setpoints.
     absent: u16,
-    /// Pending notice of the association that this relay has left.
+    /// Pending notice to the neighbour that this relay has left an association with it.
     leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, in any association, m; NaN before the first.
     seen_m: f32,
-    /// Reminders until that x expires.
+    /// Number of reminders, one per second, until the neighbour's last x expires.
     seen_reminders_left: u8,
 }
 
@@ -85,17 +87,20 @@ impl Association {
         }
     }
 
-    /// Returns true if there is no flown neighbour: the chain ends here, or the neighbour is absent.
+    /// Returns true if no neighbour follows setpoints on this side. The chain ends here, or the neighbour's drone is
+    /// not flown to setpoints.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
 
-    /// Stores the x of a neighbour's message.
+    /// Stores the neighbour's x, `x_m`, from a message. It expires after 15 reminders without another one.
     pub(super) const fn record_x(&mut self, x_m: f32) {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance of this relay on its own side of the neighbour's last x, m; NaN if unknown.
+    /// Returns how far this relay is past the neighbour's last x in the right direction, m.
+    ///
+    /// Negative if the relay is on the wrong side of the neighbour, which is at `side`; NaN if a position is unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -114,12 +119,14 @@ impl Association {
         }
     }
 
-    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x.
+    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The distance must be
+    /// larger than the errors of both reports.
     pub(super) fn is_passed(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
-    /// Returns true if this relay's reported x is on its own side of the neighbour's last x.
+    /// Returns true if this relay's reported x is on the right side of the neighbour's last x. The distance must be
+    /// at least the errors of both reports.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -128,12 +135,12 @@ impl Association {
         self.absent != 0
     }
 
-    /// Marks the neighbour as absent: it has left the association of that number, and may be anywhere.
+    /// Marks the neighbour as absent: it has left the association with that number, and may be anywhere.
     pub(super) const fn mark_absent(&mut self, association: u16) {
         self.absent = association;
     }
 
-    /// Accepts the neighbour's association number; an absent neighbour is back.
+    /// Accepts the number that the neighbour gave to the association. An absent neighbour counts as back.
     pub(super) const fn pair(&mut self, association: u16) {
         self.heard = association;
         self.absent = 0;
@@ -145,7 +152,8 @@ impl Association {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own
     }
 
-    /// Returns the next association after this relay has left this one. It has a notice if the neighbour relies on this one.
+    /// Returns a new association in place of this one, which this relay has left. It includes a leave notice if the
+    /// neighbour's number is known, because the neighbour then relies on the old association.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own: self.own,
@@ -162,7 +170,7 @@ impl Association {
         }
     }
 
-    /// Returns the next association; a pending notice of an earlier one is kept.
+    /// Returns a new association with the same neighbour. A pending leave notice is kept.
     pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
         Self {
             leave_notice: self.leave_notice,
@@ -170,8 +178,8 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to an association that this relay, or the neighbour, has left. The notice is repeated
-    /// until the neighbour starts a new association.
+    /// Returns true if a message belongs to an association that this relay, or the neighbour, has left. This relay's
+    /// leave notice is then sent again, until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.heard;
@@ -190,7 +198,7 @@ impl Association {
         fence.association == self.absent
     }
 
-    /// Schedules a pending notice again; returns true if there is one.
+    /// Schedules a pending leave notice again; returns true if there is one.
     pub(super) const fn remind(&mut self) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             leave_notice.due = true;
@@ -215,7 +223,7 @@ impl Association {
         known
     }
 
-    /// Returns a message of this association; the fence's number, x and step are 0.
+    /// Returns a message of this association. Number, x and step of its fence are 0, for the caller to fill in.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own,
@@ -232,21 +240,22 @@ impl Association {
         }
     }
 
-    /// Takes the open request from a message of this association. A reply is due if the neighbour has not received the last
-    /// request of this relay.
+    /// Stores the neighbour's request for an open chain, or its end, from a message of this association. A reply is
+    /// due if the neighbour has not received the last request of this relay.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.opens = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
-    /// Forwards a request to open the chain, or its end.
+    /// Sets or clears the request for an open chain in the messages to the neighbour. A message is due after a
+    /// change.
     pub(super) const fn forward_open(&mut self, opens: bool) {
         self.due |= self.open_sent != opens;
         self.open_sent = opens;
     }
 
-    /// Takes the halt request from any message of the neighbour. A request is only withdrawn by a relay that is in order on its
-    /// other side (`is_placed`), because a rebooted one does not know its earlier request.
+    /// Stores the halt request of any message of the neighbour, or ends it if the message has none. Only a message
+    /// with a valid position (`is_placed`) ends it, because a rebooted neighbour does not know its earlier request.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -259,7 +268,8 @@ impl Association {
         self.halt_reminders_left > 0
     }
 
-    /// Forwards a halt request, or its end.
+    /// Sets or clears the request to halt the chain in the messages to the neighbour. A message is due after a
+    /// change.
     pub(super) const fn forward_halt(&mut self, halts: bool) {
         self.due |= self.halt_sent != halts;
         self.halt_sent = halts;
@@ -269,15 +279,16 @@ impl Association {
         self.halt_sent
     }
 
-    /// Counts a reminder. A received halt request or position expires unless it is repeated within some reminders.
+    /// Counts one reminder, sent every second. The neighbour's halt request and its position expire after 15
+    /// reminders without a repetition.
     pub(super) const fn count_reminder(&mut self) {
         self.halt_reminders_left = self.halt_reminders_left.saturating_sub(1);
         self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
-    /// Returns the message of a relay without an association: one that is not flown or has just started.
+    /// Returns the message of a relay that does not follow setpoints or has just started, if it is due.
     ///
-    /// It contains the relay's position, and a halt request to forward.
+    /// The message contains the relay's position, and a halt request to forward. It needs no association.
     pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.leave_notice.is_none();
         let place = own.reported.filter(|_| is_due)?;
@@ -290,24 +301,26 @@ impl Association {
         })
     }
 
-    /// Counts a message of another association; returns true if they are too many to be late ones.
+    /// Counts a consecutive message of another association. Returns true once there are too many of them to be late
+    /// ones.
     pub(super) const fn count_foreign(&mut self) -> bool {
         self.strays = self.strays.saturating_add(1);
         self.strays >= STRAYS
     }
 }
 
-/// Limit on this relay's x, because of a lost relay that may still hover, or of an unflown drone.
+/// Obstacles on one side that limit this relay's x. They are a lost relay that may still hover, and a drone that is
+/// not flown to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Nearest lost node, and the limit of this relay's x because of that node, m.
+    /// Nearest lost node on this side, and the limit of this relay's x because of that node, m.
     lost: Option<(u16, f32)>,
-    /// x from which a nearby lost relay is at least the separation away, m; NaN if no relay is lost nearby. Below this x the two
-    /// may be separated across the line only.
+    /// x at which this relay is the separation away from a nearby lost relay, m; NaN if none is nearby. Until this
+    /// relay has reached it, perhaps only lateral offset and altitude separate the two.
     near_m: f32,
-    /// True if a lost relay was out of order with this one at its last message.
+    /// True if a lost relay was on the wrong side of this one along x, by the last messages.
     disordered: bool,
-    /// Relay that reported last that it is not flown, and its reported position.
+    /// Node number and last reported position of a neighbour whose drone is not flown to setpoints.
     unflown: Option<(u16, Placement)>,
 }
 
@@ -325,7 +338,8 @@ impl KeepOut {
         self.lost.map(|(_, limit_m)| limit_m)
     }
 
-    /// Adds a lost relay, `node`, with the limit `limit_m`. The side determines the nearer node and the tighter limit.
+    /// Adds the lost relay `node` with the limit `limit_m` of this relay's x, m. Of two lost relays the nearer node
+    /// is kept, and the tighter limit; `side` determines both.
     #[inline(never)] // called from both sides
     pub(super) fn raise(&mut self, side: Side, node: u16, limit_m: f32) {
         let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
@@ -335,7 +349,7 @@ impl KeepOut {
         });
     }
 
-    /// Removes lost relays at or beyond `node`, which has sent a message.
+    /// Removes the lost relays at or beyond `node`, because `node` has sent a message.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -349,8 +363,8 @@ impl KeepOut {
         }
     }
 
-    /// Takes a message that the neighbour is not flown, with its reported position. One of the current association is late, and
-    /// ignored.
+    /// Stores the position of a neighbour that reports that its drone is not flown to setpoints. Such a message with
+    /// the number of the current association is late, and ignored.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.heard;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
@@ -358,18 +372,18 @@ impl KeepOut {
         }
     }
 
-    /// Removes the obstacle: the neighbour is flown.
+    /// Removes the neighbour's drone as an obstacle: it is flown to its setpoints again.
     pub(super) const fn remove_unflown(&mut self) {
         self.unflown = None;
     }
 
-    /// Removes the obstacle because the line changes: the drone's position along the new line is unknown.
+    /// Returns the obstacles for a changed line: without the unflown drone, whose new x is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
     }
 
-    /// Returns `otherwise` as the reason for a limit or a wait, or that the neighbour `node` is not flown.
+    /// Returns `HoldReason::NotFlown` if the neighbour `node` does not follow setpoints, else `otherwise`.
     pub(super) fn reason(&self, node: u16, otherwise: HoldReason) -> HoldReason {
         if self.unflown.is_some_and(|(unflown, _)| unflown == node) {
             HoldReason::NotFlown
@@ -378,15 +392,16 @@ impl KeepOut {
         }
     }
 
-    /// Returns true if a drone that is not flown blocks this relay's path to its agreed position.
+    /// Returns true if a drone without setpoints blocks this relay's path to its agreed position.
     pub(super) fn blocks(&self, own: &Own) -> bool {
         let ways = own.setpoint.zip(own.target);
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
-    /// Returns the part of the path from `from` to `to` that keeps clear of a drone that is not flown. It keeps the separation. If
-    /// `from` is closer than the separation, the path comes no nearer. Along x it ends before that drone, unless the two are the
-    /// separation apart across the line. Within the separation along x only moves across the line away from the drone remain.
+    /// Returns the last position on the path from `from` to `to` that keeps clear of the obstructing drone. That
+    /// drone does not follow setpoints. The path keeps the separation from it; if `from` is closer, the path comes no
+    /// nearer. Along x the path ends before that drone, unless lateral offset and altitude separate the two. Within
+    /// the separation along x only moves to the side, or up or down, away from the drone remain.
     pub(super) fn path_end(
         &self,
         from: Placement,
@@ -415,9 +430,10 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Moves the limit for relays that were lost before the first setpoint to that setpoint's `x_m`.
+    /// Sets the limit of this relay's x for relays that were lost before its first setpoint to `x_m`.
     ///
-    /// They were never heard and may hover anywhere beyond it; from `near_m` on they are the separation away.
+    /// These relays were never heard and may hover anywhere beyond the first setpoint, which is at `x_m`. At `near_m`
+    /// this relay is the separation away from them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -425,12 +441,12 @@ impl KeepOut {
         }
     }
 
-    /// Marks the last lost relay as possibly closer than the separation, until this relay reaches `near_m`.
+    /// Marks the last lost relay as possibly closer than the separation, until this relay is at `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
-    /// Returns the x from which on the last lost relay is the separation away, m; NaN if it already is.
+    /// Returns the x at which this relay is the separation away from the last lost relay, m. NaN if it already is.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
@@ -440,8 +456,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay `is_beyond` the x `near_m`. `near_m` then becomes its limit, so it stays the
-    /// separation away from the lost relay.
+    /// Ends [`is_near`](Self::is_near) once `is_beyond` returns true for `near_m`. `near_m` then becomes this relay's
+    /// limit, so that it stays the separation away from the lost relay.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -454,12 +470,12 @@ impl KeepOut {
         }
     }
 
-    /// Marks that a lost relay is out of order with this one.
+    /// Marks that a lost relay may be on the wrong side of this one along x.
     pub(super) const fn disorder(&mut self) {
         self.disordered = true;
     }
 
-    /// Returns true while a lost relay may be on the wrong side. No path along x then leads away from it.
+    /// Returns true while a lost relay may be on the wrong side of this one. No path along x then leads away from it.
     pub(super) const fn is_disordered(&self) -> bool {
         self.disordered
     }
@@ -468,8 +484,8 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Keeps clear of relays at `side` that were never heard. They may hover anywhere beyond `limit_m`, until any of them has sent
-    /// a message.
+    /// Adds the obstacle for relays at `side` that were never heard. They may hover anywhere beyond `limit_m`, until
+    /// any of them has sent a message.
     pub(super) fn expect(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),
@@ -480,48 +496,55 @@ impl KeepOut {
     }
 }
 
-/// Message of a relay to a neighbour about the fence between them.
+/// Message between neighbours about their fence: a plane across x with one of the two on either side.
 ///
-/// It is a state, not a step: it may be lost, duplicated, delayed or reordered.
+/// It contains the complete state, so it may be lost, duplicated, delayed or reordered.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fence {
-    /// Number of the sender's association with this neighbour, never 0.
+    /// Number that the sender gave to its association (session) with this neighbour, never 0.
     pub association: u16,
-    /// Echo of the destination's association number as last received, 0 for none.
+    /// Number of the destination's association that the sender received last, 0 for none.
     pub echo: u16,
-    /// Owner: number of the fence, 0 before the first. Follower: number of the newest fence received.
+    /// Number of the fence. From its owner upstream: 0 before the first fence. From the follower downstream: newest
+    /// number received.
     pub number: u16,
-    /// Owner: x of the fence. Follower: low end of its reachable interval. m, -1e7 to 1e7.
+    /// x of the fence if its owner (upstream) sends it, else the lowest x that the follower may reach.
+    ///
+    /// Before the first fence the owner sends the highest x that it may reach. m, -1e7 to 1e7.
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
-    /// Position of the sender across the line, or its target position across the line, m. Both coordinates are -1e7 to 1e7.
+    /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
+    /// setpoints: those of its reported position.
     pub across: CrossSection,
-    /// Owner: requested step, which is the distance to keep from the fence along x, m, 0 to 1e5. If it is less than the
-    /// separation, the follower must not move across the line.
+    /// Distance along x that the owner (upstream) requests to keep from the fence plane, m, 0 to 1e5. If it is less
+    /// than the separation, the follower must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
 }
 
 impl Fence {
-    /// Flag: the sender has arrived at its position across the line.
+    /// Flag: the sender has arrived at its lateral offset and altitude.
     pub const ARRIVED: u8 = 1;
-    /// Flag of the follower: it agrees to `apart_m` of the newest fence.
+    /// Flag of the follower (downstream): it agrees to `apart_m`, the step of the newest fence.
     pub const AGREES: u8 = 2;
-    /// Flag: the sender, or a relay beyond it, has to move across the line. It needs the separation along x for that.
+    /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
+    /// beyond it, needs that to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
     /// Flag: echo of the last [`REQUESTS_OPENING`](Self::REQUESTS_OPENING) received from the destination.
     pub const OPENING_RECEIVED: u8 = 8;
     /// Flag: the sender has left this association. It does not fly to its setpoints, or did not for a time. Positions and the
     /// number of the fence are not valid.
     pub const LEFT: u8 = 16;
-    /// Flag: the sender, or a relay beyond it, is not in order with its neighbours. All relays hold their positions. It is repeated
-    /// every second, and valid in any association.
+    /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond it, is
+    /// on the wrong side of a neighbour along x, or does not know. The request is repeated every second, and valid in
+    /// any association.
     pub const HALTS: u8 = 32;
-    /// Flag: the position shows the order only, and grants nothing. Of the follower: it is not in order with its neighbour
-    /// downstream. With [`LEFT`](Self::LEFT): the sender is not flown, and `x_m` is its last reported x.
+    /// Flag: the position only shows the order along x, and allows the neighbour no move. From the follower: its own
+    /// order with its neighbour downstream is not confirmed. With [`LEFT`](Self::LEFT): the sender does not follow
+    /// setpoints, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
     pub(super) const fn without_place(association: u16, echo: u16) -> Self {
@@ -541,7 +564,7 @@ impl Fence {
         self.flags & flag != 0
     }
 
-    /// Returns true if all numbers are within their ranges.
+    /// Returns true if all numbers of the message are within their ranges.
     pub fn is_valid(&self) -> bool {
         let CrossSection { y_m, altitude_m } = self.across;
         let places = [self.x_m, self.target_m, y_m, altitude_m];
@@ -552,22 +575,22 @@ impl Fence {
     }
 }
 
-/// Reason that keeps a relay from its agreed position.
+/// Reason that keeps a relay's setpoint from its agreed position.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
-    /// The neighbour has not agreed to a fence yet.
+    /// The order of the two relays along x has not been confirmed by messages yet.
     Unheard,
-    /// The neighbour is on the wrong side of this relay along the line, or too close for certainty. Neither moves.
+    /// The neighbour is on the wrong side of this relay along the line, or too close to tell. Neither moves.
     Order,
-    /// The agreed distance along x is less than allowed, given the current positions across the line.
+    /// The agreed positions are closer along x than lateral offsets and altitudes of the two relays allow.
     Close,
     /// A lost relay may still hover between this relay and its agreed position.
     Lost,
-    /// The neighbour is not flown, and blocks the path or has not made room.
+    /// The neighbour's drone is not flown to setpoints, and blocks the path or has not made room.
     NotFlown,
-    /// The neighbour has not made room for at least five seconds.
+    /// The setpoint has not moved for at least five seconds, because the neighbour has not made room.
     Pending,
-    /// Another relay of the chain is not in order with its neighbours, so all relays hold their positions.
+    /// Another relay is, or may be, on the wrong side of a neighbour. All relays therefore hold their positions.
     Halted,
 }

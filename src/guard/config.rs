@@ -6,32 +6,32 @@ use crate::root::sqrt;
 use crate::time::Duration;
 use crate::without_quorum::WithoutQuorum;
 
-/// Default `lag`: stopping time of the autopilot link's default pace.
+/// Default of [`GuardConfig::lag`]: the stopping time at the default pace of the autopilot link.
 const LAG: Duration = Duration::from_millis(9_800);
 
 /// Maximum distance from the geofence, m in each coordinate, at which a relay may start.
 pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 
-/// Geofence of the setpoints.
+/// Geofence: the box of the allowed setpoints, in coordinates of the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geofence {
-    /// Smallest x, m from Tx: -1e7 to `most_x_m`.
+    /// Smallest x, m from Tx toward Rx: -1e7 to `most_x_m`.
     pub least_x_m: f32,
-    /// Largest x, m: to 1e7.
+    /// Largest x, m from Tx toward Rx: `least_x_m` to 1e7.
     pub most_x_m: f32,
-    /// Smallest y, m from the line: -1e7 to `most_y_m`.
+    /// Smallest y, m to the right of the line (negative to its left): -1e7 to `most_y_m`.
     pub least_y_m: f32,
-    /// Largest y, m: to 1e7.
+    /// Largest y, m to the right of the line (negative to its left): `least_y_m` to 1e7.
     pub most_y_m: f32,
-    /// Lowest altitude, m: -1e7 to `most_altitude_m`.
+    /// Lowest altitude, m above ground: -1e7 to `most_altitude_m`.
     pub least_altitude_m: f32,
-    /// Highest altitude, m: to 1e7.
+    /// Highest altitude, m above ground: `least_altitude_m` to 1e7.
     pub most_altitude_m: f32,
 }
 
 impl Geofence {
-    /// Returns true if `place` is inside.
+    /// Returns true if `place` is inside the geofence.
     pub fn contains(&self, place: Placement) -> bool {
         (self.least_x_m..=self.most_x_m).contains(&place.x_m)
             && (self.least_y_m..=self.most_y_m).contains(&place.y_m)
@@ -97,7 +97,7 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the configuration with a larger geofence. It has room for relays that leave the line without a quorum.
+    /// Returns the configuration with a geofence enlarged for relays that leave the line without a quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.fence;
@@ -139,7 +139,7 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the position nearest to `place` that is no farther outside of the geofence than `before`.
+    /// Returns the position nearest to `place` that is no farther outside the geofence than `before`.
     pub(super) fn cut_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.fence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
@@ -157,7 +157,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns true if a relay may start at `place`. So close to the geofence that all numbers are exact enough.
+    /// Returns true if a relay may start at `place`: within 5 km of the geofence in each coordinate. Farther away the
+    /// coordinates would be rounded too much.
     pub(super) fn may_begin_at(&self, place: Placement) -> bool {
         let (near, box_place) = (BEGIN_WITHIN_M, self.cut(place));
         (place.x_m - box_place.x_m).abs() <= near
@@ -165,8 +166,10 @@ impl GuardConfig {
             && (place.altitude_m - box_place.altitude_m).abs() <= near
     }
 
-    /// Returns the x of node `node` while the chain is open, for the agreed `x_m`. The order is kept, and the positions are the
-    /// separation apart if the mission's relays fit into the geofence so.
+    /// Returns the goal of node `node` along x, m, while the chain is open; `x_m` is its agreed x.
+    ///
+    /// In an open chain the order is kept, and the goals are the separation apart if the mission's relays fit into
+    /// the geofence so.
     #[inline(never)] // called from several places
     pub(super) fn open_place(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.fence.least_x_m;
@@ -178,22 +181,23 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.fence.most_x_m)
     }
 
-    /// Returns the minimum distance along x of two relays at `one` and `other` across the line, m.
+    /// Returns the minimum distance along x, m, at which two relays are the separation apart in space. `one` and
+    /// `other` are their lateral offsets and altitudes.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a position, m. Four steps of an f32 at the far end of the geofence.
+    /// Returns the maximum rounding error of a position in the geofence, m: four steps of an f32.
     pub(super) fn rounding(&self) -> f32 {
         4.0 * f32::EPSILON * self.fence.most_x_m.abs().max(self.fence.least_x_m.abs())
     }
 }
 
-/// Maximum distance of a position from Tx, m.
+/// Maximum absolute value of a coordinate of a position, m.
 const FARTHEST_M: f32 = 1e7;
 
-/// Returns true if `x_m` is finite and in the range of positions along x.
+/// Returns true if the coordinate `x_m` is a number within ±1e7 m.
 pub(super) fn is_place(x_m: f32) -> bool {
     x_m.abs() <= FARTHEST_M
 }

@@ -6,27 +6,27 @@ use super::own::Own;
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Forward distance of wrapping fence numbers below which a fence is newer than the last one.
+/// Limit of a wrapping difference of fence numbers: a received fence is newer if it is below.
 const AHEAD: u16 = 0x8000;
 
-/// Follower's state of a fence: the one toward Tx.
+/// State of the fence plane toward Tx: the neighbour upstream places it, this relay stays beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence received, 0 before the first.
+    /// Number of the newest fence plane that the neighbour has announced, 0 before the first.
     number: u16,
-    /// x of the newest fence, m.
+    /// x of the newest fence plane that the neighbour has announced, m.
     fence_m: f32,
-    /// Step requested by the owner, m; infinite for the separation.
+    /// Distance along x that the neighbour requests to keep from this relay, m; infinite before its first.
     asked_m: f32,
-    /// Step that this relay has agreed to, m.
+    /// Distance along x to the neighbour that this relay has agreed to, m; infinite before any.
     taken_m: f32,
-    /// Agreed x of the neighbour, m.
+    /// Agreed x of the neighbour upstream, m.
     target_m: f32,
-    /// True once this relay has cleared a fence.
+    /// True once this relay is known to be beyond a fence plane that the neighbour has announced.
     clear: bool,
-    /// True if the owner was informed that the newest fence has been cleared.
+    /// True if this relay has reported to the neighbour that it is beyond the newest fence plane.
     owner_informed: bool,
 }
 
@@ -45,7 +45,7 @@ impl FenceFollower {
         }
     }
 
-    /// Replaces the neighbour by `node`; 0 for none.
+    /// Replaces the neighbour upstream by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
             self.keep_out.disorder();
@@ -54,8 +54,8 @@ impl FenceFollower {
         self.association.node = node;
     }
 
-    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`. If that neighbour was never
-    /// heard, the limit is this relay's position.
+    /// Starts a new association (session). The limit of x because of the previous neighbour remains in `keep_out`. If
+    /// that neighbour was never heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -79,8 +79,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. Its limits do not apply to
-    /// manual flight.
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The limits along x
+    /// do not apply to manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -89,7 +89,8 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association because the line has changed. Lost relays are kept, unflown drones are not.
+    /// Starts a new association because the line from Tx to Rx has changed. Lost relays remain obstacles, unflown
+    /// drones do not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -98,8 +99,8 @@ impl FenceFollower {
         };
     }
 
-    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it. If the two were in order, it is otherwise
-    /// free.
+    /// Handles a notice that the neighbour upstream does not follow setpoints any more. This relay comes no nearer to
+    /// it. If the order of the two along x was right, this side sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -155,7 +156,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the smallest allowed x, m. A value above the current setpoint asks this relay to go there.
+    /// Returns the smallest allowed x, m. If it is above the current setpoint, this relay has to go there.
     #[inline(never)] // called from several places
     pub(super) fn least(&self, own: &Own) -> f32 {
         let granted = match (self.association.has_no_flown_neighbour(), self.number) {
@@ -166,30 +167,33 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Returns true if this side allows a move across the line.
+    /// Returns true if nothing upstream forbids this relay to change its lateral offset or altitude.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.is_held(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if a requested step below the separation forbids this relay to move across the line.
+    /// Returns true if the neighbour requests a distance along x below the separation. This relay then must not
+    /// change its lateral offset or altitude.
     pub(super) fn is_held(&self, own: &Own) -> bool {
         self.asked_m < own.config.separation_m
     }
 
-    /// Returns true if the neighbour may have been too close since the start.
+    /// Returns true if the neighbour upstream may still be closer than the separation after a start. It has announced
+    /// a fence plane, but this relay is not yet known to be beyond one.
     pub(super) const fn is_tight(&self) -> bool {
         self.is_agreed() && !self.clear
     }
 
-    /// Returns true if the agreed positions are closer along x than the separation.
+    /// Returns true if the agreed x of this relay and the upstream relay are closer than the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.is_agreed() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the requested step if the two neighbours stay the separation apart. `downstream_m` is the distance on the other
-    /// side.
+    /// Agrees to the distance along x that the neighbour requests, unless that is too small. With `downstream_m`, the
+    /// distance on the other side, it must add up to the separation, so that this relay's two neighbours are that far
+    /// apart.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.asked_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -198,7 +202,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the minimum distance along x that the neighbour upstream keeps, m; limits downstream use it.
+    /// Returns the distance along x that the neighbour upstream is sure to keep, m. The limits on the downstream side
+    /// use it.
     pub(super) const fn taken_m(&self) -> f32 {
         if self.keep_out.is_near() || self.is_agreed() && !self.clear {
             0.0
@@ -207,9 +212,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if no flown neighbour is upstream, or if it has announced a fence.
+    /// Returns true if no flown neighbour is upstream, or if the neighbour has announced a fence plane.
     ///
-    /// A neighbour announces a fence once it has found this relay beyond it. False while a lost relay may be out of order.
+    /// A neighbour announces a fence once it has found this relay beyond it. False while a lost relay may be on the
+    /// wrong side.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.is_agreed())
@@ -217,18 +223,19 @@ impl FenceFollower {
 
     /// Returns true if the neighbour upstream was reported at a larger x than this relay.
     ///
-    /// Also true while a lost relay may be out of order.
+    /// Also true while a lost relay may be on the wrong side of this one.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         self.keep_out.is_disordered()
             || !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
     }
 
-    /// Returns true if a fence was received.
+    /// Returns true if the neighbour has announced a fence plane in this association.
     pub(super) const fn is_agreed(&self) -> bool {
         self.number != 0
     }
 
-    /// Updates the state after a report. The owner waits for the news that the newest fence has been cleared.
+    /// Updates the state after a position report. A message is due once this relay is beyond the newest fence plane,
+    /// because the neighbour waits for that. `low_m` is the lowest x of this relay and those beyond it, m.
     pub(super) fn settle(&mut self, own: &Own, low_m: f32) {
         if self.is_agreed() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -236,10 +243,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the highest possible x of the relays upstream before the first fence is cleared, m.
+    /// Returns the highest possible x of the relays upstream during the start, m.
     ///
-    /// Until then the neighbour upstream, and relays beyond it, may be closer than the separation. Afterwards all are below this
-    /// relay, and the result is negative infinity.
+    /// Until this relay is beyond the first fence plane, the neighbour upstream, and relays beyond it, may be closer
+    /// than the separation. Afterwards all are below this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.is_agreed() && !self.clear {
             self.fence_m - self.asked_m.min(own.config.separation_m)
@@ -248,8 +255,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message, with `low_m` as the valid x. A relay that is not `placed` (in order with its neighbour
-    /// downstream) only sends a halt request.
+    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. If `placed` is false (the
+    /// order with its neighbour downstream is not confirmed), a relay only sends a halt request.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

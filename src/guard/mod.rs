@@ -112,26 +112,26 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     born: Instant,
-    /// Last reported position before the first setpoint.
+    /// Last reported position, from which the first setpoint starts.
     found: Option<Placement>,
-    /// True if the relay flies to its setpoints.
+    /// True while the drone is flown to this guard's setpoints.
     flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
     /// True while this relay requests a halt of the chain.
     ///
-    /// It is out of order with a neighbour, or several reminders in a row found it without an order.
+    /// It is on the wrong side of a neighbour, or several reminders in a row found its order along x unknown.
     disorder: bool,
-    /// Reminders in a row without order.
+    /// Number of consecutive reminders, one per second, that found the order along x unknown.
     waits: u8,
     reminders: u8,
     refused: u32,
 }
 
-/// Reminders between two messages of a relay that is not flown.
+/// Number of reminders, one per second, between two messages of a relay that does not follow setpoints.
 const ALONE_EVERY: u8 = 4;
 
-/// Reminders in a row without order after which the whole chain halts.
+/// Number of consecutive reminders with an unknown order along x after which the chain halts.
 const MOST_WAITS: u8 = 3;
 
 impl Guard {
@@ -167,15 +167,15 @@ impl Guard {
         self.owner.association.due = true;
     }
 
-    /// Returns true if `place`, limited to the geofence, is the current agreed position.
+    /// Returns true if `place`, limited to the geofence, is the agreed position that the guard has now.
     pub fn is_for(&self, place: Placement) -> bool {
         self.own.target == Some(self.own.config.cut(place))
     }
 
-    /// Takes a position report of the flight controller, measured at time `at`.
+    /// Handles a position report of the flight controller, measured at time `at`.
     ///
-    /// The first setpoint is a position reported since the start, with altitude and side, even outside of the geofence, but
-    /// within [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
+    /// The first setpoint is a position reported since the start, with its altitude and lateral offset, even outside
+    /// of the geofence, but within [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
     pub fn position(&mut self, at: Instant, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
@@ -209,10 +209,10 @@ impl Guard {
         true
     }
 
-    /// Changes the line: earlier positions and messages are void, and the relay begins as after a start.
+    /// Starts again because the line from Tx to Rx has changed. Earlier positions and messages are void.
     ///
-    /// It starts with the first position reported once it has stopped, after `now`, or after the start if that is `None`. Lost
-    /// relays may hover anywhere beyond this relay, as after a start.
+    /// The relay begins with the first position reported once it has stopped, after `now`, or after the start if that
+    /// is `None`. Lost relays may hover anywhere beyond this relay, as after a start.
     pub fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(now) = now {
             self.born = self.born.max(now + self.own.config.lag);
@@ -231,7 +231,7 @@ impl Guard {
         self.own.config.fence = fence;
     }
 
-    /// Handles a message of node `from` at `side`.
+    /// Handles a message of node `from`, a neighbour at `side`.
     ///
     /// A message out of range is counted, one of an earlier association or of another node is ignored.
     pub fn hear(&mut self, side: Side, from: u16, fence: &Fence) {
@@ -267,10 +267,10 @@ impl Guard {
         }
     }
 
-    /// Removes the limits of lost relays at `side`, which have landed or were removed.
+    /// Removes the obstacles of lost relays at `side`, which have landed or were removed.
     ///
-    /// `others` states that the chain has more relays at that side. This relay then keeps clear of them, as of a neighbour that it
-    /// has not heard after a start, until it has heard one of them.
+    /// `others` states that the chain has more relays at that side. This relay then keeps clear of them, as of a
+    /// neighbour that it has not heard after a start, until it has heard one of them.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         let (is_heard, limit_m, keep_out) = match side {
@@ -287,7 +287,8 @@ impl Guard {
         }
     }
 
-    /// Moves the setpoint as far as currently granted, and returns it. `None` before there is an agreed position and a report.
+    /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` before there is an agreed
+    /// position and a report.
     ///
     /// `now` is the time at which the setpoint is passed on: the relay flies toward it within [`GuardConfig::lag`].
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
@@ -344,7 +345,7 @@ impl Guard {
         self.own.setpoint
     }
 
-    /// Ends the state near a lost neighbour once this relay has reached the required distance.
+    /// Ends the restriction near a lost neighbour once this relay is the separation away from it.
     fn clear_near(&mut self) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         self.follower
@@ -355,7 +356,9 @@ impl Guard {
             .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Updates the open state of the chain, and forwards requests away from the relay that needs it.
+    /// Decides if this relay needs an open chain: all relays the separation apart along x. Requests of one neighbour
+    /// for that are forwarded to the other one. `clear` is true if this relay may change its lateral offset and
+    /// altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let waits = !clear && !own.has_agreed_cross_section();
@@ -369,13 +372,14 @@ impl Guard {
         down.forward_open(downward);
     }
 
-    /// Returns true if this relay is known to be in order with both neighbours.
+    /// Returns true if the order of this relay and both neighbours along x is known to be right.
     fn is_ordered(&self) -> bool {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and a neighbour, or its two neighbours, are known to be out of order. Each neighbour may be in
-    /// order with this relay by the error of the reports only, although the two are not with each other.
+    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. Within the errors of
+    /// the reports, each neighbour may be on the right side of this relay although the two neighbours are not in
+    /// order.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -383,7 +387,7 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if this relay is on its own side of both neighbours. Their messages or their reported positions show that.
+    /// Returns true if messages or reported positions show this relay between its two neighbours along x.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);
@@ -391,7 +395,7 @@ impl Guard {
             && (self.owner.is_ordered(own) || seen(&self.owner.association, Side::Downstream))
     }
 
-    /// Halts this relay while it, or a relay that requests it, is not in order.
+    /// Halts this relay while its order along x is not known, or while another relay requests a halt.
     fn halt(&mut self, is_ordered: bool, now: Instant) {
         self.disorder &= !is_ordered && !self.is_seen_in_order();
         self.disorder |= self.is_out_of_order();
@@ -399,7 +403,7 @@ impl Guard {
         self.own.halt(halted || !is_ordered, now);
     }
 
-    /// Forwards halt requests; returns true if there are any.
+    /// Forwards the halt requests of this relay and of its neighbours; returns true if there are any.
     fn pass_halt(&mut self) -> bool {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         let (upstream, downstream) = (up.has_halt_request(), down.has_halt_request());
@@ -494,10 +498,12 @@ impl Guard {
         }
     }
 
-    /// Returns the reason that keeps this relay from its position on `side`. `None` if there is none, or no agreed position.
+    /// Returns the reason that keeps this relay from its agreed position, on the given side. `None` if there is none,
+    /// or no agreed position.
     ///
-    /// While a new agreement spreads it may refer to positions of the previous one. While the relay is not flown only
-    /// [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown.
+    /// While a new agreement spreads it may refer to positions of the previous one. While the drone is not flown to
+    /// setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown
+    /// to them.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         if !self.flown {
@@ -522,7 +528,7 @@ impl Guard {
             .or_else(|| self.pending(side))
     }
 
-    /// Returns the reason for a setpoint that has not moved toward `side` for long.
+    /// Returns the reason if the setpoint has not moved toward `side` for five reminders, else `None`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {
@@ -541,7 +547,7 @@ impl Guard {
         waits.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 
-    /// Number of rejected inputs: not a number, or out of range. It saturates.
+    /// Returns the number of rejected inputs: not a number, or out of range. It saturates.
     pub const fn refused(&self) -> u32 {
         self.refused
     }

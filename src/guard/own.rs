@@ -31,31 +31,32 @@ impl Span {
     }
 }
 
-/// Reachable interval of the relay, m along x.
+/// Interval along x, m, in which this relay may be, between its last report and its setpoints.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
     pub(super) at_m: f32,
     pub(super) low_m: f32,
     pub(super) high_m: f32,
-    /// Time of the last change of the setpoint.
+    /// Time of the last change of the setpoint's x.
     changed: Instant,
-    /// Span of all setpoints since `since`.
+    /// Interval that contains the x of all setpoints since the time `since`.
     late: Span,
     since: Instant,
-    /// Span of earlier setpoints that may still have had an effect at the last report.
+    /// Interval of the x of earlier setpoints, which may still have had an effect at the last report.
     before: Span,
     reported: Instant,
-    /// True once a report shows the effect of the first setpoint.
+    /// True once a position report shows the effect of the first setpoint.
     known: bool,
 }
 
 impl ReachableInterval {
-    /// Returns the interval before the first setpoint.
+    /// Returns the interval in which the relay may be before its first setpoint: its x is not known.
     pub(super) const fn unknown(now: Instant) -> Self {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval for the first setpoint. Until it takes effect, the relay may be on its way to an earlier one.
+    /// Returns the interval in which the relay may be after the first setpoint, at `x_m`. Until that takes effect,
+    /// the relay may still fly to an earlier one.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             at_m: x_m,
@@ -81,7 +82,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Takes a new setpoint: the relay may first fly on toward the last one, and then turn.
+    /// Extends the interval of the relay's possible x by a new setpoint `x_m`. The relay may first fly on toward the
+    /// last setpoint, and then turn.
     pub(super) fn go(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.at_m).abs() > 0.0 {
             self.at_m = x_m;
@@ -91,7 +93,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Takes a report of time `at`: the relay is between there and its recent setpoints.
+    /// Updates the interval of the relay's possible x by a position report of time `at`. The relay is between the
+    /// reported x and its recent setpoints.
     pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
         let hovers = (x_m - self.at_m).abs() <= config.hover_m + config.rounding();
         let here = Span::at(if hovers { self.at_m } else { x_m });
@@ -116,13 +119,13 @@ impl ReachableInterval {
         self.known
     }
 
-    /// Returns true if the relay has arrived at its setpoint.
+    /// Returns true if the relay has arrived at its setpoint's x.
     pub(super) fn is_still(&self) -> bool {
         self.known && self.high_m <= self.low_m
     }
 }
 
-/// Reminders, one per second, after which a setpoint short of the agreed position is reported.
+/// Number of reminders, one per second, after which an unmoved setpoint counts as held up.
 const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
@@ -133,20 +136,21 @@ pub(super) struct Own {
     pub(super) target: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
-    /// Time of the last change of the setpoint across the line.
+    /// Time of the last change of the setpoint's lateral offset or altitude.
     turned: Instant,
-    /// True once the relay has arrived at the setpoint's position across the line.
+    /// True once the relay has arrived at the setpoint's lateral offset and altitude.
     pub(super) still: bool,
-    /// True if this relay knows of a request to open the chain.
+    /// True while the chain is open here, on request: neighbours are the separation apart along x.
     pub(super) open: bool,
-    /// True while this relay holds its position. This relay or another one is not in order with its neighbours.
+    /// True while this relay holds its position, because the order of relays along x is wrong or unknown.
     pub(super) halted: bool,
     pub(super) reported: Option<Placement>,
-    /// Last position sent while not flown.
+    /// Position in the last message to a neighbour while the drone was not flown to setpoints.
     pub(super) sent_place: Placement,
-    /// Reminders since the last change of the setpoint.
+    /// Number of reminders, one per second, since the last change of the setpoint.
     reminders: u8,
-    /// Last setpoint at which this relay arrived, or its first one. It is on its way from there, so it stops no farther outside.
+    /// Last setpoint at which this relay arrived, or its first one. A halt on the way from there stops the relay no
+    /// farther outside the geofence than that.
     left: Placement,
 }
 
@@ -180,7 +184,8 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the start of the next path. On its way to `setpoint` the relay may stop as far along x as it was reported.
+    /// Returns the position at which the relay's next path starts. This is `setpoint`. On the way to it, its x is
+    /// limited to the reported one, because the relay may stop there.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -197,8 +202,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for some reminders before the agreed position. That position is farther toward
-    /// `side`, or across the line unless this side is `clear` for that.
+    /// Returns true if the setpoint is short of the agreed position and has not moved for five reminders. The agreed
+    /// position is then farther toward `side`. Or it has another lateral offset or altitude, and `clear` is false:
+    /// this side forbids that move.
     pub(super) fn waits(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -211,7 +217,7 @@ impl Own {
         self.reminders >= MAX_REMINDERS_STILL && wants
     }
 
-    /// Returns true if the relay, while not flown, was reported away from the position that it has sent.
+    /// Returns true if the relay has moved away from the last position that it has sent without setpoints.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.sent_place.cross_section())
@@ -220,7 +226,7 @@ impl Own {
         })
     }
 
-    /// Clears the setpoint, since the relay is no longer flown to setpoints, or is again. It may be anywhere.
+    /// Clears the setpoint and the known x, because the relay is no longer flown or the line changes.
     pub(super) const fn release(&mut self, now: Instant) {
         self.setpoint = None;
         self.reachable = ReachableInterval::unknown(now);
@@ -228,7 +234,7 @@ impl Own {
         (self.open, self.halted) = (false, true);
     }
 
-    /// Starts or ends a halt. A relay that halts on its way stops where it was last reported, which is in its reachable interval.
+    /// Starts or ends a halt of this relay. If it halts on its way, it stops where it was last reported.
     pub(super) fn halt(&mut self, halted: bool, now: Instant) {
         let begins = halted && !self.halted;
         self.halted = halted;
@@ -253,7 +259,8 @@ impl Own {
         self.set_setpoint(place, now);
     }
 
-    /// Takes a report. The relay has arrived across the line if `at` is long enough after the last change there.
+    /// Handles a position report, measured at time `at`. The relay has arrived at its lateral offset and altitude if
+    /// `at` is long enough after their last change.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
         self.still |= at >= self.turned + self.config.lag
             && self.is_near(place.cross_section(), self.cross_section());
@@ -262,7 +269,7 @@ impl Own {
         }
     }
 
-    /// Returns true if `is` equals `to_be` within the hover error.
+    /// Returns true if lateral offset and altitude of `is` and `to_be` agree within the hover error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
@@ -272,7 +279,7 @@ impl Own {
         self.setpoint.unwrap_or_default().cross_section()
     }
 
-    /// Returns true if the setpoint across the line is the agreed one.
+    /// Returns true if the setpoint has the agreed lateral offset and altitude.
     #[inline(never)] // called from several places
     pub(super) fn has_agreed_cross_section(&self) -> bool {
         self.target
@@ -287,7 +294,7 @@ impl Own {
         self.goal_of(self.node, self.target_m())
     }
 
-    /// Returns the current goal of `node` along x, m, for its agreed `target_m`.
+    /// Returns the current goal of `node` along x, m: `target_m`, or its place in an open chain.
     pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
         if self.open {
             self.config.open_place(node, target_m)
@@ -296,7 +303,7 @@ impl Own {
         }
     }
 
-    /// Returns true if positions with this step are closer along x than the separation.
+    /// Returns true if two positions `step_m` apart along x are closer than the separation.
     pub(super) fn is_close(&self, step_m: f32) -> bool {
         step_m < self.config.separation_m - self.config.rounding()
     }

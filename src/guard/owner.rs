@@ -7,29 +7,30 @@ use crate::place::CrossSection;
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Owner's state of a fence: the one toward Rx.
+/// State of the fence plane toward Rx: this relay places it, the neighbour downstream stays beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence, 0 before the first.
+    /// Number of the newest fence plane that this relay has announced, 0 before the first.
     number: u16,
-    /// x of the newest fence, m; infinite before the first.
+    /// x of the newest fence plane that this relay has announced, m; infinite before the first.
     fence_m: f32,
-    /// Requested step, m; infinite for the separation.
+    /// Distance along x that this relay requests to keep from the fence plane, m; infinite before any.
     asked_m: f32,
-    /// Step along x to which the neighbour has agreed, m, or a larger limit of this relay.
+    /// Distance along x to which the neighbour has agreed, m. A larger one that this relay requests replaces it at
+    /// once. Infinite stands for the separation.
     granted_m: f32,
-    /// Smallest x at which the neighbour stays for certain, m; negative infinity before its first message.
+    /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     counted_m: f32,
-    /// Agreed x of the neighbour, m.
+    /// Agreed x of the neighbour downstream, m.
     target_m: f32,
-    /// Neighbour's position across the line, and true if the neighbour has arrived at that position.
+    /// Lateral offset and altitude of the neighbour's setpoint; `still` is true once it has arrived there.
     across: CrossSection,
     still: bool,
-    /// True if the neighbour has received the newest fence.
+    /// True if the neighbour has received the newest fence plane.
     answered: bool,
-    /// True once the neighbour has cleared the first fence.
+    /// True once the neighbour has reported that it is beyond a fence plane.
     clear: bool,
 }
 
@@ -51,7 +52,7 @@ impl FenceOwner {
         }
     }
 
-    /// Replaces the neighbour; 0 for none.
+    /// Replaces the neighbour downstream by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
             self.keep_out.disorder();
@@ -60,8 +61,8 @@ impl FenceOwner {
         self.association.node = node;
     }
 
-    /// Starts a new association; the limit because of the previous neighbour remains in `keep_out`. If that neighbour was never
-    /// heard, the limit is this relay's position.
+    /// Starts a new association (session). The limit of x because of the previous neighbour remains in `keep_out`. If
+    /// that neighbour was never heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -79,8 +80,8 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. Its limits do not apply to
-    /// manual flight.
+    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The limits along x
+    /// do not apply to manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -89,7 +90,8 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association because the line has changed. Lost relays are kept, unflown drones are not.
+    /// Starts a new association because the line from Tx to Rx has changed. Lost relays remain obstacles, unflown
+    /// drones do not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -98,8 +100,8 @@ impl FenceOwner {
         };
     }
 
-    /// Handles a neighbour that is no longer flown: this relay comes no nearer to it. If the two were in order, it is otherwise
-    /// free.
+    /// Handles a notice that the neighbour downstream does not follow setpoints any more. This relay comes no nearer
+    /// to it. If the order of the two along x was right, this side sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -116,7 +118,7 @@ impl FenceOwner {
         self.association.heard != 0
     }
 
-    /// Returns true if there is no neighbour, or the neighbour has a larger x than this relay.
+    /// Returns true if no flown neighbour is downstream, or if its x is known to be beyond this relay's.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour()
@@ -137,9 +139,10 @@ impl FenceOwner {
 
     /// Returns true if the neighbour is known to be beyond this relay along x.
     ///
-    /// Each report has an error of up to `hover_m`. Before the first fence is cleared, two relays whose reports are closer than
-    /// the errors along x are in order only if they may pass each other: they are then the separation apart across the line. A
-    /// pair that was in order may have moved by the errors once more since then, each time that one of them halts or is rebooted.
+    /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence plane, two relays
+    /// whose reports are closer than the errors along x are in order only if they may pass each other: lateral offset
+    /// and altitude then keep them the separation apart. A pair that was in order may have moved by the errors once
+    /// more since then, each time that one of them halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
@@ -151,7 +154,8 @@ impl FenceOwner {
         self.counted_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x of this relay and relays beyond it, m. These relays are in order only by the error of the reports.
+    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream is lower only by the
+    /// errors of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.counted_m < low_m - 2.0 * own.config.rounding();
@@ -162,13 +166,15 @@ impl FenceOwner {
         }
     }
 
-    /// Returns this relay's distance from `counted_m`, m. `taken_m` is the distance that the follower allows the relay upstream.
+    /// Returns the distance along x that this relay keeps from the neighbour downstream, m. `taken_m` is the distance
+    /// agreed with the neighbour upstream; the two distances add up to at least the separation.
     pub(super) fn apart(&self, own: &Own, taken_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.granted_m.max(separation_m - taken_m).min(separation_m)
     }
 
-    /// Returns the minimum distance to the relay downstream, m. 0 near a lost one, and before the first fence is cleared.
+    /// Returns the distance along x to the relay downstream that is certain, m. It is 0 near a lost relay, and until
+    /// the neighbour is beyond the first fence plane. `taken_m` is the distance agreed with the neighbour upstream.
     pub(super) fn kept_distance(&self, own: &Own, taken_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -178,7 +184,8 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the positions across the line must not change, because they may separate the two.
+    /// Returns true if the distance along x is below the separation. Lateral offset and altitude then must not
+    /// change, because they may separate the two relays.
     pub(super) fn holds(&self, own: &Own) -> bool {
         self.asked_m.min(self.granted_m) < own.config.separation_m
     }
@@ -231,7 +238,7 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the largest allowed x, m, at the distance `apart` from the neighbour.
+    /// Returns the largest allowed x, m, that keeps the distance `apart` from the neighbour, m.
     #[inline(never)] // called from several places
     pub(super) fn most(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
@@ -245,30 +252,31 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Returns true if this side allows a move across the line.
+    /// Returns true if nothing downstream forbids this relay to change its lateral offset or altitude.
     pub(super) fn is_clear(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.holds(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the neighbour may have been too close since the start.
+    /// Returns true if the neighbour downstream may still be closer than the separation after a start. It has
+    /// answered, but has not reported yet that it is beyond a fence plane.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
 
-    /// Returns true if the agreed positions are closer along x than the separation.
+    /// Returns true if the agreed x of this relay and the downstream relay are closer than the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the neighbour has received and cleared the newest fence.
+    /// Returns true if the neighbour has received the newest fence plane and reported that it is beyond it.
     pub(super) fn is_agreed(&self) -> bool {
         self.clear && self.answered && self.counted_m >= self.fence_m
     }
 
-    /// Returns the best step, m. Below the separation only if both have arrived across the line and the agreed positions are that
-    /// close.
+    /// Returns the distance along x that the agreed positions need, m. It is below the separation only if both relays
+    /// have arrived at their lateral offsets and altitudes and the agreed positions are that close.
     fn best_apart(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -281,7 +289,9 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the best current x of the fence, m, its step, and true if that is final. `None` if there may be no fence.
+    /// Returns the best x of the fence plane now, m, the step to request, m, and true if the x is final. `None` if
+    /// the neighbour is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays
+    /// upstream, m.
     #[inline(never)] // called from several places
     fn proposed_fence(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -305,7 +315,8 @@ impl FenceOwner {
         Some((goal.max(nearest), ask, goal >= nearest))
     }
 
-    /// Schedules a message after a move of the setpoint. At once for a final fence, otherwise at the next reminder.
+    /// Schedules a message if the best position of the fence plane has changed. A final one is sent at once. While
+    /// this relay moves, another one waits for the next reminder.
     pub(super) fn settle(&mut self, own: &Own, taken_m: f32, upstream_m: f32) {
         if let Some((x_m, ask, last)) = self.proposed_fence(own, taken_m, upstream_m) {
             let stays = last || own.reachable.is_still();
@@ -318,7 +329,8 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (ask - asked).abs() > 0.0
     }
 
-    /// Returns the pending message. The fence only moves here, so that an unsent fence uses no number.
+    /// Returns the pending message to the neighbour downstream. The fence plane moves only here and if `moves` is
+    /// true, so an unsent fence uses no number.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

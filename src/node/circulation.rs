@@ -30,53 +30,55 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a pass on which relays compute. Its frames are twice as long, and each relay may take thirty work
-/// portions.
+/// Factor on the wait for a reply if the relays on the way compute. The frames are then twice as long, and each relay
+/// may take thirty work portions.
 const SLOW: u32 = 4;
 
-/// Maximum of the exponent n in the wait of 2 << n hop times between retransmissions: eight hop times.
+/// Maximum exponent n of the wait between retransmissions, 2 << n hop times: at most eight hop times.
 const LOG_MOST: u32 = 2;
 
-/// Hop times until the first retransmission on a lossy channel. In this time the neighbour has also replied to a duplicate.
+/// Wait before the first retransmission on a lossy channel, in hop times. In this time the neighbour has also replied
+/// to a duplicate.
 const SOON: u32 = 4;
 
 /// Number of messages after a loss for which the channel counts as lossy.
 const MEMORY: u8 = 8;
 
-/// Progress of a message at one relay.
+/// Progress of a message along the chain, as seen by one relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Stage {
-    /// No message, or this relay has not forwarded it yet.
+    /// No message is known, or this relay has not forwarded it yet.
     Idle,
-    /// Forwarded or about to be; its result is not known yet.
+    /// The message has been forwarded, or is about to be; its result is not known yet.
     Outstanding,
-    /// The result is known.
+    /// The result of the message is known.
     Completed,
-    /// Cancelled after sending; its times are no sign of life. Otherwise like `Completed`.
+    /// The message was cancelled after sending. This is like `Completed`, but its times are not used as a sign of
+    /// life of a neighbour.
     Cancelled,
 }
 
-/// A reply to the previous relay.
+/// Reply to the previous relay on the message's way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Reply {
-    /// The result.
+    /// The message has completed; the reply contains its result.
     Result,
     /// The message was received, and its result is not known yet.
     InProgress,
 }
 
-/// The path between this relay and the relay that replies.
+/// Path between this relay and the relay that replies, to compute the wait for the reply.
 #[derive(Clone, Copy)]
 pub(crate) struct Path {
-    /// Time of one hop.
+    /// Duration of one hop: transmission and handling of one frame.
     pub(crate) hop_time: Duration,
     /// Number of hops.
     pub(crate) hops: u16,
-    /// True if relays compute before they forward.
+    /// True if the relays on the path compute before they forward the message.
     pub(crate) slow: bool,
 }
 
-/// Part of one relay in a message that travels along the chain and in its result.
+/// State of one relay for a message that travels along the chain, and for the reply that comes back.
 #[derive(Clone, Debug)]
 pub(crate) struct Circulation {
     stage: Stage,
@@ -84,7 +86,7 @@ pub(crate) struct Circulation {
     completed_at: Instant,
     is_forward_due: bool,
     reply_due: Option<Reply>,
-    /// Retransmissions since a neighbour replied last.
+    /// Number of retransmissions since the next relay replied last.
     retries: u8,
     /// True once the next relay has replied that it has the message.
     is_received: bool,
@@ -92,14 +94,14 @@ pub(crate) struct Circulation {
     is_lossy: bool,
     /// Number of further messages during which the channel still counts as lossy.
     lossy_messages: u8,
-    /// Remaining repetitions of the reply without a request for it.
+    /// Number of times that the reply is still repeated without a request, on a lossy channel.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
 }
 
 impl Circulation {
-    /// Creates an idle circulation; `seed` sets the random part of its waits.
+    /// Creates the state of a relay that has no message yet; `seed` sets the random part of the waits.
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             stage: Stage::Idle,
@@ -117,7 +119,7 @@ impl Circulation {
         }
     }
 
-    /// Returns a message at `stage` without times, for models that leave time out.
+    /// Returns the state of a message at `stage` without times, for model checks that leave time out.
     #[cfg(test)]
     pub(crate) const fn at_stage(stage: Stage) -> Self {
         Self {
@@ -131,12 +133,12 @@ impl Circulation {
         self.stage
     }
 
-    /// Returns true while the result is awaited.
+    /// Returns true while the result of the message is awaited.
     pub(crate) const fn is_outstanding(&self) -> bool {
         matches!(self.stage, Stage::Outstanding)
     }
 
-    /// Returns the time at which this relay had the message to forward.
+    /// Returns the time at which this relay received or created the message; `None` without a message.
     pub(crate) const fn started_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Outstanding | Stage::Completed => Some(self.started_at),
@@ -144,7 +146,7 @@ impl Circulation {
         }
     }
 
-    /// Returns the time at which this relay knew the result; `None` before.
+    /// Returns the time at which this relay knew the result of the message; `None` before.
     pub(crate) const fn completed_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Completed => Some(self.completed_at),
@@ -152,7 +154,7 @@ impl Circulation {
         }
     }
 
-    /// Forwards a new message.
+    /// Starts a new message at this relay: schedules its forwarding to the next relay.
     pub(crate) const fn start(&mut self, now: Instant) {
         self.stop(Stage::Outstanding);
         self.started_at = now;
@@ -163,7 +165,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Replies with the result, over `path` to the initiator. The initiator itself is no hop away and has nobody to reply to.
+    /// Completes the message, and schedules the reply with its result. `path` leads to the initiator. It has no hops
+    /// at the initiator itself, which sends no reply.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -177,12 +180,13 @@ impl Circulation {
         self.stop(Stage::Completed);
     }
 
-    /// Gives the message up.
+    /// Gives the message up, as if this relay had never had it.
     pub(crate) const fn withdraw(&mut self) {
         self.stop(Stage::Idle);
     }
 
-    /// Completes the message without a result, and forgets its times. No later message is a sign of life by them.
+    /// Cancels the message: it counts as completed without a result, and its times are forgotten. A later message
+    /// then cannot be taken for a sign of life that answers it.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -196,7 +200,7 @@ impl Circulation {
         self.timer = None;
     }
 
-    /// Handles a retransmission of the current message by the previous relay. The initiator is `path` hops away.
+    /// Handles a retransmission of the current message by the previous relay. `path` leads to the initiator.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if matches!(self.stage, Stage::Completed | Stage::Cancelled) {
@@ -211,14 +215,14 @@ impl Circulation {
         }
     }
 
-    /// Handles the next relay's reply that the message is in progress.
+    /// Handles the next relay's reply that the message is in progress. `path` leads to the last relay.
     pub(crate) fn on_in_progress(&mut self, now: Instant, path: Path) {
         self.retries = 0;
         self.is_received = true;
         self.await_result(now, path);
     }
 
-    /// Schedules the message once more, if its result is awaited: a neighbour can be reached again.
+    /// Schedules the message again if its result is awaited, because the next relay can be reached again.
     pub(crate) const fn resend(&mut self) {
         self.is_forward_due |= self.is_outstanding();
     }
@@ -228,7 +232,8 @@ impl Circulation {
         core::mem::take(&mut self.is_forward_due) && self.is_outstanding()
     }
 
-    /// Starts the retransmission timer of a message forwarded at `now`. The last relay is `path` hops away.
+    /// Starts the retransmission timer of a message forwarded at `now`. `path` leads to the last relay, from which
+    /// the result comes.
     pub(crate) fn await_result(&mut self, now: Instant, path: Path) {
         let round_trip = (2 * u32::from(path.hops) + 2) * if path.slow { SLOW } else { 1 };
         let hops = match self.retries {
@@ -260,7 +265,8 @@ impl Circulation {
         self.timer = is_left.then(|| now + self.jitter.spread(hop_time.times(SOON)));
     }
 
-    /// Schedules what the timer is for. Returns true if the message is retransmitted.
+    /// Schedules a retransmission or a repeated reply once the timer has expired. Returns true for a retransmission
+    /// of the message.
     pub(crate) fn handle_timeout(&mut self, now: Instant, hop_time: Duration) -> bool {
         if self.timer.is_none_or(|at| at > now) {
             return false;
@@ -296,7 +302,7 @@ pub(crate) struct LateMessages(u8);
 impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
-    /// Counts a late message; returns true if there are too many, and starts again from zero.
+    /// Counts a message with an old number. Returns true if there are too many, and starts again from zero.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;
@@ -322,7 +328,7 @@ mod tests {
 
     const START: Instant = Instant::from_millis(1_000);
 
-    /// Sends a new message at `now`.
+    /// Starts a message at `now` and sends it.
     fn send(circulation: &mut Circulation, now: Instant) {
         circulation.start(now);
         assert!(circulation.poll_forward());
@@ -335,7 +341,7 @@ mod tests {
         circulation
     }
 
-    /// Hop times from `now` until the timer expires.
+    /// Returns the number of hop times from `now` until the timer expires.
     fn wait(circulation: &Circulation, now: Instant) -> u64 {
         let at = circulation.next_timeout().unwrap();
         at.since(now).as_micros() / HOP.as_micros()
@@ -345,7 +351,7 @@ mod tests {
         u64::from(hops)..=u64::from(hops + hops / 8)
     }
 
-    /// Lets the timer expire `times` times. Returns the time of the last one.
+    /// Lets the retransmission timer expire `times` times. Returns the time of the last expiry.
     fn expire(circulation: &mut Circulation, mut now: Instant, times: u32) -> Instant {
         for _ in 0..times {
             now = circulation.next_timeout().unwrap();

@@ -10,22 +10,22 @@ use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// Active mission, with the number of relays of the view.
+    /// Active mission; its number of relays is that of the view (agreed set of members).
     pub(crate) mission: Mission,
-    /// Interference of the active mission, independent of the current estimate.
+    /// Interference that the active mission configures, independent of the current estimate.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
     /// Node number: 1 is the relay next to Tx.
     pub(crate) node: u16,
     /// Number of relays of the mission as loaded before flight.
     pub(crate) all: u16,
-    /// Digest of the mission as loaded.
+    /// Digest of the mission that was loaded before flight.
     pub(crate) digest: u16,
     /// Identifier of the active mission.
     pub(crate) active: MissionId,
-    /// Last accepted view.
+    /// Last accepted view (agreed set of members).
     pub(crate) view: ViewId,
-    /// Index in the view, from 1 next to Tx.
+    /// Index of this relay among the members of the view: 1 for the member next to Tx.
     pub(crate) index: u16,
 }
 
@@ -45,7 +45,8 @@ impl Member {
         }
     }
 
-    /// Returns the position from the leader, from 1, and the number of relays, before any view change.
+    /// Returns this relay's rank, counted from the leader with 1, and the number of relays. Both are those of the
+    /// loaded mission, before any view change.
     pub(crate) const fn place_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -54,22 +55,22 @@ impl Member {
         (place, self.all)
     }
 
-    /// Returns the digest of passes in the accepted view.
+    /// Returns the digest that messages of a pass bear: of the active mission and the accepted view.
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
     }
 }
 
-/// State that every layer receives.
+/// State of the relay that is passed to every protocol layer.
 #[derive(Clone, Copy)]
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// Newest mission that this relay has stored.
+    /// Identifier of the newest mission that this relay has stored.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last relay of a pass.
+    /// True if this relay is the last one on the way from the leader: it has no next neighbour.
     pub(crate) end: bool,
-    /// Remaining time of other relays' leases.
+    /// Remaining time of the leases of other relays.
     pub(crate) other_leases: OtherLeases,
 }
 
@@ -90,7 +91,8 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if the joint method is selected and has a choice of cross-sections.
+    /// Returns true if relays optimise their positions jointly. This requires the joint method, and a choice of
+    /// lateral offset or altitude.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let free = !(config.band.is_single() && config.lateral.is_single());
@@ -110,7 +112,7 @@ impl<'a> Context<'a> {
         self.mission().after(self.index()).is_none()
     }
 
-    /// Returns the path from this relay to the last relay of the view.
+    /// Returns the number and duration of the hops from this relay to the last relay of the view.
     pub(crate) fn path_to_last(&self) -> Path {
         let mission = self.mission();
         self.path(match mission.heading() {
@@ -119,7 +121,7 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Returns the path from this relay to the leader.
+    /// Returns the number and duration of the hops from this relay to the leader.
     pub(crate) fn path_to_leader(&self) -> Path {
         let relays = self.mission().relays();
         self.path(
@@ -143,7 +145,7 @@ impl<'a> Context<'a> {
         (0.0..=self.mission().config().distance_m).contains(&place.x_m)
     }
 
-    /// Returns the allowed altitudes, m, of this relay at `altitude_m`.
+    /// Returns the altitudes, m, that this relay may take: only `altitude_m` if it holds its altitude.
     pub(crate) fn band(&self, altitude_m: f32) -> Band {
         if self.settings().hold_altitude {
             Band::at(altitude_m)
@@ -156,9 +158,10 @@ impl<'a> Context<'a> {
 /// Remaining leases of other relays, as far as this relay knows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Longest lease of members of this relay's view that rely on this relay.
+    /// Longest remaining time for which members of this relay's view may rely on this relay.
     pub(crate) lease_left: Duration,
-    /// Accepted view, and the longest lease of members of earlier views. `None` if a member may not have accepted `view`.
+    /// Last accepted view. `rest` is the longest remaining lease of earlier views; `None` if a member may not have
+    /// accepted `view`.
     pub(crate) view: ViewId,
     pub(crate) rest: Option<Duration>,
 }
@@ -171,7 +174,8 @@ impl OtherLeases {
         rest: Some(Duration::from_micros(0)),
     };
 
-    /// Returns the wait for leases of views before `view`, in tenths of a second.
+    /// Returns the time until all leases of views before `view` have expired, in tenths of a second. `u16::MAX` if it
+    /// is not known.
     pub(crate) fn rest_of(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
@@ -182,7 +186,7 @@ impl OtherLeases {
     }
 }
 
-/// Effects of one layer on the other layers.
+/// Results of one protocol layer's work that concern other layers or the firmware.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is one thing that happened or did not"
@@ -193,15 +197,15 @@ pub(crate) struct Effects {
     pub(crate) ignored: Option<Ignored>,
     /// True if a message was retransmitted.
     pub(crate) resent: bool,
-    /// True if a pass or a proposal has started at this relay.
+    /// True if this relay has started a pass or a view proposal.
     pub(crate) began: bool,
-    /// True if a new view is needed.
+    /// True if a new view (agreed set of members) is needed.
     pub(crate) view_needed: bool,
-    /// Neighbour that was alive at this time or later, by its reply.
+    /// Neighbour that has replied to a message, and the time of that message: it was alive then or later.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the proposal that was received or made.
+    /// Origin of the view proposal that was received or made.
     pub(crate) proposed_by: Option<Proposer>,
-    /// True if a proposal is outstanding: no pass continues before its decision.
+    /// True if a view proposal is outstanding: no pass continues before its decision.
     pub(crate) view_proposed: bool,
     pub(crate) news: Option<LayerEvent>,
     /// Changes of the interference estimate and of the faulty receivers.
@@ -215,51 +219,51 @@ pub(crate) enum Ignored {
     Duplicate,
 }
 
-/// Neighbour on the path of passes.
+/// Neighbour, named by the direction from the leader to the last relay: next or previous.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Peer {
     Next,
     Previous,
 }
 
-/// Result of a layer for the other layers or the firmware.
+/// Result of one protocol layer for the other layers or the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
-    /// The chain has agreed on a target.
+    /// The chain has agreed on its positions.
     Converged,
-    /// The leader has found no feasible target.
+    /// The leader has found no feasible target SIR.
     Infeasible,
-    /// The lease has expired.
+    /// The lease of the last agreement has expired.
     Lapsed,
-    /// A request for a view is due to the neighbour toward the leader.
+    /// A request for a new view is due, to the neighbour toward the leader.
     RequestView,
-    /// A proposal is decided.
+    /// A view proposal has been decided.
     ProposalDecided(ProposalOutcome),
 }
 
-/// Results of sensing.
+/// Changes that new measurements of the interference have caused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sensed {
     /// The interference estimate has changed.
     pub(crate) new_estimate: bool,
-    /// The measurements do not fit a single source.
+    /// The measurements do not fit a single source of interference.
     pub(crate) unclear: bool,
     /// Node whose measurements do not fit the other nodes' measurements.
     pub(crate) off: Option<u16>,
 }
 
-/// Decision on a proposal.
+/// Decision on a view proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum ProposalOutcome {
-    /// Accepted: a view of `relays` relays, whose positions may be used in `usable_in` tenths of a second.
+    /// Accepted: the view has `relays` members. Its positions may be used in `usable_in` tenths of a second.
     Granted { relays: u16, usable_in: u16 },
-    /// Superseded: an earlier view was decided, which the leader's next proposal follows.
+    /// Superseded: an earlier view was decided, and the leader's next proposal has to follow that view.
     Superseded,
-    /// Rejected: no quorum.
+    /// Rejected: too few relays are reachable for a quorum.
     NoQuorum,
 }
 
-/// Origin of a proposal at this relay.
+/// Origin of a view proposal: this relay itself, or the neighbour that sent it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Proposer {
     Itself,
@@ -293,7 +297,7 @@ impl Effects {
         ..Self::NONE
     };
 
-    /// Effects of a message that cannot be joined: a new view is needed.
+    /// Effects of a message of a view in which this relay cannot take part: a new view is needed.
     pub(crate) const FOREIGN: Self = Self {
         view_needed: true,
         ..Self::STALE
@@ -306,7 +310,7 @@ impl Effects {
         }
     }
 
-    /// Adds the origin of a proposal.
+    /// Returns the effects with the origin of a view proposal.
     pub(crate) const fn by(self, proposer: Proposer) -> Self {
         Self {
             proposed_by: Some(proposer),
@@ -315,7 +319,7 @@ impl Effects {
     }
 }
 
-/// Pause between two portions of a computation, so that the caller's loop can run.
+/// Pause between two portions of a long computation, so that the caller's loop can run.
 pub(crate) const PAUSE: Duration = Duration::from_micros(250);
 
 /// Maximum duration of a lease, as a multiple of `dead_after`.
@@ -326,7 +330,7 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(LONGEST)
 }
 
-/// Returns the maximum round trip of the first pass through `all` relays with half of the frames lost.
+/// Returns the longest round trip of the first pass through `all` relays with half of the frames lost.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

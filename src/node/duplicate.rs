@@ -54,82 +54,88 @@ use crate::wire::message::Claim;
 pub(crate) enum Sender {
     /// The frame is this relay's own.
     Itself,
-    /// Another node, which has not stated its claim number; with a key, perhaps a forger.
+    /// Another node, whose claim to the index is not known; with signed frames perhaps a forger.
     Unknown,
-    /// Another node, with its claim to this relay's number.
+    /// Another node, with its claim to this relay's index.
     Rival(Rival),
 }
 
-/// The claim of another node to this relay's number.
+/// Claim of another node to this relay's index.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
     /// True if the claim has a newer epoch than this relay; false if it has the same epoch.
     pub(crate) newer_epoch: bool,
-    /// True if its sender is passive.
+    /// True if the other node is passive: it has no setpoint and takes part in nothing.
     pub(crate) passive: bool,
-    /// True if the claim was sent after this relay's start, as this relay's claim in it or a key proves.
+    /// True if the claim is known to be sent after this relay's start. It names this relay's claim number, or a key
+    /// proves it.
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a lease sets in its claim number to keep its position.
+/// Bit that a relay with a position sets in its claim number, to win against a later node.
 pub(crate) const RAISED: u32 = 1 << 31;
 
-/// Wait before the first unprompted claim; each further interval is twice the previous one.
+/// Wait before the first unprompted claim to this relay's index. Each further interval is twice the previous one.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start before unprompted claims begin: a hundred relays have agreed by `align`.
+/// Time from the start until unprompted claims begin. A hundred relays take about as long to agree.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum interval between unprompted claims, before they continue every `dead_after`.
+/// Maximum interval between the first unprompted claims. Later ones follow every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims, [`least_interval`] apart, after a claim of an active node to the same index.
+/// Number of claims, [`least_interval`] apart, that answer an active node's claim to the same index.
 const DEFENCES: u8 = 32;
 
-/// Number of claims after a frame with this index that is no claim, or after raising one with a key.
+/// Number of claims after a frame from another node with this index that is no claim.
+///
+/// With a key it is the number of claims after this relay has raised its claim number.
 const QUESTIONS: u8 = 8;
 
-/// Returns the minimum interval between claims. The claims of two relays and their echoes leave room on the channel.
+/// Returns the minimum interval between claims to this relay's index. Claims of two relays and their echoes do not
+/// fill the channel then.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Returns the interval between claims of a passive relay. Many fit into the time after which it becomes active.
+/// Returns the interval between claims of a passive relay to its index, a quarter of `probe_after`. Many claims fit
+/// into the time after which it becomes active.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
 
-/// Claims of this relay to its index, and the other node that uses it.
+/// State of this relay's claims to its index, and of another node that uses the same index.
 #[derive(Clone, Debug)]
 pub(crate) struct IndexClaims {
     number: u32,
-    /// Largest claim number of another node of this epoch.
+    /// Largest claim number received from another node with this index and epoch.
     rival: u32,
-    /// Claim number received last.
+    /// Claim number of the other node with this index, as received last; 0 before any.
     heard: u32,
-    /// Time when another node with this index was received last. True if this relay had a position when it was received first.
+    /// Time of the last frame of another node with this index. The flag is true if this relay had a position when it
+    /// received the first one.
     contest: Option<(Instant, bool)>,
-    /// Times when a duplicate of the own index, and of a neighbour's, was last observed.
+    /// Last times at which a duplicate of the own index, and of a neighbour's index, was observed.
     observed: [Option<Instant>; 2],
-    /// Time when this relay last received a frame of its own.
+    /// Time when this relay last received a frame that it had sent itself.
     echoed: Option<Instant>,
     /// Time when a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next unprompted claim, and the interval that follows it.
+    /// Time of the next unprompted claim to this index. `interval` is the time from there to the one after it.
     next_claim: Option<Instant>,
     interval: Duration,
-    /// Remaining claims because of an active node with this index.
+    /// Number of claims still to send because another active node uses this index.
     defences: u8,
-    /// Earliest time of the next claim.
+    /// Earliest time of the next claim to this index.
     quiet_until: Instant,
     claim_due: bool,
-    /// True once new sessions are due, with the current claim number.
+    /// True if all sessions with other nodes must be restarted under the current claim number.
     sessions_due: bool,
     jitter: Jitter,
 }
 
-/// Index that two nodes use.
+/// Index that two nodes use: this relay's own, or that of a neighbour.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Duplicated {
     Own,
@@ -197,7 +203,7 @@ impl IndexClaims {
         self.heard
     }
 
-    /// Returns true if this relay had a position before it first received the other node.
+    /// Returns true if this relay has held a position since before it first received the other node.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -235,7 +241,7 @@ impl IndexClaims {
         false
     }
 
-    /// Compares claims; returns true if the relay becomes passive.
+    /// Compares the claim of another node with this relay's. Returns true if this relay becomes passive.
     fn compare(
         &mut self,
         now: Instant,
@@ -278,7 +284,7 @@ impl IndexClaims {
         true
     }
 
-    /// Schedules a claim unless one was sent recently.
+    /// Schedules a claim to this relay's index, unless one was sent recently.
     fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);
@@ -286,7 +292,7 @@ impl IndexClaims {
         }
     }
 
-    /// Sends claims until `rival` is passive.
+    /// Schedules repeated claims to this relay's index, for some time or until `rival` is passive.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {
@@ -302,8 +308,8 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts the unprompted claims on links without a key, and those of a defence. A shared channel needs none, because any frame
-    /// of the other node is received directly.
+    /// Starts the unprompted claims: those on links without a key, and those that answer another node. A shared
+    /// channel needs no others, because any frame of the other node is received directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -315,12 +321,12 @@ impl IndexClaims {
         self.passive_until.is_some()
     }
 
-    /// Returns true if a claim is due, and marks it as sent.
+    /// Returns true if a claim to this relay's index is due, and marks it as sent.
     pub(crate) const fn poll_claim(&mut self) -> bool {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns the claim number with which all sessions must restart, if that is due.
+    /// Returns the claim number with which all sessions must be restarted; `None` if that is not due.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }
@@ -357,7 +363,7 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Removes the other node, which is gone; returns true if this relay becomes active.
+    /// Handles the report that the other node with this index is gone. Returns true if this relay becomes active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {
@@ -405,7 +411,8 @@ mod tests {
         }
     }
 
-    /// A claim sent before this relay's restart names its previous claim number. It does not answer this start.
+    /// A claim that names another claim number than this relay's was sent before its last start. Such a claim is
+    /// answered and has no other effect.
     #[test]
     fn a_claim_that_does_not_answer_this_start_is_answered_and_has_no_other_effect() {
         let settings = Settings::default();
@@ -437,7 +444,8 @@ mod tests {
         }
     }
 
-    /// Checks the rows of the state table for claims. Every order, lease, epoch and state of the other node.
+    /// Checks the rows of the state table for claims. It tries every order of the claim numbers, and every lease,
+    /// epoch and state of the other node.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();
@@ -475,7 +483,8 @@ mod tests {
         }
     }
 
-    /// Checks that of two relays that hold a lease only one is active after at most three claims.
+    /// Checks that only a relay that had a position before it received the other one raises its claim. 40 s later the
+    /// other one counts as received for the first time again.
     #[test]
     fn a_relay_that_was_placed_after_it_received_the_other_one_does_not_raise_its_claim() {
         let settings = Settings::default();
@@ -570,8 +579,8 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// Checks that a relay claims its index after a claim of an active node. It does so for four seconds, or until that node is
-    /// passive.
+    /// Checks that a relay repeats its claim to its index after a claim of an active node. It does so for four
+    /// seconds, or until that node is passive.
     #[test]
     fn a_number_is_defended_for_four_seconds_or_until_the_other_is_passive() {
         let settings = Settings::default();

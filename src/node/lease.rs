@@ -39,17 +39,17 @@ use crate::wire::message::{Message, Pulse, Pulsed};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// State without an agreement in this view, or with one that is not known to all members.
+    /// No lease yet: there is no agreement in this view, or not all members are known to have it.
     Open,
     Until(Instant),
     Lapsed,
 }
 
-/// Last renewal that this relay took part in.
+/// Last lease renewal that this relay took part in.
 #[derive(Clone, Copy, Debug)]
 struct Current {
     number: u16,
-    /// Duration of the lease, in tenths of a second.
+    /// Duration of the lease that the renewal grants, in tenths of a second.
     span: u16,
 }
 
@@ -67,9 +67,9 @@ pub(crate) struct Lease {
     is_whole: bool,
     /// True once this relay has agreed on its position in this view.
     is_agreed: bool,
-    /// Start of the next renewal at the leader.
+    /// Time at which the leader starts the next lease renewal; `None` if none is due.
     next_at: Option<Instant>,
-    /// Slowly decaying maximum of recent round trips of renewals.
+    /// Slowly decaying maximum of recent round trips of lease renewals through the chain.
     slowest: Duration,
     circulation: Circulation,
 }
@@ -95,7 +95,8 @@ impl Lease {
         }
     }
 
-    /// Allows for a view before the restart. Other members may rely on this relay for the longest possible lease.
+    /// Extends the time for which other members may rely on this relay by the longest possible lease. They may hold
+    /// such a lease of a view before this relay's restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }
@@ -108,12 +109,13 @@ impl Lease {
         }
     }
 
-    /// Returns true until this relay knows of an agreement in this view.
+    /// Returns true until the first lease of this view is granted.
     pub(crate) const fn is_open(&self) -> bool {
         matches!(self.state, LeaseState::Open)
     }
 
-    /// Returns the silence after which a neighbour may be lost. The span of the last renewal, at least `dead_after`.
+    /// Returns the silence after which a neighbour may be lost. It is the span of the last lease renewal, at least
+    /// `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let span = self.current.map_or(0, |current| current.span);
         from_tenths(span).max(settings.dead_after)
@@ -151,7 +153,7 @@ impl Lease {
         self.end();
     }
 
-    /// Ends the lease: there is no agreement until this relay agrees on its position in another view.
+    /// Ends the lease. There is none until this relay agrees on its position in another view.
     pub(crate) fn end(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
@@ -168,12 +170,13 @@ impl Lease {
         self.is_whole |= self.rest.0 != ViewId::LOADED;
     }
 
-    /// Returns true once all relays of the view are known to be in it.
+    /// Returns true once all relays of the view are known to have accepted it.
     pub(crate) const fn is_whole(&self) -> bool {
         self.is_whole
     }
 
-    /// Records this relay's agreement in the view. If it leads, all members have agreed, and the first renewal is scheduled.
+    /// Records that this relay has agreed on its position. At the leader all members have then agreed, and the first
+    /// lease renewal is scheduled.
     pub(crate) fn on_agreement(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
@@ -181,7 +184,7 @@ impl Lease {
         }
     }
 
-    /// Handles a renewal or its reply, received in this relay's view from the neighbour that may send it.
+    /// Handles a lease renewal or its reply. It is of this relay's view, from the neighbour that may send it.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         match message {
             Message::Pulse(pulse) => self.on_pulse(context, *pulse),
@@ -216,8 +219,9 @@ impl Lease {
         effects
     }
 
-    /// Extends the lease after all members took part in `pulse`, unless that lease has expired already. If `next`, the span of
-    /// the next renewal, is more than twice as long, the first spans were too short: the lease would expire before its renewal.
+    /// Extends the lease after all members took part in the renewal `pulse`, unless it has expired already. If
+    /// `next`, the span of the next renewal, is more than twice as long, the first spans were too short: the lease
+    /// would expire before its renewal.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -242,7 +246,8 @@ impl Lease {
         }
     }
 
-    /// Completes the current renewal.
+    /// Completes the current lease renewal and schedules the reply. The leader extends its own lease and schedules
+    /// the next renewal.
     fn complete_renewal(&mut self, context: &Context<'_>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
@@ -280,7 +285,7 @@ impl Lease {
         half.max(self.slowest.times(2).min(most)).max(PAUSE)
     }
 
-    /// Returns the span that the leader announces, in tenths of a second.
+    /// Returns the duration of the lease that the leader announces, in tenths of a second.
     fn announced_span(&self, settings: &Settings) -> u16 {
         let slow = self.slowest.times(3).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
@@ -311,7 +316,7 @@ impl Lease {
         }
     }
 
-    /// Handles the timers: next renewal at the leader, retransmission, expiry of the lease.
+    /// Handles the timers: next renewal at the leader, retransmission, and expiry of the lease.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let now = context.now;
         let hop_time = context.settings().hop_time;
@@ -334,7 +339,7 @@ impl Lease {
         }
     }
 
-    /// Returns the renewal to forward, if one is pending, and marks it as sent.
+    /// Returns the lease renewal to forward, if one is pending, and marks it as sent.
     pub(crate) fn poll_onward(&mut self, context: &Context<'_>) -> Option<Message> {
         let is_due = self.circulation.poll_forward();
         let current = self.current.filter(|_| is_due)?;
@@ -347,7 +352,7 @@ impl Lease {
         }))
     }
 
-    /// Returns the reply, if one is pending, and marks it as sent.
+    /// Returns the reply to a lease renewal, if one is pending, and marks it as sent.
     pub(crate) fn poll_back(&mut self, context: &Context<'_>) -> Option<Message> {
         let reply = self.circulation.poll_reply()?;
         let current = self.current?;
@@ -371,8 +376,8 @@ mod tests {
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
 
-    /// Returns the span announced 40 s after an unfinished renewal of view 1, tenths of a second. Just before, the leader has
-    /// accepted a view that follows view `base` and loses no relay.
+    /// Returns the span of the lease that the leader announces, in tenths of a second. A renewal of view 1 is
+    /// unfinished since 40 s, and the leader has just accepted a view that follows view `base` and loses no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

@@ -47,18 +47,18 @@ struct Asked {
     last: Instant,
 }
 
-/// State of the offers to the neighbour, and to the ground station, on one side.
+/// State of the mission offers to the neighbour, and to the ground station, on one side.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
     /// Number in the neighbour's last hello, which an answering offer repeats; 0 before any.
     nonce: u16,
-    /// Reception time of that hello.
+    /// Time at which the neighbour's last hello was received; `None` before any.
     heard: Option<Instant>,
-    /// True if an offer is pending.
+    /// True if an offer of a mission to the neighbour is pending.
     is_due: bool,
-    /// Time of the next repetition.
+    /// Time at which the offer to the neighbour is repeated; `None` if it is not.
     at: Option<Instant>,
-    /// Number of offers sent.
+    /// Number of offers sent since the last change of the mission or of the neighbour.
     tries: u8,
     /// True if a hello to the ground station is pending.
     reports: bool,
@@ -78,48 +78,49 @@ impl Offering {
     };
 }
 
-/// Result of an offered mission.
+/// Reaction to an offered mission.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offered {
-    /// Stored.
+    /// The mission is newer and has been stored.
     Stored,
-    /// Rejected: no valid line on earth, or outside the geofence; `is_new` for the first time.
+    /// The mission is rejected: no valid line on earth, or outside the geofence. `is_new` is true the first time that
+    /// this mission is rejected.
     Refused { why: LineError, is_new: bool },
-    /// Ignored: not newer, or for other relays.
+    /// The mission is ignored: not newer than the stored one, or for other relays.
     Passed,
 }
 
-/// Hop times until the first repetition of an offer.
+/// Time until the first repetition of a mission offer, in hop times.
 const OFFER_HOPS: u32 = 4;
-/// Number of offers after which the interval doubles.
+/// Number of mission offers after which the interval between them doubles.
 const OFFERS_AT_A_PACE: u8 = 4;
-/// Maximum number of repetitions.
+/// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;
 
 /// Missions known to one relay, and its offers to the neighbours.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
-    /// Newest stored mission.
+    /// Identifier of the newest stored mission.
     latest: MissionId,
-    /// State of the uploads; without the feature `upload` there is none.
+    /// State of the uploads: one element with the feature `upload`, none without it.
     uploads: [Uploads; UPLOAD as usize],
 }
 
-/// State that only relays with the feature `upload` have.
+/// State of mission uploads, which only relays with the feature `upload` have.
 #[derive(Clone, Copy, Debug)]
 struct Uploads {
     /// Upload of the newest stored mission; `None` for the one loaded before flight.
     upload: Option<Upload>,
-    /// Sites of the active mission if it has its own; positions are then along the line between them.
+    /// Sites of Tx and Rx of the active mission if it has its own; positions are then along their line.
     sites: Option<Sites>,
-    /// Distance and altitudes of the mission as loaded, m.
+    /// Distance from Tx to Rx of the mission loaded before flight, m. `loaded_band` is its range of altitudes.
     loaded_m: f32,
     loaded_band: Band,
-    /// Last mission refused by this relay or by one beyond a neighbour.
+    /// Identifier of the last mission that this relay, or one beyond a neighbour, has refused.
     refused: Option<MissionId>,
-    /// Current number of this relay's hellos, and the previous one.
+    /// Number that this relay's hellos bear now, and the previous one. A mission offer must contain one of them.
     asked: [Asked; 2],
-    /// Offers toward Tx and toward Rx.
+    /// State of the mission offers toward Tx and toward Rx.
     offering: [Offering; 2],
     jitter: Jitter,
 }
@@ -161,7 +162,7 @@ impl MissionUpdate {
         self.latest
     }
 
-    /// Returns mission `id` if it is the active or the stored one.
+    /// Returns the mission with the identifier `id` if it is the active or the stored one, else `None`.
     pub(crate) fn mission_of(&self, member: &Member, id: MissionId) -> Option<Mission> {
         if id == member.active {
             return Some(member.mission);
@@ -170,7 +171,7 @@ impl MissionUpdate {
         Mission::try_new(*upload.config()).ok()
     }
 
-    /// Returns the number for a hello sent now; 0 if uploads are not accepted.
+    /// Returns the number that a hello sent now bears; 0 if uploads are not accepted.
     pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
         let Some(uploads) = uploads.filter(|_| accepts_uploads(member)) else {
@@ -189,7 +190,8 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if `answer` is the number of a hello that was sent within the last two `dead_after`.
+    /// Returns true if `answer` is the number of a hello that this relay has sent recently. Recently means within
+    /// twice `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -212,14 +214,14 @@ impl MissionUpdate {
         }
     }
 
-    /// Schedules an offer at `side`.
+    /// Schedules an offer of the newest mission to the neighbour at `side`.
     pub(crate) fn schedule_offer(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.is_due = true;
         }
     }
 
-    /// Restarts the repetitions at `side`: there is a new mission or a new neighbour.
+    /// Starts the repetitions of offers at `side` again, for a new mission or a new neighbour.
     pub(crate) fn reset_offers(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.tries = 0;
@@ -275,7 +277,8 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules a hello to the ground station at `side`. If its hello `asks`, schedules the stored upload instead.
+    /// Schedules a hello to the ground station at `side` if it `reports` is true. With `asks`, the number of the
+    /// station's hello, schedules the stored upload.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -295,13 +298,13 @@ impl MissionUpdate {
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
-    /// Returns the refused mission, unless it is `active` or older than the stored mission.
+    /// Returns the last refused mission, unless it is `active` or older than the stored mission.
     pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
-    /// Records a neighbour's refusal; returns true if it is new and concerns the stored mission.
+    /// Records that a neighbour refuses a mission. Returns true if that is new and concerns the stored mission.
     pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
@@ -312,7 +315,7 @@ impl MissionUpdate {
         uploads.is_some_and(|uploads| uploads.refused.replace(id) != Some(id))
     }
 
-    /// Stores `upload` if it is for this relay and newer than the stored mission.
+    /// Stores `upload` if it is for this relay, allowed here and newer than the stored mission.
     pub(crate) fn store_if_newer(&mut self, member: &Member, upload: &Upload) -> Offered {
         let id = upload.id();
         if id <= self.latest {
@@ -354,7 +357,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Restores `upload` after a start, if the relay is still `untouched`; returns its mission.
+    /// Restores the mission `upload` after a start, if the relay is still `untouched`; returns the mission.
+    /// `untouched` is true before the first message.
     pub(crate) fn resume(
         &mut self,
         member: &Member,
@@ -384,7 +388,8 @@ impl MissionUpdate {
         self.upload().copied().filter(|_| older)
     }
 
-    /// Checks that `upload` is for this relay. Relays in a field accept none, even if the digest of the base matches.
+    /// Checks that this relay can use `upload`: base, line and geofence. Relays in a field of interference accept
+    /// none, even if the digest of the base matches.
     fn fits(&self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         let config = upload.config();
         let loaded = self.uploads().ok_or(UploadError::Base)?;
@@ -412,26 +417,28 @@ impl MissionUpdate {
     }
 }
 
-/// Line of the active mission.
+/// Methods for the line between Tx and Rx along which positions of the active mission are measured.
 impl MissionUpdate {
-    /// Returns the sites of the active mission, if it has its own.
+    /// Returns the geographic sites of Tx and Rx of the active mission, if it has its own.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.uploads()?.sites
     }
 
-    /// Returns the digest of the line of this relay's positions.
+    /// Returns the digest that identifies the line along which this relay's positions are measured.
     pub(crate) fn line_digest(&self, member: &Member) -> u16 {
         between(member.digest, self.sites())
     }
 
-    /// Adopts the sites of the stored mission; returns true if they differ, so that positions are void.
+    /// Adopts the sites of the stored mission as those of the active one. Returns true if they differ, so that
+    /// positions are void.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
         uploads.is_some_and(|uploads| core::mem::replace(&mut uploads.sites, sites) != sites)
     }
 
-    /// Returns the configured geofence, if any; it grows with the line of a mission with its own sites.
+    /// Returns the configured geofence, if any, fitted to the active mission. It grows along x with the line of a
+    /// mission that has its own sites.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.fence;
         if self.sites().is_some() {

@@ -13,11 +13,11 @@ use crate::sir::square;
 /// True with the feature `field`. Without it `Settings::measure` is rejected, and the code is unreachable.
 const FIELD: bool = cfg!(feature = "field");
 
-/// Measurement of a relay or of a ground end.
+/// Measurement of a relay or of a ground station, which the firmware passes to the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
-    /// Interference power at the setpoint, in a field.
+    /// Interference power at the setpoint of a relay, in a field of interference.
     Interference {
         /// Received power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
@@ -27,12 +27,12 @@ pub enum Sample {
     /// It is averaged until its relative error is that of [`Listen`](crate::sensing::Listen). It excludes the signals of the
     /// chain, and includes the receiver's noise, which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
-        /// Position of the drone: at most 100 D from the transmitter in each coordinate.
+        /// Position of the drone. Each coordinate is at most 100 times the distance from Tx to Rx away from Tx.
         at: Placement,
         /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
     },
-    /// Mean interference power at the ground transmitter; for relay 1, or any of the first four.
+    /// Mean interference power at the ground transmitter, for relay 1 or another of the first four relays.
     Transmitter {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
@@ -50,7 +50,7 @@ pub enum Sample {
 }
 
 impl Sample {
-    /// Returns true for measurements of the interferer, which need `Settings::listen`.
+    /// Returns true for measurements of an unknown interferer, which need `Settings::listen`.
     pub(crate) const fn is_heard(self) -> bool {
         matches!(
             self,
@@ -59,7 +59,7 @@ impl Sample {
     }
 }
 
-/// Interference measured at the setpoint, in a field.
+/// Meter of the interference at the setpoint, from samples in a field of interference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {
     estimator: Option<(Estimator, u32)>,
@@ -79,7 +79,7 @@ impl Meter {
         }
     }
 
-    /// Adds a sample; `at` is the setpoint of relay 1. Returns true if it was accepted.
+    /// Adds a sample; `at` is the setpoint of relay 1, `None` at other relays. Returns true if it was accepted.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,

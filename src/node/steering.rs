@@ -7,7 +7,7 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Time after which fence messages that may be lost are sent again.
+/// Interval after which messages to the neighbours about motion are repeated, as they may be lost.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
 /// True with the feature `guard`; without it no setpoint is limited.
@@ -23,7 +23,7 @@ pub(crate) struct Steering {
 }
 
 impl Steering {
-    /// State before [`begin`](Self::begin).
+    /// State before [`begin`](Self::begin): without a guard and a setpoint.
     pub(crate) const NONE: Self = Self {
         guard: None,
         remind_at: None,
@@ -47,7 +47,8 @@ impl Steering {
         self.guard.as_mut().filter(|_| GUARD)
     }
 
-    /// Moves the setpoint toward `agreed` as far as the guard allows at `now`. Returns true if it has changed.
+    /// Moves the setpoint toward the position `agreed` as far as the guard allows at `now`. Returns true if the
+    /// setpoint has changed.
     pub(crate) fn steer(&mut self, now: Instant, agreed: Option<Placement>) -> bool {
         if let Some(agreed) = agreed
             && let Some(guard) = self.guard()
@@ -81,14 +82,14 @@ impl Steering {
         }
     }
 
-    /// Handles a fence message of the neighbour `from` at `side`.
+    /// Handles a motion message (fence) of the neighbour `from` at `side`.
     pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) {
         if let Some(guard) = self.guard() {
             guard.hear(side, from, fence);
         }
     }
 
-    /// Schedules fence messages again that may be lost.
+    /// Schedules the motion messages (fences) to the neighbours again once the timer has expired.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.remind_at.is_some_and(|at| at <= now) {
             self.remind_at = None;
@@ -99,7 +100,7 @@ impl Steering {
         }
     }
 
-    /// Sets whether the drone flies to the setpoints from `now` on. Returns true if the guard did not know it.
+    /// Sets whether the drone flies to the setpoints from `now` on. Returns true if the guard did not know this.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -108,7 +109,7 @@ impl Steering {
         is_news
     }
 
-    /// Changes the line of the positions at time `now`, or after a start if `None`.
+    /// Starts again along another line from Tx to Rx, at time `now`, or after a start if `None`.
     pub(crate) fn switch_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
             guard.leave_line(now);
@@ -129,7 +130,8 @@ impl Steering {
         }
     }
 
-    /// Removes the limits of lost relays at `side`; `others` states that the view has more relays there.
+    /// Removes the setpoint limits that lost relays at `side` cause. `others` states that the view has more relays
+    /// there.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
@@ -140,7 +142,7 @@ impl Steering {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 
-    /// Returns the next fence message with its side and its destination node.
+    /// Returns the next motion message (fence), with its side and its destination node.
     pub(crate) fn poll_transmit(&mut self) -> Option<(Side, u16, Fence)> {
         self.guard()?.poll()
     }

@@ -156,10 +156,10 @@ impl Relay {
         self.node.begin(identity, seed, now);
     }
 
-    /// Processes bytes received at `port`, split anywhere. Bytes at a port that `Settings::wiring` lacks are dropped.
+    /// Processes bytes received at `port`, in pieces of any length. Bytes at a port that `Settings::wiring` lacks are dropped.
     ///
-    /// Takes a dozen instructions per byte; a CRC for at most one frame per 16 bytes; a message of at most 16 reaches, with a tag
-    /// if frames are signed, for at most one per 19 bytes. Longer work is left to [`handle_timeout`](Self::handle_timeout).
+    /// Takes a dozen instructions per byte; a CRC for at most one frame per 16 bytes; the positions for 16 target SIRs, with a
+    /// tag if frames are signed, for at most one message per 19 bytes. Longer work is left to [`handle_timeout`](Self::handle_timeout).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -196,8 +196,8 @@ impl Relay {
 
     /// Handles timers that have expired by `now`, and one portion of a computation.
     ///
-    /// The portion is bounded: 256 reaches while the leader predicts, the chain's hops over ten relays (over forty where nothing
-    /// changes) of the joint method, 624 positions of Algorithm 2; almost nothing otherwise.
+    /// The portion is bounded: 256 positions of relays while the leader predicts, the chain's hops over ten relays (over forty
+    /// where nothing changes) of the joint method, 624 positions of Algorithm 2; almost nothing otherwise.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -216,7 +216,7 @@ impl Relay {
         self.node.handle_timeout(self.clock.advance(now));
     }
 
-    /// Restarts the method from its beginning: use it in a closed loop after measuring the actual position.
+    /// Restarts the placement method from its beginning. A closed loop calls it after measuring the actual position.
     ///
     /// Only the leader (relay 1; in a field relay N) restarts; at other relays the call has no effect.
     ///
@@ -311,9 +311,9 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the acceptor state, to be stored now, if it differs from the stored one.
+    /// Returns the votes on views (acceptor state) to store now, if they differ from the stored ones.
     ///
-    /// [`poll_transmit`](Self::poll_transmit) returns no frame until the state is confirmed: a restarted relay that has forgotten
+    /// [`poll_transmit`](Self::poll_transmit) returns no frame until they are confirmed: a restarted relay that has forgotten
     /// what it sent could vote twice, and the chain could split. Takes constant time.
     ///
     /// ```
@@ -332,22 +332,25 @@ impl Relay {
         self.node.unpersisted()
     }
 
-    /// Returns the present acceptor state, stored or not.
+    /// Returns the present votes on views (acceptor state), stored or not.
     ///
-    /// A firmware may store it at the start, so that a failure of the storage shows before flight. Takes constant time.
+    /// A firmware may store them at the start, so that a failure of the storage shows before flight. Takes constant
+    /// time.
     pub const fn view_record(&self) -> ViewRecord {
         self.node.view_record()
     }
 
     /// Confirms that `record`, returned by [`unpersisted`](Self::unpersisted), is stored. Takes constant time.
     ///
-    /// A firmware without storage confirms each record at once; its relay must then stay off for the rest of the flight after a
-    /// reboot. A record that the relay has replaced meanwhile may be confirmed, too; `unpersisted` then returns the current one.
+    /// A firmware without storage confirms each record at once; its relay must then stay off for the rest of the
+    /// flight after a reboot. If the relay has a newer record meanwhile, `unpersisted` returns that one.
     pub const fn persisted(&mut self, record: &ViewRecord) {
         self.node.persisted(record);
     }
 
-    /// Passes an [unconfirmed](Self::unpersisted) record to `store`, and confirms it if that returns true.
+    /// Passes a record that is not stored to `store`, and confirms it if that returns true.
+    ///
+    /// See [`unpersisted`](Self::unpersisted).
     pub fn persist(&mut self, mut store: impl FnMut(&ViewRecord) -> bool) {
         if let Some(record) = self.unpersisted()
             && store(&record)
@@ -455,7 +458,8 @@ impl Relay {
         self.node.round().target().filter(|_| known)
     }
 
-    /// Returns an upper bound of the linear SIR at the current altitudes. The leader has it after Algorithm 1 or 4.
+    /// Returns an upper bound of the worst hop's SIR at the current altitudes, linear. The leader has it after
+    /// Algorithm 1 or 4.
     ///
     /// No chain reaches it. `None` at other relays, and with the paper's fixed step, which omits chains.
     pub fn bound(&self) -> Option<f32> {
@@ -475,7 +479,7 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive. Another relay with the larger claim then uses its index.
+    /// Returns true while this relay is passive: another relay with a larger claim uses its index.
     ///
     /// It has no setpoint and takes no part in the protocol until the other relay has been silent for twice
     /// `Settings::dead_after`, or until [`clear_duplicate_index`](Self::clear_duplicate_index) is called.
@@ -497,12 +501,14 @@ impl Relay {
         self.node.stats()
     }
 
-    /// Returns the relay's place in the agreed view. 1 (next to the transmitter) to the relays of [`mission`](Self::mission).
+    /// Returns the relay's index in the agreed view: 1 (next to the transmitter) to the number of relays.
+    ///
+    /// The number of relays is that of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
         self.node.member().index
     }
 
-    /// Returns the last accepted view, to which all positions refer.
+    /// Returns the last accepted view (agreed set of members), to which all positions refer.
     pub fn view(&self) -> ViewId {
         self.node.member().view
     }
@@ -528,54 +534,59 @@ impl Relay {
         &self.node.member().mission
     }
 
-    /// Returns the sites of the active mission; `None` for the ones configured before flight.
+    /// Returns the sites of Tx and Rx of the active mission; `None` for those configured before flight.
     ///
     /// They define the line of all positions: once they change, convert latitude and longitude by the new ones only.
     pub fn sites(&self) -> Option<Sites> {
         self.node.sites()
     }
 
-    /// Returns the estimate from the measurements at this position; `None` before there are enough.
+    /// Returns the estimate of a field's interference from this relay's measurements. It is of the present position;
+    /// `None` before there are enough measurements.
     pub fn estimate(&self) -> Option<Estimate> {
         self.node.round().meter().estimate()
     }
 
-    /// Returns the measured Upsilon that this relay uses, 1/W. It replaces the agreed field's once this relay has measured enough.
+    /// Returns Upsilon = E[1/I] of the interference I, as this relay has measured and uses it, 1/W. It replaces the
+    /// mission's field once this relay has measured enough; `None` before.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
     }
 
-    /// Returns the estimate of the interference and its number. The mission's until the chain has estimated another.
+    /// Returns the estimate of the interference and its number. It is the mission's until the chain has estimated
+    /// another.
     pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
 
     /// Returns the interference measured at the transmitter (upstream) or the receiver (downstream), W.
     ///
-    /// The mean without noise; `None` before a report or without [`Settings::listen`](crate::Settings::listen).
+    /// It is the mean without noise; `None` before a report or without [`Settings::listen`](crate::Settings::listen).
     pub fn level_w(&self, side: Side) -> Option<f32> {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns the reason why the last collected measurements gave no estimate, at the leader.
+    /// Returns the reason why the last collected measurements gave no estimate. `None` if they gave one, and except
+    /// at the leader.
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
 
-    /// Returns the completed rounds of Algorithm 2 while it runs, at the leader. The second value is the chain's linear SIR after
-    /// the last round.
+    /// Returns the number of completed rounds of Algorithm 2 while it runs, at the leader. The second value is the
+    /// chain's linear SIR after the last round.
     pub fn rounds(&self) -> Option<(u16, f32)> {
         self.node.round().rounds()
     }
 
-    /// Returns the relay's profile; its altitude is the one chosen last.
+    /// Returns the relay's power, and the altitude that was chosen for it last.
     pub fn profile(&self) -> Profile {
         self.node.round().profile()
     }
 }
 
 impl Relay {
-    /// Processes one measurement of the interference, W or linear SIR. It is used if `Settings::measure` requires measurements.
+    /// Processes one measurement of the interference, W or linear SIR. `Settings::measure` or `Settings::listen` must request its
+    /// kind.
     ///
     /// Takes constant time. Unusable samples are counted as [`Stats::samples_rejected`](crate::Stats::samples_rejected).
     ///
@@ -595,7 +606,7 @@ impl Relay {
         self.node.handle_sample(self.clock.advance(now), sample);
     }
 
-    /// Processes the drone's position, `x_m` and altitude, at the time `at` of its measurement. Takes constant time.
+    /// Processes the drone's position `place`, measured at time `measured_at`. Takes constant time.
     ///
     /// A guard needs it before the first setpoint. A position that is not a number, or farther than 1e7 m, is ignored.
     ///
@@ -639,7 +650,8 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Handles the control state, as [`handle_control`](Self::handle_control). Returns true if the relay has a guard that did not know this control state.
+    /// Sets if the drone flies to setpoints, as [`handle_control`](Self::handle_control) does. Returns true if the
+    /// relay has a guard that did not know this.
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         self.node.handle_control(self.clock.advance(now), flown)
     }

@@ -11,11 +11,11 @@ use crate::wire::frame::{FrameBuf, Opened};
 use crate::wire::message::Message;
 use crate::wire::session::{Checked, Session};
 
-/// Questions to a silent neighbour of which one comes with a handshake that requests a reply. The reply shows whether the
-/// neighbour takes another node with this relay's index for this relay.
+/// Number of heartbeat requests to a silent neighbour for each handshake that requests a reply. The reply shows
+/// whether the neighbour takes another node with this relay's index for this relay.
 const QUESTIONS: u16 = 4;
 
-/// Handles an intact frame of this relay's network.
+/// Handles an intact frame of this relay's network, received at `port`.
 pub(super) fn receive(
     node: &mut Node,
     endpoint: &mut Endpoint,
@@ -132,7 +132,7 @@ fn decode(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     bump(counter);
 }
 
-/// Writes the next frame; handshakes come before messages.
+/// Writes the next frame into `frame`, if there is one; handshakes come before messages.
 pub(super) fn poll_transmit(
     node: &mut Node,
     endpoint: &mut Endpoint,
@@ -165,7 +165,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules the handshake that accompanies `message`, if there is one.
+/// Schedules a handshake to node `to`, if one has to accompany `message`.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0

@@ -13,13 +13,13 @@ mod tests;
 
 pub use facade::Relay;
 
-/// Port of a relay.
+/// Serial port or radio of a relay, through which frames are received and sent.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Port {
-    /// Link toward the transmitter, with [`Wiring::Pair`](crate::Wiring::Pair).
+    /// Link to the neighbour toward the transmitter, with [`Wiring::Pair`](crate::Wiring::Pair).
     Upstream,
-    /// Link toward the receiver, with [`Wiring::Pair`](crate::Wiring::Pair).
+    /// Link to the neighbour toward the receiver, with [`Wiring::Pair`](crate::Wiring::Pair).
     Downstream,
     /// Shared channel, with [`Wiring::Shared`](crate::Wiring::Shared).
     Shared,

@@ -19,7 +19,8 @@ fn relay(auth: Option<Auth>) -> Relay {
     Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
 }
 
-/// Checks that the relay stops sending: a repeated counter would let an old frame pass for a new one.
+/// Checks that the relay stops sending once its frame counter is used up. A repeated counter would let an old frame
+/// pass for a new one.
 #[test]
 fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
     let auth = Auth {

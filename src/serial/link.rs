@@ -13,13 +13,14 @@ use heapless::Deque;
 #[doc(hidden)] // public because the documentation of public functions links to it
 pub const READ_LIMIT: usize = 64;
 
-/// Capacity for two frames: one in transmission, and the next one.
+/// Capacity of the transmit queue, bytes: one frame in transmission, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
 
 /// Maximum pause, in byte times, between two attempts at a port that accepts nothing.
 const LONGEST_PAUSE: u32 = 128;
 
-/// Driver-enable pin of a link without one: full duplex, or a radio that switches by itself.
+/// Type of the driver-enable pin of a link without one. Such a link is full duplex, or a radio that switches by
+/// itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NoPin {}
 
@@ -54,18 +55,18 @@ pub(crate) const fn byte_time(baud: u32) -> Duration {
 pub struct SerialLink<P, D = NoPin> {
     port: P,
     pin: Option<D>,
-    /// Last level of the pin; `None` before it is set, and after an error.
+    /// Last level set at the driver-enable pin; `None` before the first and after an error.
     level: Option<bool>,
     byte_time: Duration,
     waiting: Deque<u8, QUEUE>,
     clock: MonotonicClock,
     /// Time at which the port last accepted a byte, or the first byte was queued.
     moved_at: Instant,
-    /// Bytes written by the last poll; they count from the next one, because their exact time is unknown.
+    /// Number of bytes written by the last poll. They count from the next poll, because their exact time is unknown.
     uncounted: u32,
-    /// Time at which all counted bytes have left.
+    /// Time at which all counted bytes have left the port.
     quiet_at: Instant,
-    /// True if the last poll stopped reading at its limit.
+    /// True if the last poll stopped reading at its limit, so that the port may have more bytes.
     unread: bool,
     stats: SerialStats,
 }
@@ -78,7 +79,8 @@ impl<P: SerialPort> SerialLink<P> {
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Creates a link over `port` at `baud` bit/s, with 10 bits per byte. The pin is high while this relay sends.
+    /// Creates a half-duplex link over `port` at `baud` bit/s, with 10 bits per byte. The driver-enable pin is high
+    /// while this relay sends.
     ///
     /// The first poll sets the pin low, unless it has something to send.
     pub fn half_duplex(port: P, baud: u32, pin: D) -> Self {
@@ -103,7 +105,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Sets the pin high; returns true if the line may be driven.
+    /// Sets the driver-enable pin high, if there is one. Returns true if bytes may then be sent.
     fn raise(&mut self) -> bool {
         if let Some(pin) = &mut self.pin
             && self.level != Some(true)
@@ -118,7 +120,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
         true
     }
 
-    /// Sets the pin low if all bytes have left.
+    /// Sets the driver-enable pin low if all bytes have left the port.
     fn lower(&mut self, now: Instant) {
         let Some(pin) = self.pin.as_mut().filter(|_| self.level != Some(false)) else {
             return;
@@ -141,7 +143,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P, D> SerialLink<P, D> {
-    /// Counters since the link was created.
+    /// Returns the counters since the link was created.
     pub fn stats(&self) -> &SerialStats {
         &self.stats
     }
@@ -160,15 +162,15 @@ impl<P, D> SerialLink<P, D> {
 pub(super) trait FrameLink {
     /// Passes at most [`READ_LIMIT`] received bytes to `relay`, as bytes of `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
-    /// Returns true if a frame of any length fits.
+    /// Returns true if one more frame of any length fits into the transmit queue.
     fn has_room(&self) -> bool;
-    /// Queues a frame, or counts that it does not fit.
+    /// Queues a frame for sending, or counts that it does not fit.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame for a port that does not exist.
+    /// Counts a frame of the relay for a port that does not exist.
     fn unrouted(&mut self);
-    /// Writes as many bytes as fit, and updates the pin.
+    /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);
-    /// Returns the time of this link's next poll, later than `now`.
+    /// Returns the time of this link's next poll, later than `now`; `None` if it has nothing to do.
     fn wake(&self, now: Instant) -> Option<Instant>;
 }
 
@@ -261,23 +263,25 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SerialStats {
-    /// Bytes lost because they were not read in time.
+    /// Number of bytes lost because they were not read in time.
     pub overrun: u32,
-    /// Bytes without a stop bit.
+    /// Number of bytes received without a stop bit.
     pub framing: u32,
-    /// Bytes with the wrong parity.
+    /// Number of bytes received with the wrong parity.
     pub parity: u32,
     /// Number of bytes received with noise on the line.
     pub noise: u32,
-    /// Reads that failed for another reason.
+    /// Number of reads that failed for another reason.
     pub other: u32,
-    /// Failed writes, and failed queries for the last byte's departure; the bytes are offered again.
+    /// Number of failed writes, and of failed queries if the last byte has left. The bytes are offered again.
     pub write: u32,
-    /// Failed attempts to set the driver-enable pin; it is tried again.
+    /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,
-    /// Frames that did not fit into the transmit queue, because the port accepts nothing. The relay repeats what matters.
+    /// Number of frames that did not fit into the transmit queue, because the port accepts nothing. The relay repeats
+    /// what matters.
     pub dropped: u32,
-    /// Frames for a port that does not exist. The relay's [`Wiring`](crate::Wiring) does not match this driver.
+    /// Number of frames for a port that does not exist. The relay's [`Wiring`](crate::Wiring) does not match this
+    /// driver.
     pub unrouted: u32,
 }
 

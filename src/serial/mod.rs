@@ -115,7 +115,7 @@ use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::FrameLink;
 
-/// Two serial ports, one to each neighbour, full duplex unless a link has a pin.
+/// Ports of a relay with two links, one to each neighbour; full duplex unless a link has a pin.
 #[derive(Debug)]
 pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
     /// Link toward the transmitter.
@@ -125,7 +125,7 @@ pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
 }
 
 impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, UPin, DPin> {
-    /// Creates the links of a relay with [`Wiring::Pair`](crate::Wiring::Pair).
+    /// Creates the ports of a relay with [`Wiring::Pair`](crate::Wiring::Pair), from its two links.
     pub const fn new(upstream: SerialLink<U, UPin>, downstream: SerialLink<D, DPin>) -> Self {
         Self {
             upstream,
@@ -141,17 +141,18 @@ impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, 
     }
 }
 
-/// Serial port to a channel that all neighbours receive. A radio modem, or a half-duplex bus with a driver-enable pin.
+/// Port of a relay on one channel that all neighbours receive. The channel is a radio modem, or a half-duplex bus
+/// with a driver-enable pin.
 ///
-/// Medium access is the modem's task; this crate only prevents relays from retransmitting in step.
+/// The modem controls the access to the channel; this crate only keeps relays from retransmitting at the same times.
 #[derive(Debug)]
 pub struct Shared<P, Pin = NoPin> {
-    /// Link to the channel.
+    /// Link to the shared channel.
     pub channel: SerialLink<P, Pin>,
 }
 
 impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
-    /// Creates the link of a relay with [`Wiring::Shared`](crate::Wiring::Shared).
+    /// Creates the port of a relay with [`Wiring::Shared`](crate::Wiring::Shared).
     pub const fn new(channel: SerialLink<P, Pin>) -> Self {
         Self { channel }
     }
@@ -161,7 +162,8 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
     }
 }
 
-/// `poll` for both wirings; as a trait's method it would have to be imported beside the ports.
+/// Defines the method `poll` for the ports of one kind of wiring. A trait's method would have to be imported beside
+/// the ports.
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {

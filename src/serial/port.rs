@@ -57,7 +57,7 @@ pub trait SerialPort {
     fn has_left(&mut self) -> Result<Option<bool>, Fault>;
 }
 
-/// Port with [`embedded_hal_nb`] traits: one byte per call, and it knows when the last one has left.
+/// Port with [`embedded_hal_nb`] traits: one byte per call, and it reports when the last byte has left.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Nb<S>(pub S);
 
@@ -93,7 +93,7 @@ where
     }
 }
 
-/// Converts the result of an `nb` call; `None` for `WouldBlock`.
+/// Converts the result of an `nb` call. `None` stands for `WouldBlock`: the call would have to wait.
 fn ready<S, T>(result: nb::Result<T, S::Error>) -> Result<Option<T>, Fault>
 where
     S: embedded_hal_nb::serial::ErrorType,

@@ -96,12 +96,14 @@ impl<F: FnMut()> Pend for F {
     }
 }
 
-/// Byte queues between an interrupt and the main loop. Fewer than `IN` received bytes, and fewer than `OUT` to send.
+/// Byte queues between an interrupt and the main loop, one for each direction. They hold up to `IN` - 1 received
+/// bytes, and up to `OUT` - 1 to send.
 ///
-/// `OUT` should hold a frame of [`MAX_FRAME`](crate::wire::frame::MAX_FRAME), so that the main loop can sleep meanwhile.
+/// `OUT` should hold a frame of [`MAX_FRAME`](crate::wire::frame::MAX_FRAME), so that the main loop can sleep
+/// meanwhile.
 #[derive(Debug)]
 pub struct ByteQueues<const IN: usize, const OUT: usize> {
-    /// Received bytes or faults, as [`coded`].
+    /// Queue of received bytes or faults, encoded by [`coded`].
     received: [AtomicU16; IN],
     outgoing: [AtomicU8; OUT],
     in_marks: Marks,
@@ -152,7 +154,7 @@ pub struct InterruptEnd<'q> {
     received: Filler<'q, AtomicU16>,
     outgoing: Emptier<'q, AtomicU8>,
     lost: &'q AtomicU32,
-    /// True while bytes were lost and no [`Fault::Overrun`] has been queued for them.
+    /// True after bytes were lost, until a [`Fault::Overrun`] is queued in their place.
     gap: bool,
 }
 
@@ -180,9 +182,9 @@ impl InterruptEnd<'_> {
         }
     }
 
-    /// Passes bytes to `take` until it rejects one or none is left; returns true if some are left.
+    /// Passes queued bytes to `take` until it rejects one or none is left; returns true if some are left.
     ///
-    /// Then the interrupt for an empty data register must stay enabled; otherwise it must be disabled.
+    /// If some are left, the interrupt for an empty data register must stay enabled; otherwise it must be disabled.
     pub fn send(&mut self, mut take: impl FnMut(u8) -> bool) -> bool {
         while let Some(byte) = self.outgoing.peek() {
             if !take(byte) {
@@ -212,12 +214,13 @@ impl<K> fmt::Debug for QueuedPort<'_, K> {
 }
 
 impl<K> QueuedPort<'_, K> {
-    /// Number of bytes that [`write`](SerialPort::write) would accept now.
+    /// Returns the number of bytes that [`write`](SerialPort::write) would accept now.
     pub fn room(&self) -> usize {
         self.outgoing.room()
     }
 
-    /// Received bytes lost because the queue was full. The main loop did not read for longer than its depth.
+    /// Returns the number of received bytes that were lost because the queue was full. The main loop then has not
+    /// read for too long.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
@@ -256,7 +259,7 @@ impl<K: Pend> SerialPort for QueuedPort<'_, K> {
     }
 }
 
-/// Encodes a byte, or a fault as a code above the bytes.
+/// Encodes a received byte as itself, and a fault as a code above 255.
 const fn coded(item: Result<u8, Fault>) -> u16 {
     match item {
         Ok(byte) => byte as u16,
@@ -280,7 +283,8 @@ const fn decoded(code: u16) -> Result<u8, Fault> {
     }
 }
 
-/// Cell of one item. The indices synchronise access, so its own ordering is relaxed.
+/// Atomic cell of a ring, for one item. The indices of the ring synchronise access, so the cell's own ordering is
+/// relaxed.
 pub(super) trait Place {
     type Item: Copy;
 
@@ -312,7 +316,8 @@ impl Place for AtomicU16 {
     }
 }
 
-/// Indices of both sides. The ring is empty if they are equal, so one cell is never used.
+/// Indices of a ring: its first item, and the end behind its last item. The ring is empty if they are equal, so one
+/// cell is never used.
 #[derive(Debug)]
 pub(super) struct Marks {
     first: AtomicUsize,
@@ -334,15 +339,16 @@ struct Side<'q, P> {
     marks: &'q Marks,
 }
 
-/// Producer.
+/// Producer's side of a ring, which appends items.
 #[derive(Debug)]
 pub(super) struct Filler<'q, P>(Side<'q, P>);
 
-/// Consumer.
+/// Consumer's side of a ring, which takes items.
 #[derive(Debug)]
 pub(super) struct Emptier<'q, P>(Side<'q, P>);
 
-/// Returns both sides; the exclusive borrow of the marks makes them the only ones.
+/// Returns the producer's and the consumer's side of a ring. The exclusive borrow of `marks` makes them the only
+/// ones.
 pub(super) fn sides<'q, P>(
     places: &'q [P],
     marks: &'q mut Marks,
@@ -362,7 +368,7 @@ impl<P> Side<'_, P> {
 }
 
 impl<P: Place> Filler<'_, P> {
-    /// Appends an item; returns false if the ring is full.
+    /// Appends an item to the ring; returns false if the ring is full.
     pub(super) fn put(&mut self, item: P::Item) -> bool {
         let Side { places, marks } = &self.0;
         let end = marks.end.load(Ordering::Relaxed);
@@ -392,7 +398,7 @@ impl<P: Place> Filler<'_, P> {
 }
 
 impl<P: Place> Emptier<'_, P> {
-    /// Returns the first item without removing it.
+    /// Returns the first item of the ring without removing it.
     pub(super) fn peek(&self) -> Option<P::Item> {
         let Side { places, marks } = &self.0;
         let first = marks.first.load(Ordering::Relaxed);
@@ -402,7 +408,7 @@ impl<P: Place> Emptier<'_, P> {
         places.get(first).map(P::load)
     }
 
-    /// Removes the first item, if there is one.
+    /// Removes the first item of the ring, if there is one.
     pub(super) fn pop(&mut self) {
         let marks = self.0.marks;
         let first = marks.first.load(Ordering::Relaxed);

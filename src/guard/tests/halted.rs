@@ -70,7 +70,8 @@ fn a_start_outside_the_box_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Two relays 1 m apart, with an error of 1 m per report are out of order. They are in order if they may pass each other.
+/// Two relays closer along x than the errors of their reports are in order only if they may pass. They may pass each
+/// other if lateral offset and altitude keep them the separation apart.
 #[test]
 fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
@@ -108,8 +109,8 @@ fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
     }
 }
 
-/// Two neighbours may each be in order with the relay between them by the error of the reports. They need not be in order with each
-/// other.
+/// Two neighbours halt the relay between them if they are in the wrong order. Each may be on the right side of that
+/// relay within the errors of the reports.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -173,7 +174,8 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// A relay that halts on its way into the geofence stops outside. The nearest position inside may be a neighbour's.
+/// A relay that halts on its way into the geofence stops outside, where it is. The nearest position inside may be a
+/// neighbour's.
 #[test]
 fn a_relay_that_halts_outside_the_box_stops_there() {
     let mut one = One {
@@ -209,7 +211,8 @@ fn a_relay_that_halts_outside_the_box_stops_there() {
     assert_eq!(one.guard.setpoint(), Some(high));
 }
 
-/// A rebooted neighbour does not know its earlier request: its first messages withdraw no halt.
+/// A halt request outlasts a reboot of the neighbour that sent it. The rebooted neighbour does not know its earlier
+/// request, so its first messages do not withdraw it.
 #[test]
 fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -246,7 +249,7 @@ fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
     }
 }
 
-/// A relay that is given back beyond a neighbour that it knows requests a halt with its first message.
+/// A relay that is flown again on the wrong side of a known neighbour requests a halt at once.
 #[test]
 fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -272,7 +275,7 @@ fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
     }
 }
 
-/// A relay that is not flown, or has just started, also forwards a halt.
+/// A relay that does not follow setpoints, or has just started, also forwards a halt request.
 #[test]
 fn a_halt_passes_a_relay_that_is_not_flown() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -299,7 +302,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     assert_eq!(before.setpoint().to_bits(), 55.0_f32.to_bits());
 }
 
-/// A relay in its pilot's hands knows its order relative to flown neighbours.
+/// A relay in manual control reports if it is on the wrong side of a flown neighbour.
 #[test]
 fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
     let mut one = One {
@@ -323,8 +326,8 @@ fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
-/// A relay that started beside a silent one moves away to the separation, then across. It stays so far away until the silent one is
-/// cleared, and reports the reason meanwhile.
+/// A relay that started beside a silent one first moves away along x, then changes its altitude. It keeps the
+/// separation along x until an operator clears the silent one, and reports the reason meanwhile.
 #[test]
 fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     let mut one = One {
@@ -358,7 +361,8 @@ fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
 }
 
-/// A relay out of order with a neighbour that becomes silent stays. It halts the others until that one is cleared.
+/// A relay on the wrong side of a neighbour that becomes silent stays where it is. The chain halts until an operator
+/// clears the silent neighbour.
 #[test]
 fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -387,7 +391,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     }
 }
 
-/// A relay beside one that is not flown waits without halting the chain. The positions of the two must show their order.
+/// A relay beside one without setpoints does not halt the chain if their positions are in order.
 #[test]
 fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
@@ -415,7 +419,8 @@ fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
     }
 }
 
-/// The fence of an association from before a reboot may be far beyond this relay. It is not its owner's position.
+/// A fence plane from before a reboot does not show its owner on the wrong side. A message with a fence number
+/// contains the x of the fence plane, which may be far from the position of its owner.
 #[test]
 fn an_old_fence_says_nothing_of_where_its_owner_is() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -438,7 +443,8 @@ fn an_old_fence_says_nothing_of_where_its_owner_is() {
     }
 }
 
-/// Relays 2 and 3 are in order only by the error of their reports, 2.5 m below each other. Relay 2 sends the lower x upstream.
+/// Relay 3 is 2.5 m short of relay 2 along x, within the errors of their reports. Relay 2 sends that lower x
+/// upstream.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {
@@ -486,8 +492,9 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Relay 1 starts beside relay 2 after relays 2 and 3 have cleared their first fence. Relays 1 and 2 are in order but for the error
-/// of the reports. The next fence between these two is the separation beyond relay 1, too (rule 7).
+/// Relay 1 starts beside relay 2 after relay 3 has gone beyond the first fence plane of relay 2. Relays 1 and 2 are
+/// in order only by the error of the reports. Each next fence plane is then the separation beyond relay 1, too (rule
+/// 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

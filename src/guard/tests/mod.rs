@@ -33,7 +33,7 @@ fn at(x_m: f32) -> Placement {
     Placement::on_line(x_m, 50.0)
 }
 
-/// Returns a neighbour's first message.
+/// Returns the first message of a neighbour, which knows no association of this relay yet.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,
@@ -47,7 +47,7 @@ fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     }
 }
 
-/// Guard between `neighbours` that hovers at `x_m`, with the agreed position `target_m`, and the clock.
+/// Guard under test, with the clock of the test.
 struct One {
     guard: Guard,
     now: Instant,
@@ -139,7 +139,7 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Rule 1: a relay keeps the limit that it has granted.
+/// Rule 1: the follower stays beyond the fence that it has received.
 ///
 /// It does so even if the neighbour on the other side started too close.
 #[test]
@@ -193,7 +193,7 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// An operator has cleared the lost neighbour; the one beyond it was never heard.
+/// A relay keeps clear of relays beyond a removed neighbour until it hears one of them.
 #[test]
 fn a_relay_keeps_clear_of_those_beyond_a_cleared_one_until_it_hears_them() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
@@ -271,11 +271,11 @@ fn a_relay_that_turns_flies_on_no_farther_than_it_was_told() {
     assert_eq!(after(21_000, &[], 95.0), (95.0, 95.0));
 }
 
-/// Exact setpoints of the two, m along x.
+/// Setpoints of the owner and of the follower, m along x, compared exactly.
 #[derive(PartialEq, Debug)]
 struct Both(f32, f32);
 
-/// Relay 1 toward Tx and relay 2 toward Rx, with one fence between them.
+/// Two guards with one fence between them: relay 1 toward Tx and relay 2 toward Rx.
 struct Pair {
     owner: One,
     follower: One,
@@ -312,7 +312,7 @@ impl Pair {
     }
 }
 
-/// Rule 8: neither relay moves before it has heard the other one.
+/// Rule 8: neither of two neighbours moves before it has received a message of the other.
 #[test]
 fn nobody_moves_before_the_other_one_was_heard() {
     let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);
@@ -331,7 +331,7 @@ fn nobody_moves_before_the_other_one_was_heard() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Rules 3, 4 and 6: a fence to the right is requested, and approached as the other relay clears it.
+/// Rules 3, 4 and 6: the owner requests a fence toward Rx, and advances as the follower clears it.
 #[test]
 fn the_keeper_follows_the_kept_relay() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
@@ -355,7 +355,7 @@ fn the_keeper_follows_the_kept_relay() {
     );
 }
 
-/// Rules 1 and 5: toward Tx the follower follows the fence, which follows the owner's position.
+/// Rules 1 and 5: toward Tx the owner moves first, the fence follows it, and the follower the fence.
 #[test]
 fn the_kept_relay_follows_the_keeper() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -402,7 +402,7 @@ fn late_messages_grant_nothing() {
     );
 }
 
-/// A report that is older than the setpoint, or too early for its effect, frees nothing.
+/// A report that is older than the setpoint, or too early for its effect, does not free any space.
 #[test]
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -461,8 +461,8 @@ fn relays_in_the_wrong_order_stay() {
     );
 }
 
-/// A restarted owner does not know its announced fence. The follower keeps it until it has exchanged messages with the new owner,
-/// and ignores old messages afterwards.
+/// A restarted owner does not know the fence that it announced. The follower keeps that fence until it has exchanged
+/// messages with the restarted owner, and ignores old messages afterwards.
 #[test]
 fn a_new_life_is_told_from_an_old_one() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -502,7 +502,8 @@ fn a_new_life_is_told_from_an_old_one() {
     );
 }
 
-/// A relay out of order with one neighbour grants nothing to the other one. It requests a halt, with an x that does not count.
+/// A relay on the wrong side of its neighbour downstream gives the one upstream no valid position. It requests a
+/// halt, with an x that does not count.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);

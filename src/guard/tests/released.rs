@@ -45,7 +45,7 @@ impl Row {
         }
     }
 
-    /// Passes one message of relay `k`, from 0, to its neighbour.
+    /// Passes the next message of relay `k` to its neighbour and returns it. Relays count from 0.
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;
@@ -110,7 +110,7 @@ fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
     assert_eq!(row.setpoint(0), Some(180.0));
 }
 
-/// Rule 15: the pilot flies the middle one in front of its neighbour, across the line or along it.
+/// Rule 15: neighbours do not fly through a drone in manual control that hovers in their way.
 #[test]
 fn nobody_flies_through_a_drone_that_its_pilot_hovers_in_the_way() {
     for (y_m, expected_m) in [(0.0, 80.0), (6.0, 80.0), (20.0, 20.0)] {
@@ -151,7 +151,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// A relay beside a drone in manual control moves across the line only away from it.
+/// A relay beside a drone in manual control moves to the side, up or down only away from it.
 ///
 /// Beside means within the separation along x.
 #[test]
@@ -214,7 +214,8 @@ fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// The neighbour's companion restarted and was not engaged. Its old association still limits this relay.
+/// The companion of the neighbour restarted, and its pilot has not engaged setpoint control again. The limit of the
+/// neighbour's old association still holds, and the hold reason names the unflown neighbour.
 #[test]
 fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
     let mut row = Row::new();
@@ -232,7 +233,8 @@ fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// A flown and silent neighbour makes no room. That is reported after five reminders, and not while the relay moves.
+/// A neighbour that follows setpoints but is silent makes no room. This is reported after five reminders, and not
+/// while the relay moves.
 #[test]
 fn a_relay_that_stands_for_long_says_that_it_waits_for_room() {
     let mut row = Row::new();
@@ -280,8 +282,8 @@ fn given_back_it_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// The release is repeated until the neighbour has started a new association. That holds even if the pilot has given the drone
-/// back.
+/// The leave notice is repeated until the neighbour has started a new association. That holds even if the pilot has
+/// given the drone back.
 #[test]
 fn what_is_lost_is_told_again() {
     let mut row = Row::new();
@@ -306,7 +308,8 @@ fn what_is_lost_is_told_again() {
     assert!(row.all.iter().all(|one| one.guard.is_there()));
 }
 
-/// Late messages from before the pilot took over do not bring the relay back. Late releases do not send it away again.
+/// Late messages from before the pilot took over do not make the drone count as flown. After it is flown again, late
+/// leave notices do not make it count as released.
 #[test]
 fn late_messages_say_nothing_of_who_flies() {
     let mut row = Row::new();
@@ -342,7 +345,7 @@ fn late_messages_say_nothing_of_who_flies() {
     assert_eq!(row.setpoint(0), Some(200.0 - APART));
 }
 
-/// Two relays in a row are taken: each informs the other one, and both associate again.
+/// Two neighbouring relays are flown by hand and then by setpoints again. Both associate with each other again.
 #[test]
 fn two_in_a_row_are_taken_and_given_back() {
     let mut row = Row::new();

@@ -11,7 +11,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::upload::UPLOAD;
 
 impl Node {
-    /// Handles the decision on a proposal: on acceptance, starts the new view with its mission.
+    /// Handles the decision on a view proposal: on acceptance, starts the new view with its mission.
     pub(super) fn adopt_view(&mut self, now: Instant, decided: ProposalOutcome) {
         let Some(proposed) = self.layers.view.proposed() else {
             return;
@@ -69,7 +69,7 @@ impl Node {
         }
     }
 
-    /// Sets the mission of the new view, which has the identifier `id`.
+    /// Makes `mission`, whose identifier is `id`, the active mission of the new view.
     fn activate_mission(&mut self, now: Instant, mission: Mission, id: MissionId) {
         if id == self.member.active {
             // The number of relays may have changed.
@@ -80,9 +80,10 @@ impl Node {
         self.raise(Event::Adopted);
     }
 
-    /// Replaces the active mission by the stored one, `mission`, at time `now`, or after a start if `None`.
+    /// Replaces the active mission by the stored one, `mission`. `now` is `None` after a start.
     ///
-    /// With other sites all positions are void: there is no setpoint until the next agreement, and the guard starts again.
+    /// With other sites of Tx and Rx all positions are void: there is no setpoint until the next agreement, and the
+    /// guard starts again.
     pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.interference = *mission.interference();

@@ -47,7 +47,8 @@ impl Node {
         }
     }
 
-    /// Repeats a claim to its sender, or compares an echo; returns false if signed frames replace claims.
+    /// Handles a node's claim to its index. An original is repeated to its sender, an echo is compared with this
+    /// relay's own claim. Returns false if signed frames replace claims.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -81,7 +82,7 @@ impl Node {
         Some((side, to, Message::Claim(claim)))
     }
 
-    /// Returns the destination of a due claim, and marks it as sent.
+    /// Returns the destination of a due claim to this relay's index, and marks the claim as sent.
     ///
     /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
@@ -95,7 +96,7 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if all sessions must be restarted under that number.
+    /// Returns the new claim number if all sessions with other nodes must be restarted under that number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
@@ -106,8 +107,8 @@ impl Node {
 
     /// Returns true if a handshake accompanies `message`.
     ///
-    /// It does with each lease renewal, on a shared channel. Another relay with this number then detects this one even if the chain
-    /// sends nothing else.
+    /// It does with each lease renewal, on a shared channel. Another relay with the same index then detects this one
+    /// even if the chain sends nothing else.
     pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
         let renews = match message {
             Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
@@ -121,19 +122,20 @@ impl Node {
         self.duplicate.rival(claim)
     }
 
-    /// Returns true while this relay is passive, because another node uses its number.
+    /// Returns true while this relay is passive, because another node uses its index.
     pub(crate) const fn is_passive(&self) -> bool {
         self.duplicate.is_passive()
     }
 
-    /// Handles the report that the other relay with this number has been removed.
+    /// Handles the report that the other relay with this relay's index has been removed.
     pub(crate) fn clear_duplicate(&mut self, now: Instant) {
         if self.duplicate.clear(now, &self.member.settings) {
             self.become_active(now);
         }
     }
 
-    /// Becomes active as after a restart: view, lease and proposal may be those of the other node by now.
+    /// Makes this relay active again, as after a restart. Its view, lease and proposal may be those of the other node
+    /// by now.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

@@ -11,7 +11,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 use crate::wire::upload::UPLOAD;
 
-/// Mission state in a hello.
+/// Mission state that a hello reports.
 struct MissionState {
     holds: MissionId,
     flies: bool,
@@ -98,9 +98,10 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay could join between node `other` at `side` and the neighbour of `other`.
+    /// Returns true if this relay could be inserted between `other` (at `side`) and its neighbour.
     ///
-    /// For that, this relay and that neighbour receive each other, or a nearer linked neighbour of this relay joins too.
+    /// For that, this relay and the neighbour of `other` receive each other, or a nearer linked neighbour of this
+    /// relay is inserted, too.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -131,7 +132,7 @@ impl Node {
         }
     }
 
-    /// Returns the number of relays at `side` in this part of the chain, as of the last count.
+    /// Returns the number of relays on `side` in this connected part of the chain, as counted last.
     pub(super) fn beyond(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;
@@ -150,7 +151,7 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a hello of the same mission from node `from` at `side`.
+    /// Handles a hello from node `from` at `side`, whose loaded mission is this relay's.
     pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let known = self.layers.view.latest_view();
@@ -206,7 +207,7 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records whether node `from` receives this relay, and reports the node if it repeatedly does not.
+    /// Records if node `from` receives this relay, and reports the node if it repeatedly does not.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self

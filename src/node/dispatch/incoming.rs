@@ -14,7 +14,8 @@ use crate::wire::message::Message;
 use crate::wire::upload::UPLOAD;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`; returns false if that node may not send it. Bounded by 16 reaches.
+    /// Handles an intact message from node `from` at `side`. Returns false if that node may not send it. Work: at
+    /// most the positions for 16 target SIRs.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,
@@ -109,7 +110,7 @@ impl Node {
         known
     }
 
-    /// Returns true if positions of `from` are along the same line: both relays fly between the same sites.
+    /// Returns true if `from` measures its positions along the same line: between the same Tx and Rx sites.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.layers.update.line_digest(&self.member);
         if !same && self.layers.neighbours.at(side).holds.is_some() {
@@ -138,7 +139,7 @@ impl Node {
         }
     }
 
-    /// Passes a message of the current mission and view to its layer.
+    /// Passes a message of the current mission and view to the protocol layer that handles it.
     fn dispatch(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
         match message {
             Message::Heartbeat { request, reply, .. } => {
@@ -201,7 +202,8 @@ impl Node {
         self.apply(now, effects);
     }
 
-    /// Records that the neighbour at `side` was alive at time `at` or later, by its reply to a message.
+    /// Records that the neighbour at `side` was alive at time `at` or later. Its reply to a message of that time
+    /// shows it.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {
@@ -212,7 +214,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles an authentic frame of node `from` at `side`; after the `first` one, messages are sent again.
+    /// Handles an authentic frame of node `from` at `side`. After the `first` one of a session, messages that the
+    /// node could not verify before are sent again.
     pub(crate) fn on_authentic(&mut self, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
@@ -229,7 +232,7 @@ impl Node {
         }
     }
 
-    /// Handles a handshake of node `from` at `side` that does not prove that this relay is received.
+    /// Handles a handshake of node `from` at `side` that does not show that the node receives this relay.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {
@@ -237,7 +240,7 @@ impl Node {
         }
     }
 
-    /// Handles a handshake under the number of node `from` at `side` with a wrong tag.
+    /// Handles a handshake in the name of node `from` at `side` that is signed with another key.
     pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -263,7 +266,7 @@ impl Node {
 }
 
 impl Node {
-    /// Side to which passes are forwarded.
+    /// Returns the side toward the last relay, to which messages from the leader are forwarded.
     pub(super) const fn onward(&self) -> Side {
         Side::onward(self.member.mission.heading())
     }
@@ -309,7 +312,8 @@ impl Node {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` at port `through`: an index received at both ports is a duplicate.
+    /// Handles a frame of node `from` received at port `through`. An index received at both ports is used by two
+    /// nodes.
     pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

@@ -51,7 +51,7 @@ mod timers;
 #[cfg(test)]
 mod tests;
 
-/// Claim to repeat: side, destination node and claim.
+/// Claim to a node's index that is to be repeated to its sender: side, destination node and claim.
 pub(crate) type Echo = (Side, u16, Claim);
 
 #[derive(Clone, Debug)]
@@ -61,11 +61,11 @@ pub(crate) struct Node {
     pub(super) steering: Steering,
     pub(super) duplicate: IndexClaims,
     pub(super) no_quorum_timer: NoQuorumTimer,
-    /// Received claim that is to be repeated to its sender.
+    /// Claim to a node's index that was received and is to be repeated to its sender.
     pub(super) echo: Option<Echo>,
-    /// Side to which the next claim is sent.
+    /// Side to which this relay sends the next claim to its index.
     pub(super) claim_side: Side,
-    /// Acceptor state that the firmware has confirmed as stored.
+    /// Votes on views (acceptor state) that the firmware has confirmed as stored.
     persisted: ViewRecord,
     pub(super) telemetry: Telemetry,
 }
@@ -75,7 +75,7 @@ fn seed_of(identity: Identity, seed: u32) -> u32 {
 }
 
 impl Node {
-    /// Creates a relay before [`begin`](Self::begin), with valid `identity` and `settings`.
+    /// Creates a relay with valid `identity` and `settings`; [`begin`](Self::begin) starts it.
     ///
     /// The value consists of plain numbers only, so that it is written in place.
     pub(crate) fn new(
@@ -142,7 +142,7 @@ impl Node {
         self.telemetry.events.raise_about(about, side, node);
     }
 
-    /// Applies the effects of one layer to the other layers, the events and the counters.
+    /// Applies the effects of one protocol layer to the other layers, the events and the counters.
     pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
         let stats = &mut self.telemetry.stats;
         for (happened, counter) in [
@@ -207,7 +207,7 @@ impl Node {
         }
     }
 
-    /// Bases the active mission on the new interference estimate.
+    /// Replaces the interference of the active mission by the new estimate.
     fn apply_estimate(&mut self) {
         let estimate = self.layers.round.sensing().estimate();
         let Member {
@@ -244,7 +244,7 @@ impl Node {
         &self.member
     }
 
-    /// Returns the sites of the active mission, if it has its own.
+    /// Returns the geographic sites of Tx and Rx of the active mission, if it has its own.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.layers.update.sites()
     }
@@ -265,7 +265,7 @@ impl Node {
         &mut self.telemetry.stats
     }
 
-    /// Returns the acceptor state if it differs from the one that is stored.
+    /// Returns the votes on views (acceptor state) if they differ from those that are stored.
     pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
         let record = self.view_record();
         (record != self.persisted).then_some(record)
@@ -280,7 +280,7 @@ impl Node {
         self.persisted = *record;
     }
 
-    /// Restores the stored acceptor state after a start.
+    /// Restores the stored votes on views (acceptor state) after a start.
     pub(crate) fn resume_view(
         &mut self,
         now: Instant,
@@ -295,14 +295,14 @@ impl Node {
         Ok(())
     }
 
-    /// Handles a measurement; counts it if it is rejected.
+    /// Handles a measurement from the firmware; counts it if it is rejected.
     pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
         if !self.layers.round.handle_sample(now, &self.member, sample) {
             bump(&mut self.telemetry.stats.samples_rejected);
         }
     }
 
-    /// Starts the search of targets again; no effect except at the leader with a view.
+    /// Starts the search for the target SIR again. It has an effect only at the leader, outside a view change.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
         let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
@@ -324,7 +324,8 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Returns the state that a layer receives. It borrows only `member`, so that each layer can be borrowed mutably meanwhile.
+    /// Returns the state that a protocol layer receives. It borrows only `member`, so that each layer can be borrowed
+    /// mutably meanwhile.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {
@@ -336,14 +337,14 @@ impl Layers {
         }
     }
 
-    /// Returns true if a proposal from `side` leaves relays out that may link at any moment. Its sender was linked a moment
-    /// ago.
+    /// Returns true if a view proposal from `side` leaves out relays that are about to be linked. Its sender was
+    /// linked a moment ago.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.place_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
-    /// Schedules outstanding messages again: the next relay can be reached again.
+    /// Schedules outstanding messages again, because the next relay can be reached again.
     pub(super) fn resend(&mut self) {
         self.view.resend();
         self.round.resend();
@@ -355,16 +356,18 @@ impl Layers {
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True once a lease expiry, or a missing quorum, has been reported since the last view.
+    /// True once a lease expiry has been reported since the last view. `no_quorum_reported` is the same for a missing
+    /// quorum.
     pub(super) lapse_reported: bool,
     pub(super) no_quorum_reported: bool,
 }
 
-/// Multiples of `dead_after` for which a part without a quorum keeps its links: first, and later.
+/// Time for which a part of the chain without a quorum first keeps its links, in `dead_after`. `MOST` is the same for
+/// every later time.
 const FIRST: u32 = 3;
 const MOST: u32 = 4;
 
-/// Timer for dropping the links of a part without a quorum.
+/// Timer after which a part of the chain without a quorum drops its links and searches again.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NoQuorumTimer {
     /// Expiry of the timer; `None` while there is a quorum.
@@ -384,7 +387,7 @@ impl NoQuorumTimer {
 }
 
 impl Node {
-    /// Starts the timer if this part of the chain has no quorum, and stops it otherwise.
+    /// Starts the timer for dropping links if this part of the chain has no quorum, else stops it.
     pub(super) fn update_no_quorum_timer(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
             self.no_quorum_timer = NoQuorumTimer::NONE;
@@ -393,7 +396,7 @@ impl Node {
         }
     }
 
-    /// Returns the time for which links are kept without a quorum.
+    /// Returns the time for which links to neighbours are kept without a quorum.
     fn link_retention(&self) -> Duration {
         let settings = &self.member.settings;
         let times = if self.no_quorum_timer.again {
@@ -405,7 +408,7 @@ impl Node {
         settings.dead_after.times(times).max(pass)
     }
 
-    /// Drops the links to both neighbours if the timer has expired.
+    /// Drops the links to both neighbours if there has been no quorum for too long.
     pub(super) fn drop_links_if_expired(&mut self, now: Instant) {
         if self.no_quorum_timer.at.is_none_or(|at| now < at) {
             return;

@@ -12,7 +12,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// Handles a message from the ground station at `side`; returns false if it may not send it.
+    /// Handles a message from the ground station at `side`. Returns false if a ground station may not send this kind
+    /// of message.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,
@@ -80,7 +81,7 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `offer_number` is that of a recent hello; otherwise counts the offer as stale.
+    /// Returns true if `offer_number` is that of a recent hello of this relay. Otherwise counts the offer as stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers
@@ -92,10 +93,10 @@ impl Node {
         asked
     }
 
-    /// Handles an offer from node `from` at `side`, for relays loaded with the same mission.
+    /// Handles an offer of a mission from node `from` at `side`, whose loaded mission is this relay's.
     ///
-    /// An offer that answers a recent hello is answered only if this relay then has a mission as new, or refuses the offered one.
-    /// Any other answer would trigger the same offer again.
+    /// An offer that answers a recent hello is answered only if this relay then has a mission as new, or refuses the
+    /// offered one. Any other answer would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -122,7 +123,8 @@ impl Node {
         }
     }
 
-    /// Stores `upload` if it is newer. One without a valid line on earth, or beyond the geofence, is counted and reported once.
+    /// Stores `upload` if it is newer than the stored mission. A mission without a valid line on earth, or beyond the
+    /// geofence, is refused, counted and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
             Offered::Stored => self.on_stored(now),
@@ -136,7 +138,7 @@ impl Node {
         }
     }
 
-    /// Reports a newer mission, offers it to the neighbours, and requests a view.
+    /// Reports the newly stored mission, offers it to both neighbours, and requests a view that uses it.
     fn on_stored(&mut self, now: Instant) {
         self.raise(Event::Uploaded);
         // The leader needs the mission to propose it, and the other relays before the proposal reaches them.
@@ -157,7 +159,7 @@ impl Node {
         Ok(())
     }
 
-    /// Restores the active `upload` after a start.
+    /// Restores the stored mission `upload` after a start, as the active mission.
     pub(crate) fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         let untouched = self.layers.view.is_untouched() && self.layers.round.is_untouched();
         let mission = self.layers.update.resume(&self.member, upload, untouched)?;
@@ -185,7 +187,8 @@ impl Node {
         }
     }
 
-    /// Schedules a hello or an offer to the neighbour `from` at `side`, by the mission that it `holds`.
+    /// Compares the mission that the neighbour `from` at `side` holds with this relay's newest one. Schedules an
+    /// offer if it is older, and a hello, which requests an offer, if it is newer.
     pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;
@@ -211,7 +214,8 @@ impl Node {
         }
     }
 
-    /// Returns the pending offer to the neighbour at `side`. Without a recent hello to answer, a hello that requests one.
+    /// Returns the pending offer to the neighbour at `side`. If no recent hello can be answered, it is a hello that
+    /// requests one.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.holds);

@@ -51,7 +51,7 @@ impl Node {
         ))
     }
 
-    /// Returns the next message of a view change, a lease renewal or a round.
+    /// Returns the next message of a view change, a lease renewal or an agreement on positions.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {

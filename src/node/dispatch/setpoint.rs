@@ -30,7 +30,8 @@ impl Node {
         self.steer(now);
     }
 
-    /// Takes the control state of the drone: true while it flies to the setpoints. Returns true if the guard did not know it.
+    /// Handles the control state of the drone: `flown` is true while it flies to the setpoints. Returns true if the
+    /// guard did not know this.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.steering.handle_control(now, flown);
         if is_news {
@@ -39,8 +40,8 @@ impl Node {
         is_news
     }
 
-    /// Handles the report that the lost relays at `side` are not in the air any more. The others of the view at that side are not
-    /// meant.
+    /// Handles the report that the lost relays at `side` are not in the air any more. The report does not concern the
+    /// present members of the view.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
         let Member { index, mission, .. } = &self.member;
         let in_view = match side {

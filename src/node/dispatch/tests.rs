@@ -36,7 +36,7 @@ pub(super) fn upload_to(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Returns relay 2 of 3, with a key if it `signs`.
+/// Returns relay 2 of 3 as a node for the tests, with a key if it `signs`.
 pub(super) fn relay(signs: bool) -> Node {
     relay_of(base(), 2, signs)
 }
@@ -100,7 +100,7 @@ pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
 
 const LENGTH: usize = Upload::LENGTH;
 
-/// First view proposed by relay 1.
+/// Identifier of the first view that relay 1 proposes.
 const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
 
 fn proposal(mission_id: MissionId) -> Message {
@@ -119,7 +119,7 @@ fn proposal(mission_id: MissionId) -> Message {
     })
 }
 
-/// Returns an offer that answers a hello sent at `NOW`.
+/// Returns an offer that answers a hello which `node` sends at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
     let offer_number = node.layers.update.next_offer_number(NOW, &node.member);
     Message::Offer {
@@ -307,7 +307,7 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
     );
 }
 
-/// A late offer only triggers a hello; an offer that answers that hello is accepted.
+/// An offer that arrives too late only triggers a hello; an offer that answers that hello is accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {

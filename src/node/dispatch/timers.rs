@@ -9,7 +9,7 @@ use crate::side::Side;
 use crate::time::Instant;
 
 impl Node {
-    /// Handles expired timers, each layer once. Bounded by one portion of a computation.
+    /// Handles expired timers, each protocol layer once. Work: at most one portion of a long computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.duplicate.handle_timeout(now, &self.member.settings) {
             self.become_active(now);
@@ -109,14 +109,15 @@ impl Node {
         }
     }
 
-    /// Returns true while this relay computes the joint solution, as all relays of its view do.
+    /// Returns true while this relay computes by the joint method, as all relays of its view do.
     fn is_solving(&self, now: Instant) -> bool {
         self.layers
             .round
             .is_solving(&self.layers.context(now, &self.member))
     }
 
-    /// Restarts the timers for neighbours and for the first pass, which waited for the joint solution.
+    /// Restarts the timers for neighbours and for the first pass, after a computation by the joint method. They
+    /// waited for its end.
     fn on_solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);
@@ -127,12 +128,12 @@ impl Node {
         }
     }
 
-    /// Returns true if neither a pass has been received nor a view requested since the start.
+    /// Returns true if no pass along the chain was received and no view was requested since the start.
     fn awaits_first(&self) -> bool {
         self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }
 
-    /// Starts the timer for the first pass; when it expires, the relay requests a view.
+    /// Starts the timer for the first pass (message along the chain). When it expires, the relay requests a view.
     pub(super) fn await_first(&mut self, now: Instant) {
         let (settings, all) = (&self.member.settings, self.member.all);
         let there_and_back = settings.hop_time.times(2 * u32::from(all));

@@ -23,11 +23,12 @@ use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum doublings of the hold-down, and its maximum in units of `dead_after`.
+/// Maximum number of doublings of a flapping link's hold-down, the time for which it is not used. `LONGEST` is the
+/// longest hold-down, in units of `dead_after`.
 const DOUBLINGS: u8 = 3;
 const LONGEST: u32 = 6;
 
-/// Losses after which a link does not count as flapping yet.
+/// Maximum number of losses of a link that does not count as flapping yet.
 const FORGIVEN: u8 = 2;
 
 /// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
@@ -36,7 +37,7 @@ const SLOW: u32 = 10;
 /// Time after the last loss at which losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
-/// Node that has been heard repeatedly.
+/// Node from which frames have been received, with the times of the first and the last one.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     distance: u16,
@@ -45,7 +46,8 @@ struct Heard {
 }
 
 impl Heard {
-    /// Updates the record with a frame at `now`. A silence of more than `gap` or another node restarts it.
+    /// Returns the record after a frame at `now` from the node at `distance`. A silence of more than `gap`, or
+    /// another node, starts the record again.
     fn again(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
             Some(known) if known.distance == distance && now.since(known.last) <= gap => {
@@ -61,19 +63,19 @@ impl Heard {
     }
 }
 
-/// State of the link to one node.
+/// Losses of the link to one node, from which a flapping link is recognised.
 #[derive(Clone, Copy, Debug)]
 struct Link {
-    /// Time of the last loss.
+    /// Time at which the link was lost last.
     lost_at: Instant,
-    /// Frames since the last loss; `None` before the first one.
+    /// Times of frames since the last loss of the link; `None` before the first one.
     back: Option<Heard>,
     losses: u8,
     /// True if `losses` does not include the last loss, because the channel was bad.
     excused: bool,
-    /// True if the last loss was an outage: no frame arrived for longer than `dead_after` after it.
+    /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
     was_down: bool,
-    /// Time between the last two losses.
+    /// Time between the last two losses of the link.
     apart: Duration,
 }
 
@@ -89,7 +91,7 @@ impl Link {
         }
     }
 
-    /// Number of losses that are not forgotten yet.
+    /// Returns the number of losses of the link, or 0 if the last one was long ago.
     #[inline(never)] // called from many places
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
         if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
@@ -99,7 +101,7 @@ impl Link {
         }
     }
 
-    /// Returns true if the link is held down.
+    /// Returns true if the link may not be used yet (hold-down), because it was lost repeatedly.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(FORGIVEN + 1) else {
             return false;
@@ -109,7 +111,7 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss after `losses` earlier losses. The number of losses grows if `counted` is true.
+    /// Records a loss of the link after `losses` earlier losses. The number of losses grows if `counted` is true.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -126,10 +128,10 @@ impl Link {
     }
 }
 
-/// Losses of the links on one side, nearest node first.
+/// Losses of the links to the nodes on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that may be selected once it has been heard for long enough.
+    /// Node that may be selected as neighbour once it has been heard for long enough.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -142,7 +144,7 @@ impl Damping {
         }
     }
 
-    /// Starts the record at `now`, in place. A copy would need more stack than any other start-up step.
+    /// Starts the record of losses at `now`, in place. A copy would need more stack than any other start-up step.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);
@@ -157,9 +159,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the node `distance` places away. `counts` is false if many frames are lost on the channel: the loss is
-    /// then added only if the link has flapped before. If another link on this side flaps, this link inherits its losses, because
-    /// both cross the same gap.
+    /// Records the loss of the link to the node `distance` relays away. `counts` is false if many frames are lost on
+    /// the channel: the loss is then added only if the link has flapped before. If another link on this side flaps,
+    /// this link inherits its losses, because both cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -175,8 +177,8 @@ impl Damping {
         }
     }
 
-    /// Records a frame from the node `distance` places away. `asks` is the start of the search while the side has no neighbour: a
-    /// candidate that has answered the search and is then silent for longer than `gap` counts as lost.
+    /// Records a frame from the node `distance` relays away. `asks` is the start of the search while the side has no
+    /// neighbour: a candidate that has answered the search and is then silent for longer than `gap` counts as lost.
     pub(super) fn record_hello(
         &mut self,
         distance: u16,
@@ -206,13 +208,15 @@ impl Damping {
         link.back = Some(Heard::again(link.back, distance, now, gap));
     }
 
-    /// Returns true if no candidate has answered since the search began. It began at `since`, at least `probe_after` ago.
+    /// Returns true if no node has answered the search for a neighbour since `since`, when it began. The search must
+    /// have begun at least `probe_after` ago.
     fn is_gap(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the losses of all links to the losses of the last lost link. All links cross the same gap.
+    /// Raises the number of losses of every link to that of the link that was lost last. The cause is the same,
+    /// because all links cross the same gap in the chain.
     fn share(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
@@ -226,38 +230,39 @@ impl Damping {
         }
     }
 
-    /// Returns true if the link to the node `distance` places away is held down.
+    /// Returns true if the link to the node `distance` relays away is held down: not used, as it flaps.
     pub(super) fn is_held_down(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let link = self.link(distance);
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if a link on this side flaps slowly: then it is worth noticing its next loss early. Such a link has been lost
-    /// more often than is forgiven, and stays up for long each time.
+    /// Returns true if a link on this side flaps slowly, so that its next loss should be noticed early. Such a link
+    /// has been lost more often than is forgiven, and stays up for long each time.
     pub(super) fn is_slow(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW);
         let is_slow = |link: &Link| link.recent(now, settings) > FORGIVEN && link.apart >= slow;
         self.links.iter().any(is_slow)
     }
 
-    /// Returns true if the last loss of the link to the node `distance` places away was an outage.
+    /// Returns true if the last loss of the link to the node `distance` relays away was an outage.
     pub(super) fn was_down(&self, distance: u16) -> bool {
         self.link(distance).is_some_and(|link| link.was_down)
     }
 
-    /// Returns the nodes whose links are held down, as a bit mask: bit 0 is the nearest one.
+    /// Returns the nodes whose flapping links are not used (held down), as a bit mask. Bit 0 is the nearest node.
     pub(super) fn held_down_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
             .filter(|distance| self.is_held_down(*distance, now, settings))
             .fold(0, |held, distance| held | mask(distance))
     }
 
-    /// Removes the candidate.
+    /// Forgets the node that was a candidate for the neighbour.
     pub(super) const fn clear(&mut self) {
         self.candidate = None;
     }
 
-    /// Returns true if the candidate has been heard for `probe_after`, and for `more` if that is longer. It is heard now.
+    /// Records that the candidate `distance` relays away is heard now. Returns true if it has been heard without a
+    /// gap for `probe_after`, and for `more` if that is longer.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,
@@ -292,7 +297,7 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// Returns a new side at second 1 000.
+    /// Returns the record of a side without losses, the time 1 000 s, and the default settings.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())

@@ -3,20 +3,21 @@
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Number of nodes on one side that are sent a hello.
+/// Number of nearest nodes on one side that may become the neighbour and are sent hellos.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Interval after which a report about a node is repeated.
+/// Interval after which a report about the same node is repeated.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// Consecutive occurrences of an event for each of the nearest nodes, nearest first.
+/// Numbers of consecutive occurrences of an event, for each of the nearest nodes, nearest first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
 impl ConsecutiveCounts {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// Counts the event `so` for the node `distance` places away. Returns true if it is exactly the `most`-th in a row.
+    /// Counts an event of the node `distance` relays away, or resets its count if `so` is false. Returns true if it
+    /// is exactly the `most`-th event in a row.
     pub(super) fn count(&mut self, distance: u16, so: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {
@@ -32,7 +33,7 @@ impl ConsecutiveCounts {
     }
 }
 
-/// Nodes on one side that can be heard.
+/// Nodes on one side that have been received recently.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hearing {
     since: Instant,
@@ -40,7 +41,7 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Nodes on one side that were reported recently: each once a minute.
+/// Limiter of reports about nodes on one side: one report a minute for each node.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ReportLimiter {
     since: Instant,
@@ -53,7 +54,7 @@ impl ReportLimiter {
         nodes: 0,
     };
 
-    /// Returns true if the node `distance` places away has not been reported in this minute. Marks it as reported.
+    /// Returns true if the node `distance` relays away has not been reported in this minute. Marks it as reported.
     pub(super) fn should_report(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
             *self = Self {
@@ -67,7 +68,7 @@ impl ReportLimiter {
     }
 }
 
-/// Returns the bit of the node `distance` places away.
+/// Returns the bit of the node `distance` relays away, 1 to 4, in a mask of nodes; else 0.
 pub(super) const fn mask(distance: u16) -> u8 {
     if distance >= 1 && distance <= CANDIDATES {
         1 << (distance - 1)
@@ -90,13 +91,13 @@ impl Hearing {
         self.now |= mask(distance);
     }
 
-    /// Returns the nodes heard in the last two periods, as a bit mask.
+    /// Returns the nodes received in the last one to two `probe_after`, as a bit mask.
     pub(super) fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
         self.age(now, settings);
         self.now | self.before
     }
 
-    /// Forgets nodes that were not heard for two periods of `probe_after`.
+    /// Forgets nodes that have not been received for two periods of `probe_after`.
     fn age(&mut self, now: Instant, settings: &Settings) {
         let span = now.since(self.since);
         if span < settings.probe_after {
@@ -109,7 +110,7 @@ impl Hearing {
     }
 }
 
-/// Candidates with a pending hello, and candidates whose hello requests an answer. Bit 0 is the nearest node.
+/// Hellos due to the nearest nodes on one side, and those of them that request an answer. Bit 0 is the nearest node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     owed: u8,
@@ -119,7 +120,7 @@ pub(super) struct Hellos {
 impl Hellos {
     pub(super) const NONE: Self = Self { owed: 0, asks: 0 };
 
-    /// Schedules a hello to the candidate `distance` places away; with `ask` it requests an answer.
+    /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.
     pub(super) const fn schedule(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
         self.owed |= bit;
@@ -128,13 +129,14 @@ impl Hellos {
         }
     }
 
-    /// Schedules hellos that request an answer to all candidates.
+    /// Schedules hellos that request an answer, to the four nearest nodes on this side.
     pub(super) const fn schedule_all(&mut self) {
         self.owed = 0x0F;
         self.asks = 0x0F;
     }
 
-    /// Returns the distance of the nearest candidate with a pending hello. The second value is true if that requests an answer.
+    /// Returns the distance of the nearest node with a pending hello, in relays. The second value is true if the
+    /// hello requests an answer.
     pub(super) fn poll(&mut self) -> Option<(u16, bool)> {
         let distance = (1..=CANDIDATES).find(|distance| self.owed & mask(*distance) != 0)?;
         let bit = mask(distance);

@@ -18,19 +18,20 @@ use crate::node::context::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Minimum number of unanswered questions before a neighbour is lost.
+/// Minimum number of unanswered heartbeat requests (questions) before a neighbour is lost.
 const QUESTIONS: u16 = 16;
 
-/// Factor on the recent maximum of unanswered questions.
+/// Factor on the recent maximum of unanswered heartbeat requests. A neighbour is lost only after a run that is that
+/// much longer.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between urgent questions: sixteen or more fit before `dead_after`. It is as short as one channel allows
-/// for all of a chain of `all` relays.
+/// Returns the interval between heartbeat requests to a silent neighbour. Sixteen or more fit before `dead_after`.
+/// The interval is as short as one channel allows for all of a chain of `all` relays.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(QUESTIONS))
 }
 
-/// Returns the interval between questions while many relays of a shared channel have no agreement yet.
+/// Returns the interval between heartbeat requests while many relays have no agreement yet. They share one channel.
 ///
 /// Three or more questions fit before `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
@@ -56,7 +57,7 @@ fn third(number: u64) -> u64 {
     u64::from(high / 3) << 32 | u64::from(rest)
 }
 
-/// Returns the round trip through the chain, but at most `most_micros`.
+/// Returns the round trip through a chain of `all` relays, but at most `most_micros`, µs.
 #[inline(never)] // called from both
 fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     let least = waiting(settings) / 64 + 1;
@@ -65,35 +66,35 @@ fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     Duration::from_micros(micros)
 }
 
-/// Returns the silence after which a sign of life is requested. It is `Settings::probe_after`, or the round trip through a chain
-/// of `all` relays if that is longer.
+/// Returns the silence after which a heartbeat is requested. It is `Settings::probe_after`, or the round trip through
+/// a chain of `all` relays if that is longer.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Number of past questions whose answers are accepted.
+/// Number of past heartbeat requests whose answers are accepted.
 const OPEN: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Time of the last sign of life, or of this relay's start.
+    /// Time of the neighbour's last sign of life, or of this relay's start.
     heard: Instant,
     lost: bool,
-    /// True once a frame has been received since the start or the last loss.
+    /// True once a frame of the neighbour has been received since the start or its last loss.
     met: bool,
-    /// Number of the last question, 0 before any.
+    /// Number of the last heartbeat request (question) to the neighbour, 0 before any.
     question: u16,
-    /// Times of the last questions, latest first.
+    /// Times of the last heartbeat requests, latest first.
     asked: [Instant; OPEN],
-    /// Number of questions since the last sign of life.
+    /// Number of heartbeat requests since the neighbour's last sign of life.
     unanswered: u16,
-    /// Recent maximum of `unanswered` at an answer. It starts at [`QUESTIONS`], so that a channel that is not known yet counts as a
-    /// bad one, and decays with each answer.
+    /// Recent maximum of `unanswered` at an answer, which shows how bad the channel is. It starts at [`QUESTIONS`],
+    /// so that a channel that is not known yet counts as a bad one, and decays with each answer.
     longest: u16,
 }
 
-/// Result of a silence.
+/// Result of the check of a neighbour's silence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Silence {
     /// True if the neighbour is lost from this moment on.
@@ -103,7 +104,7 @@ pub(crate) struct Silence {
 }
 
 impl Liveness {
-    /// Value before the start: zeros.
+    /// State before the relay starts: all zeros.
     pub(super) const NONE: Self = Self {
         longest: 0,
         ..Self::new(Instant::ZERO)
@@ -121,9 +122,10 @@ impl Liveness {
         }
     }
 
-    /// Restarts with another node, and keeps the longest run of unanswered questions. That includes the run that has just ended:
-    /// if the previous node was not lost after all, the run was too short. If the link `was_down`, that run measures an outage
-    /// and not the channel, and is dropped. If the link `flaps` slowly, the earlier runs are dropped, too.
+    /// Starts again with another node, and keeps the longest run of unanswered requests. That includes the run that
+    /// has just ended: if the previous node was not lost after all, the run was too short. If the link `was_down`,
+    /// that run measures an outage and not the channel, and is dropped. If the link `flaps` slowly, the earlier runs
+    /// are dropped, too.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             QUESTIONS
@@ -153,7 +155,7 @@ impl Liveness {
         self.lost && !self.met
     }
 
-    /// Returns the longest plausible run of lost frames on this channel.
+    /// Returns the longest silence that lost frames alone plausibly cause, with a request every `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }
@@ -163,12 +165,12 @@ impl Liveness {
         self.longest <= QUESTIONS
     }
 
-    /// Records a received frame.
+    /// Records that a frame of the neighbour has been received.
     pub(crate) const fn record_frame(&mut self) {
         self.met = true;
     }
 
-    /// Records a sign of life as of `at`; returns true if the neighbour had been lost until now.
+    /// Records that the neighbour was alive at time `at`. Returns true if it had been lost until now.
     pub(crate) fn record_sign_of_life(&mut self, at: Instant) -> bool {
         self.heard = self.heard.max(at);
         self.met = true;
@@ -178,7 +180,7 @@ impl Liveness {
         core::mem::take(&mut self.lost)
     }
 
-    /// Returns the number of a new question.
+    /// Records a heartbeat request (question) sent at `now`, and returns its number.
     pub(crate) const fn next_request(&mut self, now: Instant) -> u16 {
         self.question = match self.question.wrapping_add(1) {
             0 => 1,
@@ -190,7 +192,7 @@ impl Liveness {
         self.question
     }
 
-    /// Returns the time at which question `number` was sent, if it is one of the last few.
+    /// Returns the time at which heartbeat request `number` was sent, if it is one of the last four.
     pub(crate) fn requested_at(&self, number: u16) -> Option<Instant> {
         if number == 0 || self.question == 0 {
             return None;
@@ -199,7 +201,7 @@ impl Liveness {
         self.asked.get(usize::from(before)).copied()
     }
 
-    /// Restarts the measurement of the neighbour's silence; returns true if the neighbour is not lost.
+    /// Measures the neighbour's silence from `now` on. Returns true if the neighbour is not lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.heard = now;
@@ -207,7 +209,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks a silence; the neighbour is not lost before `dead`.
+    /// Checks the neighbour's silence at `now`. The neighbour is not lost before a silence of `dead`; `tick` is the
+    /// time to the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

@@ -26,13 +26,13 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// Value before the start.
+    /// State of both sides before the relay starts.
     pub(crate) const NONE: Self = Self {
         upstream: Neighbour::NONE,
         downstream: Neighbour::NONE,
     };
 
-    /// Starts node `node` of a chain of `all` relays at `now`.
+    /// Starts both sides of node `node`, in a chain of `all` relays, at time `now`.
     pub(crate) fn begin(
         &mut self,
         node: u16,
@@ -65,7 +65,7 @@ impl Neighbours {
         }
     }
 
-    /// Returns the neighbours toward Tx and toward Rx.
+    /// Returns the node numbers of the neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub(crate) fn nodes(&self) -> [Option<u16>; 2] {
         [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
     }
@@ -81,13 +81,14 @@ impl Neighbours {
         self.downstream.leave();
     }
 
-    /// Records on both sides that a proposal was refused.
+    /// Records on both sides that a view proposal was refused.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();
     }
 
-    /// Returns the next pending heartbeat. Its side, node, question number, and number of the question that it answers.
+    /// Returns the next pending heartbeat as (side, destination, own number, answered number). The own number is that
+    /// of its question, the answered number that of the neighbour's question; 0 for none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

@@ -38,9 +38,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// Selected node that, by its last report, has selected this relay, too.
+    /// A node is selected that, by its last report, has selected this relay, too.
     Linked,
-    /// Selected node that has not selected this relay, or no longer.
+    /// A node is selected that has not selected this relay, or does so no longer.
     Pairing {
         since: Instant,
     },
@@ -49,56 +49,58 @@ enum NeighbourState {
     },
 }
 
-/// State of one side.
+/// Neighbour on one side of this relay: its selection, its liveness and the search for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbour {
-    /// Selected node, 0 for none.
+    /// Node number of the selected neighbour, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time before which a returned node is no reason for a view. The node on its other side may be about to select it.
+    /// Time before which a returned node does not cause a request for a new view. The node on its other side may be
+    /// about to select it.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Selected node at the time the links were given up; 0 for none.
+    /// Node whose link was dropped last for want of a quorum, until another is selected; 0 for none.
     given_up: u16,
     /// Farther node that was replaced by the selected node; 0 for none.
     replaced: u16,
-    /// Start of the last search.
+    /// Start of the last search for a neighbour.
     searches_since: Instant,
-    /// Distance to the selected node, in places.
+    /// Distance to the selected node, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
-    /// Nodes that have reported hearing this relay.
+    /// Nodes on this side that have recently reported that they receive this relay.
     pub(super) both_ways: Hearing,
     /// Neighbour that each node on this side has selected toward this relay, nearest node first. 0 for none.
     pub(super) taken_by: [u16; CANDIDATES as usize],
-    /// Time of the last frame from a node that is not selected.
+    /// Time of the last frame from a node on this side that is not selected.
     near: Option<Instant>,
     /// Nodes that were heard recently.
     pub(super) hearing: Hearing,
-    /// Number of reports in a row, for each node, that it does not hear this relay.
+    /// Number of consecutive reports of each node on this side that it does not receive this relay.
     pub(super) unheard: ConsecutiveCounts,
-    /// Nodes reported as found since another node was linked or lost: bit 0 is the nearest one.
+    /// Nodes that were reported to the firmware as found since another node was linked or lost. Bit 0 is the nearest
+    /// node.
     found: u8,
-    /// Nodes of another mission.
+    /// Limiter of reports about nodes on this side that have another mission.
     pub(super) mismatches: ReportLimiter,
     /// Consecutive handshakes with each node's index that were signed with another key.
     pub(super) forged: ConsecutiveCounts,
-    /// Interval between questions.
+    /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
-    /// Silence after which a sign of life is requested.
+    /// Silence of the neighbour after which a heartbeat is requested.
     patience: Duration,
     jitter: Jitter,
     pub(super) signs: Signs,
-    /// Newest mission of the selected node, as far as it has reported.
+    /// Newest mission that the selected node has reported to hold; `None` if it has not.
     pub(crate) holds: Option<MissionId>,
-    /// Time of the next check for a sign of life.
+    /// Time of the next check of the neighbour's silence, or of the next step of the search.
     look_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
 
 impl Neighbour {
-    /// Value before the start. It is all zeros; any other value would be copied from flash.
+    /// State of a side before the relay starts: all zeros. Any other value would be copied from flash.
     pub(super) const NONE: Self = Self {
         node: 0,
         agreed: AgreedNodes::on(0),
@@ -127,7 +129,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts the side at `now` with neighbour `node`, 0 for none.
+    /// Starts this side of the relay at `now`, with the neighbour `node`, 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -167,12 +169,12 @@ impl Neighbour {
         self.node
     }
 
-    /// Returns true if no neighbour is selected and the search is over.
+    /// Returns true if this side has no neighbour and the search for one has ended without success.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true during the grace period after a node's return.
+    /// Returns true shortly after a node was selected again, while this causes no request for a new view.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
@@ -187,7 +189,7 @@ impl Neighbour {
         self.liveness.is_silent()
     }
 
-    /// Records a sign of life as of `at`; returns true if the neighbour had been lost until now.
+    /// Records that the neighbour was alive at time `at`. Returns true if it had been lost until now.
     pub(crate) fn record_sign_of_life(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.record_sign_of_life(at);
         if self.is_mutual() {
@@ -206,7 +208,7 @@ impl Neighbour {
         self.state == NeighbourState::Linked
     }
 
-    /// Records whether the neighbour has selected this relay; returns true if that is a change.
+    /// Records if the neighbour has selected this relay (`mutual`). Returns true if that is a change.
     pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -221,14 +223,15 @@ impl Neighbour {
         true
     }
 
-    /// Returns true if the selected node is to be reported as found, and marks it as reported.
+    /// Returns true if the selected node has not been reported as found yet, and marks it as reported.
     pub(crate) const fn should_report_found(&mut self) -> bool {
         let told = self.found;
         self.found |= mask(self.distance);
         self.found != told
     }
 
-    /// Restarts the silence of a neighbour in the same view; returns true if such a neighbour is not lost.
+    /// Measures the silence of a neighbour in the same view from `now` on. Returns true if there is such a neighbour
+    /// and it is not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -239,7 +242,7 @@ impl Neighbour {
         excused
     }
 
-    /// Returns true if the check for a sign of life is due.
+    /// Returns true if the check of the neighbour's silence, or the next step of the search, is due.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.look_at.is_some_and(|at| at <= now)
     }
@@ -248,8 +251,9 @@ impl Neighbour {
         self.look_at
     }
 
-    /// Handles a silence; returns true if the neighbour is lost from now on. It is not lost before `dead`. `searches` is true if
-    /// other nodes can be heard here. `asking` replaces the usual interval between questions.
+    /// Handles the timer of this side; returns true if the neighbour is lost from now on. It is not lost before a
+    /// silence of `dead`. `searches` is true if other nodes can be heard here. `asking` replaces the usual interval
+    /// between questions.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -319,10 +323,11 @@ impl Neighbour {
         lost
     }
 
-    /// Returns the silence of a node after which its link counts as down.
+    /// Returns the silence of a node after which the link to it counts as down.
     ///
-    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only. A few lost frames then make a
-    /// silence that is several times as long, so the link counts as down after the longest silence of any neighbour.
+    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only. A few lost
+    /// frames then make a silence that is several times as long, so the link counts as down after the longest silence
+    /// of any neighbour.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
         if self.has_no_peer() && !self.is_near(now, settings) {
             longest_lease(settings)
@@ -336,7 +341,7 @@ impl Neighbour {
             .is_some_and(|near| now.since(near) <= settings.dead_after)
     }
 
-    /// Records a frame of a node that is not selected. If the chain has ended here, the next check is soon.
+    /// Records a frame of a node that is not selected. If this side has no neighbour, it sends its next hellos soon.
     pub(crate) fn record_unselected(&mut self, now: Instant, settings: &Settings) {
         if self.has_no_peer() && !self.is_near(now, settings) {
             self.look_at = Some(now + self.tick);
@@ -344,7 +349,8 @@ impl Neighbour {
         self.near = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour. It then sends requests to all candidates.
+    /// Returns the start of the search while this side has no neighbour, else `None`. It then sends hellos to all
+    /// candidates.
     pub(super) const fn searching_since(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -365,7 +371,7 @@ impl Neighbour {
         node != 0 && self.given_up == node
     }
 
-    /// Releases the selected node and searches again, because the linked part of the chain has no quorum.
+    /// Drops the selected node and searches again, because this part of the chain has no quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -377,8 +383,8 @@ impl Neighbour {
         }
     }
 
-    /// Considers a node that has sent a hello and is not selected. Returns true if it is selected from now on. The candidate hears
-    /// this relay, and has selected this relay or none.
+    /// Decides if the node of a hello is selected as the neighbour from now on; returns true if so. The candidate
+    /// hears this relay, and has selected this relay or none.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
@@ -439,7 +445,7 @@ impl Neighbour {
     }
 }
 
-/// Node that is not selected and hears this relay.
+/// Candidate for the neighbour on one side: a node that is not selected and receives this relay.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "four things that its hello says"
@@ -447,21 +453,21 @@ impl Neighbour {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
-    /// Distance in places; `downstream` is true if the node is toward Rx.
+    /// Distance of the node, in relays along the chain. `downstream` is true if the node is toward Rx.
     pub(crate) distance: u16,
     pub(crate) downstream: bool,
-    /// True if the node has selected this relay.
+    /// True if the candidate has selected this relay as its neighbour.
     pub(crate) pairs: bool,
-    /// True if the node is nearer than the selected node.
+    /// True if the candidate is nearer than the selected node.
     pub(crate) nearer: bool,
-    /// True if the node is heard by the node beyond it.
+    /// True if the candidate has reported that it can be inserted between this relay and its neighbour.
     pub(crate) ready: bool,
-    /// True if this node connects more relays than the selected node.
+    /// True if the candidate connects more relays than the selected node.
     pub(crate) longer: bool,
 }
 
 impl Candidate {
-    /// Returns the number of nodes that may be between the candidate and the lost node.
+    /// Returns the number of nodes between the candidate and the nearest node, which is lost.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -473,51 +479,53 @@ impl Candidate {
 }
 
 impl Neighbour {
-    /// Returns true if the neighbour is certain and has changed. The comparison is with the one at the last decision on a proposal.
+    /// Returns true if the neighbour has changed since the last decision on a view proposal. The change must be
+    /// certain: the search is over, or the new neighbour is linked.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Returns true if the neighbour is the one of the agreed view.
+    /// Returns true if the selected neighbour is also the one in the agreed view.
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
 
-    /// Records the proposer. `Itself` means that this relay proposed and has no predecessor.
+    /// Records the origin of a view proposal. `Itself` means that this relay proposed and has no predecessor.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// Records that the proposal received from this side was granted.
+    /// Records that the view proposal received from this side was granted.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
 
-    /// Leaves the view: this side has no agreed neighbour.
+    /// Leaves the view: this side has no neighbour in the agreed view any more.
     pub(crate) const fn leave(&mut self) {
         self.agreed.agree(0);
     }
 
-    /// Records a refusal: there is no further request until the neighbour changes.
+    /// Records that a view proposal was refused. There is no further request until the neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that the proposal was granted and forwarded to the neighbour, or ended here.
+    /// Records that a view proposal was granted. It was forwarded to the neighbour on this side, or the chain `ends`
+    /// here.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Nodes on one side according to the decisions on views; 0 for none.
+/// Neighbours on one side according to the decisions on views; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
-    /// Neighbour in the agreed view.
+    /// Neighbour in the agreed view (agreed set of members).
     in_view: u16,
-    /// Neighbour at the last granted or refused proposal.
+    /// Neighbour at the last view proposal that was granted or refused.
     counted: u16,
-    /// Node that sent the last proposal.
+    /// Node that sent the last view proposal.
     proposer: u16,
 }
 
@@ -545,12 +553,12 @@ impl AgreedNodes {
         };
     }
 
-    /// Records that the proposal received from this side was granted.
+    /// Records that the view proposal received from this side was granted.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
 
-    /// Records that a proposal was granted with neighbour `node`.
+    /// Records that a view proposal was granted with `node` as the neighbour on this side.
     pub(super) const fn agree(&mut self, node: u16) {
         self.in_view = node;
         self.counted = node;
@@ -564,9 +572,9 @@ impl AgreedNodes {
 /// Pending heartbeat to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Signs {
-    /// True if a question is pending.
+    /// True if a heartbeat request (question) to the neighbour is pending.
     pub(super) ask: bool,
-    /// Number of the neighbour's question to answer, 0 for none.
+    /// Number of the neighbour's heartbeat request that is to be answered, 0 for none.
     pub(super) answer: u16,
 }
 
@@ -577,14 +585,17 @@ impl Signs {
     };
 }
 
-/// Consecutive reports of a node that it does not hear this relay: an answer or two may be lost.
+/// Number of consecutive hellos without reception of this relay after which their sender is reported.
+///
+/// Fewer may be due to a lost answer or two.
 const UNHEARD: u8 = 8;
 
-/// Consecutive handshakes with a node's index that are signed with another key.
+/// Number of consecutive handshakes of a node with another key after which the node is reported.
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Returns true if the node `distance` places away and this relay hear each other. The link is not held down.
+    /// Returns true if this relay and the node `distance` relays away receive each other. The link must not be held
+    /// down because it flaps.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held_down_nodes(now, settings);
         let is_in = |nodes: u8| mask(distance) & nodes != 0;
@@ -594,19 +605,20 @@ impl Neighbour {
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
-    /// Returns true if the neighbour on this side is linked and less than `distance` places away.
+    /// Returns true if the neighbour on this side is linked and less than `distance` relays away.
     pub(crate) fn joins_with(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
-    /// Returns true if the neighbour on this side is linked and more than `distance` places away.
+    /// Returns true if the neighbour on this side is linked and more than `distance` relays away.
     pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }
 
-    /// Records a hello of the node `distance` places away.
+    /// Records a hello of the node `distance` relays away.
     ///
-    /// `neighbour` is the one that it has selected toward this relay. `hears` is true if it receives this one.
+    /// `neighbour` is the node that the sender has selected toward this relay. `hears` is true if the sender receives
+    /// this relay.
     pub(crate) fn record_hello(
         &mut self,
         distance: u16,
@@ -623,13 +635,13 @@ impl Neighbour {
         }
     }
 
-    /// Returns the neighbour that the node `distance` places away has selected toward this relay. 0 for none.
+    /// Returns the neighbour that the node `distance` relays away has selected toward this relay. 0 for none.
     pub(crate) fn selected_by(&self, distance: u16) -> u16 {
         let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` places away. `taken` is true if that is the selected node.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if that is the selected node.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -646,49 +658,53 @@ impl Neighbour {
         }
     }
 
-    /// Returns the nodes heard recently whose links are not held down, as a bit mask. Bit 0 is the nearest one.
+    /// Returns the nodes received recently whose links are in use or usable, as a bit mask. Links that flap (held
+    /// down) are left out. Bit 0 is the nearest node.
     pub(crate) fn received_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         let held = self.damping.held_down_nodes(now, settings);
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Counts the reports of a node that it does not hear this relay. Returns true at the last of [`UNHEARD`] in a row.
+    /// Counts the reports of the node `distance` relays away that it does not receive this relay. Returns true at
+    /// exactly [`UNHEARD`] such reports in a row.
     pub(crate) fn record_reception(&mut self, distance: u16, heard: bool) -> bool {
         self.unheard.count(distance, !heard, UNHEARD)
     }
 
-    /// Returns true if the node `distance` places away has to be reported for its other mission.
+    /// Returns true if the node `distance` relays away has to be reported for having another mission.
     ///
     /// At most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.mismatches.should_report(distance, now)
     }
 
-    /// Counts a handshake that was signed with another key. Returns true at the last of [`FORGED`] in a row.
+    /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true at exactly
+    /// [`FORGED`] of them in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
 
-    /// Resets the count: the node `distance` places away has the key.
+    /// Resets the count of handshakes with another key: the node `distance` relays away has the right key.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
     }
 }
 
 impl Neighbour {
-    /// Records the neighbour's question with this number.
+    /// Records the number of the neighbour's heartbeat request, which a heartbeat will answer; 0 is none.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.signs.answer = number;
         }
     }
 
-    /// Returns the time at which the answered question `number` was sent.
+    /// Returns the time at which the answered heartbeat request `number` was sent; `None` if it is unknown.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat. Its node, question number, and number of the question that it answers.
+    /// Returns the pending heartbeat as (destination, own number, answered number). The own number is that of its
+    /// question, the answered number that of the neighbour's question; 0 for none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let Signs { ask, answer } = core::mem::take(&mut self.signs);
         if !(ask || answer != 0) || self.node == 0 {
@@ -702,12 +718,13 @@ impl Neighbour {
         Some((self.node, question, answer))
     }
 
-    /// Schedules a hello to the candidate `distance` places away; with `ask` it requests an answer.
+    /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.
     pub(crate) const fn schedule_hello(&mut self, distance: u16, ask: bool) {
         self.hellos.schedule(distance, ask);
     }
 
-    /// Returns the distance of the nearest candidate with a pending hello. The second value is true if that requests an answer.
+    /// Returns the distance of the nearest node with a pending hello, in relays. The second value is true if the
+    /// hello requests an answer.
     pub(crate) fn poll_hello(&mut self) -> Option<(u16, bool)> {
         self.hellos.poll()
     }

@@ -22,14 +22,16 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Answer, Message, Moved, Roster, Sweep, Token};
 
-/// Positions evaluated per call of [`Computation::work`] in Algorithm 2. A row of up to 24 more may be added.
+/// Maximum number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. The rest of a grid
+/// row, up to 24 more, may be added.
 pub(super) const PLACES_AT_ONCE: u16 = 600;
 
-/// True with the features for the methods beyond Algorithm 1; without them their code is unreachable.
+/// True if the feature `altitude` is on; `ADJUST` is the same for `adjust`. Without a feature the code of its method
+/// is unreachable.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
-/// Current pass with its data.
+/// Current pass along the chain, with its data.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(SweepPass),
@@ -38,37 +40,37 @@ pub(super) enum PassKind {
     Turn(TurnPass),
 }
 
-/// Solution of the joint method for this relay.
+/// Position that the joint method has computed for this relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
-    /// Cross-section: position across the line.
+    /// Cross-section of the position: lateral offset and altitude.
     pub(super) cross_section: CrossSection,
-    /// Maximum x, m.
+    /// Largest x of this relay that leaves the relays after it their separation, m.
     pub(super) end_m: f32,
-    /// True for a plain pass, in which no relay holds back.
+    /// True if no relay stops short of its farthest x to help the next hop (a plain pass).
     pub(super) plain: bool,
 }
 
-/// State of a relay's part in the algorithms.
+/// State of one relay in the placement algorithms: current pass, own position, task of the leader.
 #[derive(Clone, Debug)]
 pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True from the start of a pass at this relay until the start is reported.
+    /// True after this relay has started a pass along the chain, until the start is reported.
     pub(super) began: bool,
     /// Configured altitude and power of this relay.
     pub(super) profile: Profile,
-    /// Profiles of the relays of this view.
+    /// Profiles (altitude and power) of the relays of this view, for the joint method.
     pub(super) seats: Seats,
-    /// Solution of the joint method in this view, once it is computed.
+    /// Position of this relay by the joint method in this view, once it is computed.
     pub(super) chosen: Option<JointPlace>,
-    /// Cross-section of the agreed position.
+    /// Cross-section of the agreed position: lateral offset and altitude.
     pub(super) cross_section: CrossSection,
     /// Last reported position of the neighbour toward Rx.
     pub(super) after: Option<Placement>,
     pub(super) agreed_place: Option<Placement>,
-    /// Measured interference at the agreed position, in a field.
+    /// Meter of the interference at the agreed position, in a field of interference.
     pub(super) meter: Meter,
     /// Measurements of the interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
@@ -78,7 +80,8 @@ pub(crate) struct Computation {
 }
 
 impl Computation {
-    /// Creates the state after a start. `number` is the start of the leader's pass numbers; the leader has work at once.
+    /// Creates the state of the placement algorithms after a start. `number` seeds the pass numbers of the leader,
+    /// which has work to do at once.
     pub(crate) const fn new(
         leader: bool,
         number: u16,
@@ -104,7 +107,7 @@ impl Computation {
         }
     }
 
-    /// Returns true until the first task, pass or agreed position.
+    /// Returns true until this relay has its first task, pass along the chain, or agreed position.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::Idle) && self.agreed_place.is_none()
@@ -125,7 +128,7 @@ impl Computation {
         self.after = None;
     }
 
-    /// Starts the leader's search again: Algorithm 1 or 4 at the configured altitudes.
+    /// Starts the leader's search for the target SIR again: Algorithm 1 or 4 at the configured altitudes.
     pub(crate) fn restart(&mut self) {
         self.task.clear();
         // A new solution makes the leader try the same targets as the first time.
@@ -139,7 +142,7 @@ impl Computation {
         self.state.answer();
     }
 
-    /// Starts a new view, in which no pass has been received yet.
+    /// Starts a new view, in which no pass along the chain has been received yet.
     pub(crate) fn renew(&mut self, leads: bool) {
         self.task.clear();
         self.after = None;
@@ -149,7 +152,7 @@ impl Computation {
         self.state.renew(leads);
     }
 
-    /// Sets the agreed position to `place` and the cross-section to `at`.
+    /// Sets the agreed position to `place`, and its cross-section (lateral offset and altitude).
     #[inline(never)]
     pub(super) fn agree_on(&mut self, place: Placement, cross_section: CrossSection) {
         self.agreed_place = Some(place);
@@ -165,8 +168,8 @@ impl Computation {
 
     /// Continues this relay's part in the current pass, or the leader's preparation of the next one.
     ///
-    /// Bounded by 12 hops of 16 reaches, 128 points of an uneven field (or all of them for one target), ten relays of the joint
-    /// method, or 624 positions of Algorithm 2.
+    /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten
+    /// relays of the joint method, or 624 positions of Algorithm 2.
     pub(crate) fn work(&mut self, context: &Context<'_>) -> Action {
         if self.state.phase() == Phase::Waiting {
             match &self.pass {
@@ -191,7 +194,8 @@ impl Computation {
         }
     }
 
-    /// Returns the message to forward to the next relay, while the pass is outstanding.
+    /// Returns the message of the current pass along the chain, for the next relay. `None` if its result is known or
+    /// this relay still computes.
     pub(crate) fn onward(&self, context: &Context<'_>) -> Option<Message> {
         if self.state.phase() != Phase::Waiting {
             return None;
@@ -225,7 +229,7 @@ impl Computation {
         }
     }
 
-    /// Returns true if relays compute before they forward the current pass.
+    /// Returns true if relays compute before they forward the current pass along the chain.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
@@ -234,7 +238,7 @@ impl Computation {
         }
     }
 
-    /// Returns the result of the pass for the previous relay, once it is known.
+    /// Returns the result of the pass for the previous relay; `None` until it is known.
     pub(crate) fn back(&self, context: &Context<'_>) -> Option<Message> {
         if !self.state.is_answered() {
             return None;
@@ -278,7 +282,8 @@ impl Computation {
         }
     }
 
-    /// Returns this relay's station on a sweep: the joint method's if `chosen`, else the configured one.
+    /// Returns this relay's cross-section and power for a sweep. The cross-section is that of the joint method if
+    /// `chosen`, else the configured one.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -290,7 +295,8 @@ impl Computation {
         }
     }
 
-    /// Returns the completed rounds of Algorithm 2 and the SIR after the last one. `None` except at the leader.
+    /// Returns the number of completed rounds of Algorithm 2, and the SIR after the last one. `None` except at the
+    /// leader.
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         match &self.task {
             LeaderTask::Adjusting(rounds) => Some((rounds.done(), rounds.sir)),
@@ -302,7 +308,7 @@ impl Computation {
 /// Solver of the joint method for a whole chain.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
-/// Current task of the leader.
+/// Current task of the leader: prediction, joint method, search for the target SIR, or Algorithm 2.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -314,30 +320,30 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 pub(crate) enum LeaderTask {
     /// Idle: not the leader, not started, or finished.
     Idle,
-    /// Prediction of the chain's solution from the mission.
+    /// Prediction of the chain's target SIR from the mission, for the first sweep.
     Predicting(Planner),
     /// Computation of the chain by the joint method, which every relay runs.
     Solving(ChainSolver),
-    /// Search for the highest target at the current cross-sections.
+    /// Search for the highest feasible target SIR, by sweeps with fixed lateral offsets and altitudes.
     Searching {
         search: Search,
-        /// True if no other algorithm follows the search.
+        /// True if no other algorithm follows the search for the target SIR.
         last: bool,
-        /// True for a search at the configured altitudes, after one at the joint method's failed.
+        /// True for a search at the configured altitudes, because one at the joint method's has failed.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.
     Adjusting(Rounds),
 }
 
-/// Progress of Algorithm 2.
+/// Progress of Algorithm 2, in which the relays move one after the other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
     /// Completed rounds; the first pass, in which no relay moves, does not count.
     done: u16,
     turn: AdjustStep,
-    /// SIR of the chain after the last round, linear.
+    /// SIR of the chain's worst hop after the last round, linear.
     pub(crate) sir: f32,
 }
 
@@ -359,7 +365,8 @@ impl Rounds {
         self.done
     }
 
-    /// Records the result of a pass; returns true if it was the last one.
+    /// Records the result of a pass of Algorithm 2; returns true if it was the last one. `any` is true if a relay has
+    /// moved, `sir` the chain's SIR, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -395,7 +402,7 @@ impl LeaderTask {
         *self = Self::Solving(chain);
     }
 
-    /// Starts a search of targets; see [`Searching`](Self::Searching) for `last` and `given`.
+    /// Starts a search for the highest target SIR. See [`Searching`](Self::Searching) for `last` and `given`.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -409,14 +416,17 @@ impl LeaderTask {
     }
 }
 
-/// Hops of the prediction per call of [`Computation::work`], 16 reaches each. In an uneven field a part of one hop.
+/// Maximum number of hops that the prediction computes in one call of [`Computation::work`]. Each takes 16 targets.
+/// In a field of interference that is not uniform a call computes a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
-/// Hops per call in an even field, where a reach costs twice as much.
+/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A hop costs twice as
+/// much in a field of interference.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Computation {
-    /// Continues the leader's computation; returns true if the next pass can start.
+    /// Continues the leader's computation before a pass. Returns true if the pass can start, and `Infeasible` if
+    /// there is no feasible target SIR.
     pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
         if self.must_distribute(context) || self.must_gather(context) {
             return Ok(true);
@@ -481,7 +491,7 @@ impl Computation {
         )
     }
 
-    /// Starts the search of targets, with `ladder` as the first one if it is given.
+    /// Starts the search for the highest target SIR. `ladder`, if given, contains the targets of the first sweep.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,
@@ -491,7 +501,8 @@ impl Computation {
         self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
-    /// Starts the search at the configured cross-sections, because the joint method's are infeasible.
+    /// Starts the search for the target SIR at the configured lateral offset and altitude. Those of the joint method
+    /// are infeasible.
     pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }
@@ -513,7 +524,7 @@ impl Computation {
         Ok(())
     }
 
-    /// Starts the pass that the leader has planned.
+    /// Starts the pass along the chain that the leader has planned.
     pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
         let mission = context.mission();
         if self.must_distribute(context) {

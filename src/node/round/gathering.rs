@@ -18,18 +18,19 @@ use crate::wire::message::{OwnSeat, OwnSeats, Roster};
 use core::task::Poll;
 
 impl Computation {
-    /// Returns this relay's allowed cross-sections and power.
+    /// Returns this relay's power, and the lateral offsets and altitudes that it may take.
     pub(super) fn seat(&self, context: &Context<'_>) -> Seat {
         let holds = context.settings().hold_altitude;
         Seat::of(context.mission(), self.profile, holds)
     }
 
-    /// Returns true if this relay's profile differs from the mission's common one.
+    /// Returns true if this relay's altitudes or power differ from the mission's common profile.
     pub(super) fn has_own_profile(&self, context: &Context<'_>) -> bool {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Returns true at a leader whose next pass collects profiles: some differ, and not all are known.
+    /// Returns true if the leader's next pass has to collect the relays' profiles. Some differ from the common one,
+    /// and not all are known.
     pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
@@ -41,13 +42,13 @@ impl Computation {
             }
     }
 
-    /// Starts a pass that collects profiles, at the leader.
+    /// Starts a pass that collects the relays' profiles; called at the leader.
     pub(super) fn begin_gathering(&mut self, context: &Context<'_>) -> Action {
         let after = self.seats.known.unwrap_or(0);
         self.gather(context, after, OwnSeats::new())
     }
 
-    /// Handles a collecting pass from the previous relay.
+    /// Handles a pass that collects the relays' profiles, received from the previous relay.
     pub(crate) fn on_gather(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let own = context.index();
         let same = matches!(&self.pass, PassKind::Gather(known) if known.after == roster.after
@@ -97,7 +98,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// Handles the result of the pass from the next relay.
+    /// Handles the collected profiles of the relays, received from the next relay.
     pub(crate) fn on_gathered(&mut self, context: &Context<'_>, roster: &Roster) -> Action {
         let relays = context.mission().relays();
         if let PassKind::Gather(known) = &mut self.pass
@@ -132,9 +133,10 @@ impl Computation {
 /// Known profiles of the relays of the view.
 #[derive(Clone, Debug)]
 pub(super) struct Seats {
-    /// Number of known relays, counted from Tx; `None` before the first collecting pass.
+    /// Number of relays whose profiles are known, counted from Tx. `None` before the first pass that collects them.
     pub(super) known: Option<u16>,
-    /// Fixed altitude of each relay, m, or 0, and its power, W, or 0 for the mission's common profile.
+    /// Altitude that each relay must hold, m, or 0, and its power, W. The power is 0 for a relay with the mission's
+    /// common profile.
     own: [[f32; 2]; MOST_SOLVED],
 }
 
@@ -165,7 +167,7 @@ impl Seats {
         self.known.is_some_and(|known| known < relays)
     }
 
-    /// Stores the result of a pass along `relays`; returns true if all profiles are known.
+    /// Stores profiles that a pass along `relays` relays has collected. Returns true if all profiles are then known.
     pub(super) fn adopt(&mut self, roster: &Roster, relays: u16) -> bool {
         for seat in &roster.seats {
             let at = usize::from(seat.index).wrapping_sub(1);
@@ -180,13 +182,13 @@ impl Seats {
 }
 
 impl Computation {
-    /// Returns true while this relay has to compute its solution by the joint method.
+    /// Returns true while this relay still has to compute its position by the joint method.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues the joint solution while nothing else is to be done.
+    /// Continues this relay's computation by the joint method while the relay has nothing else to do.
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -208,7 +210,7 @@ impl Computation {
         }
     }
 
-    /// Continues the joint solution with the known profiles. Returns its target, linear SIR, when it is complete.
+    /// Continues the joint method with the known profiles. Returns the target SIR, linear, once it is complete.
     ///
     /// Without a solution this relay keeps its configured position, and the target is 0.
     #[inline(never)]
@@ -246,7 +248,7 @@ impl Computation {
         Some(target)
     }
 
-    /// Starts the solver; returns false if the chain cannot be solved.
+    /// Starts the solver of the joint method; returns false if it cannot solve this chain.
     #[inline(never)] // a solver is built here once
     fn begin_solving(&mut self, mission: &Mission) -> bool {
         let Some(chain) = ChainSolver::new(mission) else {
@@ -267,7 +269,8 @@ impl Computation {
         });
     }
 
-    /// Starts the search at the joint method's cross-sections, around `target` if it is known.
+    /// Starts the search for the target SIR with the lateral offsets and altitudes of the joint method. It starts
+    /// around `target`, if that is above 0.
     pub(super) fn search_chosen(
         &mut self,
         context: &Context<'_>,

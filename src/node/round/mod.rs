@@ -45,7 +45,8 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// Creates the state after a start. `number` is the start of the leader's pass numbers; the leader has work at once.
+    /// Creates the state of the agreement on positions after a start. `number` seeds the pass numbers of the leader,
+    /// which has work to do at once.
     pub(crate) const fn new(
         leads: bool,
         number: u16,
@@ -61,7 +62,8 @@ impl Round {
         }
     }
 
-    /// Handles a message of the current mission and view from the neighbour that may send it. Bounded by 16 reaches.
+    /// Handles a message of the current mission and view from the neighbour that may send it. Work: at most this
+    /// relay's positions for 16 target SIRs.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let before = computation.state;
@@ -102,7 +104,7 @@ impl Round {
         }
     }
 
-    /// Handles expired timers. Bounded by one portion of a computation.
+    /// Handles expired timers. Work: at most one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
@@ -128,7 +130,7 @@ impl Round {
         }
     }
 
-    /// Calls [`proceed`](Self::proceed), and adds changed sensing results since `before` to the effects.
+    /// Calls [`proceed`](Self::proceed), and adds to its effects what sensing has changed since `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -212,14 +214,14 @@ impl Round {
         self.proceed(context, Action::Work)
     }
 
-    /// Stops the current pass, because a new view is proposed.
+    /// Stops the current pass along the chain, because a new view is proposed.
     pub(crate) fn suspend(&mut self) {
         self.computation.suspend();
         self.circulation.cancel();
         self.work_at = None;
     }
 
-    /// Starts a new view. `leads` is true at the leader, `works` at a relay that computes at once.
+    /// Starts a new view at time `now`. `leads` is true at the leader, `works` at a relay that computes at once.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -237,12 +239,13 @@ impl Round {
         self.computation.discard_agreed_place();
     }
 
-    /// Schedules an outstanding pass once more: the next relay can be reached again.
+    /// Schedules an outstanding pass along the chain again, because the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
 
-    /// Returns the pending pass and starts its retransmission timer. `None` if the next relay is not `reachable`.
+    /// Returns the pending message of a pass along the chain, and starts its retransmission timer. `None` if the next
+    /// relay is not `reachable`.
     pub(crate) fn poll_onward(
         &mut self,
         context: &Context<'_>,
@@ -255,7 +258,7 @@ impl Round {
         reachable.then_some(message)
     }
 
-    /// Returns the pending reply and marks it as sent; `None` if the previous relay is not `reachable`.
+    /// Returns the pending reply to the previous relay and marks it as sent. `None` if that relay is not `reachable`.
     pub(crate) fn poll_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
         match self.circulation.poll_reply().filter(|_| reachable)? {
             Reply::Result => self.computation.back(context),
@@ -281,7 +284,7 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true until the first pass or view.
+    /// Returns true until this relay takes part in its first pass along the chain or its first view.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }

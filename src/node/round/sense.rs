@@ -28,16 +28,16 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
-/// Maximum of the sensing period, as a multiple of [`Listen::every`].
+/// Maximum interval between sensing passes, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// Passes without a change after which the period doubles.
+/// Number of sensing passes without a change after which the interval between them doubles.
 const PATIENCE: u8 = 4;
 
-/// Passes per `Listen::every` in a search for the faulty relay.
+/// Number of sensing passes in each `Listen::every` while the leader searches for a faulty relay.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Measurements in a row without interference after which the receiver may be faulty.
+/// Number of consecutive measurements without interference after which the receiver may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
@@ -46,7 +46,7 @@ impl Computation {
         SENSING && context.settings().listen.is_some() && context.mission().field().is_none()
     }
 
-    /// Returns true if the leader must distribute its estimate before any other pass.
+    /// Returns true if the leader must distribute its interference estimate before any other pass.
     pub(super) fn must_distribute(&self, context: &Context<'_>) -> bool {
         Self::is_sensing_enabled(context)
             && context.leads()
@@ -56,13 +56,13 @@ impl Computation {
                 .is_some_and(|sensor| !sensor.is_distributed)
     }
 
-    /// Returns true at a leader that may start a sensing pass: no other pass is due.
+    /// Returns true at a leader that may start a pass that collects measurements: no other pass is due.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::is_sensing_enabled(context) && context.leads() && settled
     }
 
-    /// Starts the timer of the next sensing pass, if one may follow.
+    /// Starts the timer of the next pass that collects measurements, if this relay may start one.
     pub(super) fn schedule_sensing(&mut self, context: &Context<'_>) {
         if let Some(listen) = context.settings().listen
             && self.may_sense(context)
@@ -73,7 +73,7 @@ impl Computation {
         }
     }
 
-    /// Starts a sensing pass at the leader.
+    /// Starts a pass along the chain that collects the measurements of all relays, at the leader.
     pub(super) fn begin_sense(&mut self, context: &Context<'_>) -> Action {
         let Some(sensor) = self.sensing.sensor_mut() else {
             return Action::Nothing;
@@ -93,7 +93,7 @@ impl Computation {
         self.sense(context, hearing, holds)
     }
 
-    /// Handles a sensing pass from the previous relay.
+    /// Handles a pass that collects measurements (sensing pass), received from the previous relay.
     pub(crate) fn on_sense(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         let same = matches!(&self.pass, PassKind::Sense(known)
             if known.hearing.estimate == hearing.estimate && known.from == hearing.sums);
@@ -157,7 +157,7 @@ impl Computation {
         Action::Forward
     }
 
-    /// Handles the result of a sensing pass from the next relay.
+    /// Handles the result of a pass that collects measurements (sensing pass), from the next relay.
     pub(crate) fn on_sensed(&mut self, context: &Context<'_>, hearing: &Heard) -> Action {
         if let (PassKind::Sense(known), Some(sensor)) = (&mut self.pass, self.sensing.sensor_mut())
             && self.state.is_awaited(hearing.number)
@@ -203,7 +203,8 @@ impl Computation {
         Action::Work
     }
 
-    /// Continues the search for a faulty relay with a pass; returns true if the pass has no other use.
+    /// Continues the leader's search for a faulty relay with the result of a pass. Returns true if the pass has no
+    /// other use.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -221,7 +222,7 @@ impl Computation {
         next == Next::Again
     }
 
-    /// Reviews the estimate with the result of a pass; returns true if it has changed.
+    /// Reviews the interference estimate with the result of a pass; returns true if it has changed.
     fn review_estimate(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -267,10 +268,10 @@ impl Computation {
         true
     }
 
-    /// Adds this relay's sums to the sums of later relays, and checks its receiver against these sums.
+    /// Checks this relay's receiver against the sums of the measurements of all other relays.
     ///
-    /// A relay that is excluded checks if it fits again. One whose measurement is absurd excludes itself; one that measures
-    /// nothing where the others measure much reports itself.
+    /// A relay that is excluded checks if it fits again. A relay whose measurement is absurd excludes itself; a relay
+    /// that measures nothing where the others measure much reports itself. Then its own sums are added.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,
@@ -315,10 +316,10 @@ impl Computation {
 /// True with the feature `sensing`; without it the sensing code is unreachable.
 pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
-/// Maximum distance of a measurement from Tx in each coordinate, as a multiple of D.
+/// Maximum distance of a measurement from Tx in each coordinate, in units of the distance Tx to Rx.
 const FARTHEST: f32 = 100.0;
 
-/// Sensing state of a relay; empty without the feature `sensing`.
+/// Sensing state of a relay: one element with the feature `sensing`, empty without it.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing([SensorState; SENSING as usize]);
 
@@ -328,42 +329,42 @@ pub(crate) struct Sensing([SensorState; SENSING as usize]);
 pub(super) struct SensorState {
     pub(super) listener: Listener,
     pub(super) estimate: NumberedEstimate,
-    /// Levels that the ground transmitter and receiver have reported to this relay.
+    /// Interference that the ground transmitter and the ground receiver have reported to this relay.
     pub(super) transmitter: Average,
     pub(super) receiver: Average,
     /// True while this relay excludes its own measurements, because they do not fit the other measurements.
     pub(super) off: bool,
-    /// Node excluded from the last pass; 0 for none.
+    /// Node whose measurements the last sensing pass excluded; 0 for none.
     pub(super) left_out: u16,
-    /// Node known to be faulty; 0 for none.
+    /// Node whose measurements are known to be faulty; 0 for none.
     pub(super) named: u16,
-    /// Leader only: search for the faulty relay.
+    /// Search for the relay with faulty measurements, at the leader only.
     pub(super) trial: Trial,
-    /// Leader only: ground ends whose measurements do not fit.
+    /// Ground stations (transmitter, receiver) whose measurements do not fit, at the leader only.
     pub(super) ends: EndsOff,
     /// True if the last measurements were inconsistent, and the faulty relay could not be identified.
     pub(super) contradicted: bool,
-    /// True if this relay measures nothing although the others' sums predict interference.
+    /// True if this relay measures nothing although the others' measurements predict interference here.
     pub(super) deaf: bool,
-    /// Number of consecutive measurements at or below the noise.
+    /// Number of consecutive measurements of this relay at or below the receiver's noise.
     pub(super) silent: u8,
-    /// Position of the last measurement at or below the noise.
+    /// Position of the last measurement at or below the receiver's noise.
     pub(super) silent_at: Placement,
-    /// Leader only: true if the relays of the view have received the estimate.
+    /// True if the relays of the view have received the estimate; at the leader only.
     pub(super) is_distributed: bool,
     /// Amount of measurements, and expected error, with which the estimate was adopted.
     pub(super) known: Knowledge,
-    /// Reason why the last sums gave no estimate.
+    /// Reason why the last collected measurements gave no estimate; `None` if they did.
     pub(super) unfit: Option<Unfit>,
-    /// Sensing period in multiples of `Listen::every`.
+    /// Interval between sensing passes, as a multiple of `Listen::every`.
     pub(super) wait: u32,
-    /// Number of consecutive passes that did not change the estimate.
+    /// Number of consecutive sensing passes that did not change the estimate.
     pub(super) kept: u8,
-    /// End of the current sensing period.
+    /// Time of the next sensing pass; `None` while none is scheduled.
     pub(super) at: Option<Instant>,
 }
 
-/// Initial estimate: the interference of the mission.
+/// Initial estimate: the interference that the mission configures.
 const AS_LOADED: NumberedEstimate = NumberedEstimate {
     number: 0,
     estimate: InterferenceEstimate::Mission,
@@ -418,7 +419,7 @@ impl Sensing {
         }
     }
 
-    /// Handles the load of another mission: its interference becomes the estimate.
+    /// Handles a new mission: the interference that it configures becomes the estimate.
     pub(super) const fn load(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
             sensor.estimate.estimate = InterferenceEstimate::Mission;
@@ -436,7 +437,7 @@ impl Sensing {
         self.sensor()?.at
     }
 
-    /// Returns true once when the timer has expired.
+    /// Returns true if the timer of the next sensing pass has expired, and stops the timer.
     pub(super) fn poll_due(&mut self, now: Instant) -> bool {
         self.sensor_mut()
             .is_some_and(|sensor| sensor.at.take_if(|at| *at <= now).is_some())
@@ -449,7 +450,7 @@ impl Sensing {
         }
     }
 
-    /// Returns the reason why the last sums gave no estimate; leader only.
+    /// Returns the reason why the last collected measurements gave no estimate; leader only.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
         match self.sensor() {
             Some(sensor) => sensor.unfit,
@@ -457,7 +458,7 @@ impl Sensing {
         }
     }
 
-    /// Returns the level that the ground end at `side` has reported, W; `None` without a report.
+    /// Returns the interference that the ground station at `side` has reported, W; `None` without a report.
     pub(crate) fn level_w(&self, side: Side) -> Option<f32> {
         let sensor = self.sensor()?;
         let level_w = match side {
@@ -484,7 +485,7 @@ impl Sensing {
 }
 
 impl SensorState {
-    /// Returns the level of a ground end from its `average`, with its weight faded to `now`.
+    /// Returns the interference at a ground station from its `average`, with a weight that fades by `now`.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {
@@ -528,18 +529,18 @@ impl SensorState {
     }
 }
 
-/// State of a sensing pass at one relay.
+/// State of a pass that collects measurements (sensing pass), at one relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums received from the previous relay.
+    /// Sums of measurements received from the previous relay.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the positions in use were agreed on with this estimate.
+    /// True if the positions in use were agreed on with this estimate of the interference.
     pub(super) holds: bool,
 }
 
-/// Results of sensing, of which changes are reported.
+/// Sensing results whose changes are reported to the firmware.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Findings {
     pub(super) estimate: NumberedEstimate,
@@ -551,7 +552,7 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Returns the differences from `before`. As a faulty node, 0 is the transmitter and `all` + 1 the receiver.
+    /// Returns what has changed since `before`. A faulty node of 0 is the transmitter, one of `all` + 1 the receiver.
     #[inline(never)] // called from several places
     pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
         let off = if self.off != before.off && self.off != 0 {
@@ -571,7 +572,7 @@ impl Findings {
     }
 }
 
-/// Adds a measurement of a ground end to `average`; returns false if it is not above the noise.
+/// Adds a measurement of a ground station to `average`; returns false if it is not above the noise.
 fn take_level(
     average: &mut Average,
     now: Instant,
@@ -584,7 +585,8 @@ fn take_level(
     heard_w.is_some()
 }
 
-/// Returns true if a measurement at `at` is within [`FARTHEST`] times D of Tx in each coordinate.
+/// Returns true if a measurement at `at` is near enough to Tx to be used. Each coordinate is at most [`FARTHEST`]
+/// times `distance_m`, the distance from Tx to Rx.
 fn is_near(at: Placement, distance_m: f32) -> bool {
     let far_m = FARTHEST * distance_m;
     [at.x_m, at.y_m, at.altitude_m]

@@ -18,67 +18,67 @@
 
 use crate::node::circulation::LateMessages;
 
-/// State of a relay in the protocol.
+/// Phase of a relay in the agreement on positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
-    /// Idle: this relay has not received a pass yet.
+    /// Idle: this relay has not received a pass (message along the chain) yet.
     Idle,
-    /// The leader is computing its first targets.
+    /// The leader computes the targets of its next pass.
     Planning,
-    /// A pass or a proposal has been forwarded, and its result is not known yet.
+    /// A message along the chain (pass or view proposal) has been forwarded; its result is not known yet.
     Waiting,
-    /// The last pass of the leader has completed without an agreement.
+    /// The last pass (message along the chain) has completed without an agreement.
     Answered,
     /// The chain has agreed; the relay holds its position.
     Holding,
-    /// The leader has found that no target is feasible. All relays keep their positions.
+    /// The leader has found that no target SIR is feasible. All relays keep their positions.
     Infeasible,
-    /// A new view is proposed; passes wait for its decision.
+    /// A new view (set of members) is proposed; passes wait for its decision.
     ViewChange,
     /// Missing quorum: too few relays are reachable, and this part of the chain holds its positions.
     NoQuorum,
 }
 
-/// Next action of the node.
+/// Next action of the relay after a message or a portion of work.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
     Nothing,
     /// Count a stale message.
     Stale,
-    /// Discard the pending messages, and call `work` again after a pause.
+    /// Discard the pending messages, and continue the computation after a pause.
     Work,
-    /// Call `work` after a pause; pending messages stay.
+    /// Continue the computation after a pause; pending messages stay.
     Think,
-    /// Forward the pass, with retransmission.
+    /// Forward the pass along the chain, with retransmission.
     Forward,
-    /// Reply to a duplicate.
+    /// Reply to a duplicate of the current pass.
     Repeat,
-    /// Send the result to the previous relay.
+    /// Send the result of the pass to the previous relay.
     Answer {
-        /// True if the chain has agreed.
+        /// True if the chain has agreed on its positions.
         agreed: bool,
     },
-    /// Complete the pass at the leader, which has no next pass to start.
+    /// Complete the pass along the chain at the leader, which has no next one to start.
     Settled,
-    /// Report that no target is feasible.
+    /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view, because this pass cannot be joined.
+    /// Request a new view, because this relay cannot take part in the pass along the chain.
     Foreign,
 }
 
-/// Classification of a received pass.
+/// Classification of a received pass along the chain, by its number and its content.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Pass of a restarted leader, or one that follows missed passes.
+    /// Pass of a restarted leader, or one that follows passes which this relay has missed.
     Foreign,
 }
 
 impl Arrival {
-    /// Returns the action for a pass that is not new.
+    /// Returns the action for a pass along the chain that is not new; `None` for a new one.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -89,18 +89,21 @@ impl Arrival {
     }
 }
 
-/// Maximum distance behind the current number of a late pass. Other numbers except the next one are foreign.
+/// Maximum number by which a late pass is behind the current one. A pass with another number, except the next one, is
+/// foreign: from a restarted leader, or after missed passes.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of a pass number: the first pass of a leader has a multiple of it, and no later pass has.
+/// Divisor of pass numbers: only the first pass of a leader's start or of a view has a multiple of it. By that a
+/// relay recognises a first pass, which it can join without knowing earlier ones.
 const INCARNATION: u16 = 64;
 
-/// Phase and number of the current pass.
+/// Phase of the relay, and number of the current pass along the chain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass was started or received in this view; in the loaded view, since the relay's start.
+    /// True once a pass along the chain was started or received in this view. In the loaded view it counts from the
+    /// relay's start.
     begun: bool,
     late_messages: LateMessages,
 }
@@ -131,7 +134,7 @@ impl RoundState {
         self.phase = Phase::Waiting;
     }
 
-    /// Sets the phase to `Answered`: the pass has completed without an agreement, or was given up.
+    /// Sets the phase to `Answered`: a pass along the chain has ended without an agreement.
     pub(crate) const fn answer(&mut self) {
         self.phase = Phase::Answered;
     }
@@ -154,7 +157,7 @@ impl RoundState {
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Increments the number for a new pass of the leader.
+    /// Increments the number for a new pass along the chain, at the leader.
     pub(crate) const fn begin(&mut self) {
         self.number = if self.begun {
             self.next()
@@ -173,14 +176,15 @@ impl RoundState {
         }
     }
 
-    /// Accepts a new pass with `number`.
+    /// Accepts a new pass along the chain, with `number`, as the current one.
     pub(crate) const fn accept(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a pass with `number`; `same` is true if its content equals that of the current pass.
+    /// Classifies a received pass along the chain by its `number`. `same` is true if its content equals that of the
+    /// current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
             // A relay that has missed the first pass cannot join later ones; it requests a new view.
@@ -199,7 +203,7 @@ impl RoundState {
         }
     }
 
-    /// Counts a late pass; too many in a row are foreign.
+    /// Counts a late pass along the chain; too many in a row are classified as foreign.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign
@@ -208,23 +212,23 @@ impl RoundState {
         }
     }
 
-    /// Returns true if the result of pass `number` is outstanding.
+    /// Returns true if the result of pass `number` is awaited.
     pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Returns true if the result of the pass of `before` has been received since.
+    /// Returns true if the result of the current pass has been received since the earlier state `before`.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number
     }
 
-    /// Returns true if the next pass has been received since `before`, in which a reply was sent.
+    /// Returns true if a next pass has been received since the state `before`, which had sent a result.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }
 
-    /// Returns true if a result is available for a reply.
+    /// Returns true if the result of the current pass is known, so that it can be sent as a reply.
     pub(crate) fn is_answered(self) -> bool {
         matches!(self.phase, Phase::Answered | Phase::Holding)
     }
@@ -235,7 +239,7 @@ mod tests {
     use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
     use crate::node::circulation::SUSPICIOUS;
 
-    /// Returns a state after pass 200.
+    /// Returns the state of a relay whose last pass has the number 200.
     fn begun() -> RoundState {
         let mut state = RoundState::new(Phase::Idle, 0);
         state.accept(200);

@@ -13,7 +13,7 @@ use crate::settings::Method;
 use crate::wire::message::{Answer, Sweep};
 
 impl Computation {
-    /// Handles a sweep from the previous relay.
+    /// Handles a sweep of target SIRs from the previous relay.
     pub(crate) fn on_sweep(&mut self, context: &Context<'_>, sweep: &Sweep) -> Action {
         let behind = Behind {
             relay: sweep.relay,
@@ -45,7 +45,8 @@ impl Computation {
         )
     }
 
-    /// Starts this relay's part in a sweep. `from` are the reaches of the previous relay, m.
+    /// Starts this relay's part in a sweep of target SIRs. `from` are the farthest x that the previous relay can take
+    /// for each target (its reaches), m.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -67,7 +68,7 @@ impl Computation {
         self.continue_sweep(context)
     }
 
-    /// Continues this relay's part in a sweep by one portion.
+    /// Continues this relay's part in a sweep of target SIRs by one portion of work.
     pub(super) fn continue_sweep(&mut self, context: &Context<'_>) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         if ALTITUDE && is_chosen && self.chosen.is_none() {
@@ -88,7 +89,7 @@ impl Computation {
         }
     }
 
-    /// Handles a verdict from the next relay.
+    /// Handles a verdict, the result of a sweep of target SIRs, from the next relay.
     pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &Answer) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         let link = self.link(context, is_chosen);
@@ -101,7 +102,7 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the known verdict: agrees on the position of a committed target, else continues the search.
+    /// Handles the known result of a sweep. Agrees on the position for a committed target, else continues the search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;
@@ -148,7 +149,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Completes the agreement on a target, unless another algorithm of the leader follows.
+    /// Completes the agreement on a target SIR, unless another algorithm of the leader follows.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
         self.state.settle();
         if let LeaderTask::Searching { last: false, .. } = self.task {
@@ -170,27 +171,27 @@ impl Computation {
     }
 }
 
-/// State of a sweep at one relay.
+/// State of a sweep of target SIRs at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
     /// Checksum of the received sweep, see [`fingerprint`].
     pub(crate) fingerprint: u32,
-    /// True if relays use the joint method's cross-sections.
+    /// True if the relays use the lateral offsets and altitudes of the joint method.
     pub(crate) chosen: bool,
-    /// True if a later relay of the pass has its own profile.
+    /// True if a later relay of the pass has an altitude or power of its own.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Reaches of the previous relay, m.
+    /// Farthest x that the previous relay can take for each target (its reaches), m.
     from: PerTarget,
-    /// Reach of this relay for each target, m.
+    /// Farthest x that this relay can take for each target (its reaches), m.
     pub(crate) reaches: PerTarget,
-    /// True once all reaches are computed.
+    /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
-    /// Position of this relay by the verdict, m along x.
+    /// Position that this relay takes for the committed target, m along x; `None` without one.
     place: Option<f32>,
-    /// Required position of the previous relay, m; `None` for its own reach.
+    /// Position that the previous relay must take, m along x; `None` for its farthest x (its reach).
     required_x_m: Option<f32>,
 }
 
@@ -214,7 +215,8 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep from the relay `behind`, `None` for Tx or Rx, whose reaches are `from`, m.
+    /// Starts a sweep received from the relay `behind`; `None` for Tx or Rx. `from` are the farthest x of that relay
+    /// for each target (its reaches), m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -226,9 +228,10 @@ impl SweepPass {
         self.required_x_m = None;
     }
 
-    /// Computes a portion of the reaches, and at the last relay the verdict. Returns true when all are computed.
+    /// Computes a portion of this relay's reaches, and at the last relay the verdict. Returns true when all are
+    /// computed.
     ///
-    /// Bounded by 16 reaches; in a field by 128 of its points, or by one target.
+    /// Work: at most 16 targets; in a field of interference 128 of its points, or one target.
     pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
         let link = self.link(link);
         let targets = self.ladder.targets();
@@ -244,7 +247,8 @@ impl SweepPass {
         self.done
     }
 
-    /// Accepts a verdict if this relay meets its target and has a position for it. Returns true if accepted.
+    /// Accepts a verdict, the result of a sweep, if this relay can meet the committed target. Returns true if the
+    /// verdict was accepted.
     pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &Answer) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
@@ -272,7 +276,8 @@ impl SweepPass {
         true
     }
 
-    /// Takes the position of the verdict; revokes the commit if it leaves the previous relay none.
+    /// Stores this relay's position `place` for the committed target. Derives the position of the previous relay.
+    /// Revokes the commitment if that relay has no suitable position.
     fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
@@ -296,7 +301,7 @@ impl SweepPass {
         }
     }
 
-    /// Returns the committed target and this relay's reach for it, m.
+    /// Returns the committed target SIR, and the farthest x that this relay can take for it, m.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((
@@ -305,12 +310,12 @@ impl SweepPass {
         ))
     }
 
-    /// Returns the reach of the previous relay for the committed target, m.
+    /// Returns the farthest x that the previous relay can take for the committed target, m.
     fn committed_before(&self) -> Option<f32> {
         self.from.get(usize::from(self.verdict.commit?)).copied()
     }
 
-    /// Returns this relay's agreed position, m along x, and the committed target.
+    /// Returns this relay's agreed position, m along x, and the committed target SIR.
     pub(crate) fn agreed(&self) -> Option<(f32, f32)> {
         Some((self.place?, self.committed()?.0))
     }
@@ -332,7 +337,8 @@ impl SweepPass {
     }
 }
 
-/// Returns a checksum of the previous relay's sweep data, equal in duplicates unless it has restarted.
+/// Returns a checksum of the previous relay's sweep data, to recognise duplicates. It differs if that relay has
+/// restarted with other data.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {

@@ -87,7 +87,7 @@ impl Line {
     }
 }
 
-/// Exchanges all messages until `ends` returns true; returns the messages.
+/// Exchanges all messages until `ends` returns true for a message; returns the messages.
 fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
     let mut all = Vec::new();
     for _ in 0..100_000 {
@@ -109,7 +109,7 @@ fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Mess
     panic!("it does not end: {all:?}");
 }
 
-/// Checks that the leader, which awaits no reply after the result, schedules no retransmission.
+/// Checks that a leader that holds its position after a sensing pass schedules no retransmission.
 #[test]
 #[cfg(feature = "sensing")]
 fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
@@ -127,7 +127,7 @@ fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
     assert_eq!(line.rounds[0].circulation.next_timeout(), None);
 }
 
-/// A relay that is still searching has no position to report, so it must not forward the token.
+/// A relay that still searches must not forward the token, which reports the position that it finds.
 #[test]
 #[cfg(feature = "adjust")]
 fn a_relay_that_still_searches_hands_on_no_token() {

@@ -16,7 +16,7 @@ use crate::wire::message::{AdjustStep, Moved, Token};
 use core::task::Poll;
 
 impl Computation {
-    /// Handles the token from the previous relay.
+    /// Handles the token of Algorithm 2, received from the previous relay.
     pub(crate) fn on_token(&mut self, context: &Context<'_>, token: &Token) -> Action {
         let same = matches!(&self.pass, PassKind::Turn(turn_pass) if turn_pass.turn == token.turn);
         let arrival = self.state.arrival(token.number, same);
@@ -40,7 +40,7 @@ impl Computation {
         self.take_turn(context, TurnPass::new(token.turn, token.sir, before, gain))
     }
 
-    /// Starts this relay's turn.
+    /// Starts this relay's turn in Algorithm 2, in which it may move.
     pub(super) fn take_turn(&mut self, context: &Context<'_>, mut turn_pass: TurnPass) -> Action {
         self.state.wait();
         let mut searching = false;
@@ -65,7 +65,7 @@ impl Computation {
         }
     }
 
-    /// Continues the search of this relay's turn by one portion.
+    /// Continues the search for a better position in this relay's turn, by one portion of work.
     pub(super) fn continue_turn(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Turn(turn_pass) = &mut self.pass else {
             return Action::Stale;
@@ -87,7 +87,7 @@ impl Computation {
         self.conclude_turn(context, f32::MAX)
     }
 
-    /// Handles the result of a turn from the next relay.
+    /// Handles the result of Algorithm 2's pass, received from the next relay.
     pub(crate) fn on_moved(&mut self, context: &Context<'_>, moved: &Moved) -> Action {
         if let PassKind::Turn(turn_pass) = &mut self.pass
             && !turn_pass.is_searching()
@@ -101,7 +101,7 @@ impl Computation {
         Action::Stale
     }
 
-    /// Completes the current turn; `worst` is the worst SIR beyond the next hop.
+    /// Completes this relay's turn in Algorithm 2; `worst` is the worst SIR beyond the next hop, linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,
@@ -140,16 +140,17 @@ impl Computation {
 /// State of Algorithm 2's pass at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Action of this pass, and the chain's SIR before the pass.
+    /// Action of this pass: look, move or stop. `sir` is the chain's SIR before the pass, linear.
     pub(crate) turn: AdjustStep,
     pub(crate) sir: f32,
-    /// Node before this relay, and its gain.
+    /// Position of the node before this relay. `gain_in` is the gain of that node's transmission, a factor of the
+    /// SIR.
     pub(crate) before: HopEnd,
     pub(crate) gain_in: PowerRatio,
     search: Option<LocalSearch>,
-    /// True if this relay or a later relay of the pass has moved.
+    /// True if this relay or a later relay has moved in this pass of Algorithm 2.
     pub(crate) any: bool,
-    /// Worst SIR of the hops from this relay on, linear.
+    /// Worst SIR of the hops from this relay to Rx, linear.
     pub(crate) worst: f32,
 }
 
@@ -171,7 +172,8 @@ impl TurnPass {
         }
     }
 
-    /// Returns the hops of a relay of `power_w` watts. `after` is its neighbour toward Rx, `None` for relay N.
+    /// Returns both hops of this relay, whose power is `power_w` watts. `after` is its neighbour toward Rx, `None`
+    /// for relay N.
     pub(crate) fn hops(
         &self,
         mission: &Mission,
@@ -193,7 +195,8 @@ impl TurnPass {
         )
     }
 
-    /// Starts a search around `at` within the altitudes `band`, m. Returns false if this pass moves no relay.
+    /// Starts a search for a better position around `at`, within the altitudes `band`, m. Returns false if no relay
+    /// moves in this pass.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
@@ -201,7 +204,7 @@ impl TurnPass {
         self.search.is_some()
     }
 
-    /// Continues the search for at most `budget` evaluations, and then to the end of the grid row.
+    /// Continues the search for a better position, by `budget` evaluations and the rest of a grid row.
     ///
     /// Ready at the end of the search, with a position if a better one was found.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {

@@ -28,17 +28,17 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum advance of the latest known view by one message, in view numbers.
+/// Maximum number by which one message may advance the latest known view.
 const LEAP: u32 = 4096;
 
-/// State of the view change at one relay.
+/// State of the view change (agreement on the chain's members) at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    /// `Outstanding` while the decision on a proposal is awaited.
+    /// State of the view proposal's message; `Outstanding` while its decision is awaited.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
-    /// Latest known view.
+    /// Identifier of the latest view that this relay has heard of.
     pub(super) newest: ViewId,
     pub(crate) request: ViewRequest,
     /// True if the last decision refused a view because of a missing quorum.
@@ -47,7 +47,8 @@ pub(crate) struct ViewChange {
 }
 
 impl ViewChange {
-    /// Creates the state for a chain of `relays` relays whose initial leader is node `initial_leader`.
+    /// Creates the state of the view change in a chain of `relays` relays. `initial_leader` is the node number of the
+    /// first leader.
     pub(crate) const fn new(relays: u16, initial_leader: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, initial_leader),
@@ -60,7 +61,7 @@ impl ViewChange {
         }
     }
 
-    /// Returns the acceptor state to persist; `base` is the digest of the loaded mission.
+    /// Returns the votes on views (acceptor state) to persist; `base` is the digest of the loaded mission.
     pub(crate) const fn record(&self, base: u16) -> ViewRecord {
         ViewRecord::new(base, self.electorate)
     }
@@ -70,8 +71,8 @@ impl ViewChange {
         self.proposed.is_none() && self.newest == self.electorate.promised()
     }
 
-    /// Restores the acceptor state of a relay that was just switched on, and requests a view. `untouched` is true if no other
-    /// layer has started. Returns an error if this relay has started, or has another mission.
+    /// Restores the votes on views of a relay that was just switched on, and requests a view. `untouched` is true if
+    /// no other layer has started. Returns an error if this relay has started, or has another mission.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -99,8 +100,8 @@ impl ViewChange {
         self.newest
     }
 
-    /// Records that another relay knows `view`, advancing by at most [`LEAP`] numbers per message. One message could otherwise
-    /// use up all view numbers; a relay that was away for long repeats its view often enough.
+    /// Records that another relay knows `view`; this advances the latest view by at most [`LEAP`] numbers. One
+    /// message could otherwise use up all view numbers; a relay that was away for long repeats its view often enough.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
@@ -108,24 +109,25 @@ impl ViewChange {
         }
     }
 
-    /// Records, after an agreement in `view`, that all its members have accepted it. Earlier views are ignored.
+    /// Records that all members of `view` have accepted it, after an agreement in it. Earlier views are ignored.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
         }
     }
 
-    /// Returns the outstanding proposal.
+    /// Returns the view proposal whose decision is awaited, if any.
     pub(crate) fn outstanding(&self) -> Option<Proposed> {
         self.proposed.filter(|_| self.circulation.is_outstanding())
     }
 
-    /// Returns the last proposal that this relay has voted on.
+    /// Returns the last view proposal that this relay has voted on.
     pub(crate) const fn proposed(&self) -> Option<Proposed> {
         self.proposed
     }
 
-    /// Returns this relay's place and the number of relays, as of the last proposal. Places count from 1 at the leader.
+    /// Returns this relay's rank and the number of relays, as of the last view proposal. Ranks count from 1 at the
+    /// leader.
     pub(crate) fn place_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.place, proposed.reached.max(proposed.place)))
@@ -136,7 +138,7 @@ impl ViewChange {
         self.refused
     }
 
-    /// Requests a view later than `proposal`, whose decision cannot arrive because the next relay is lost.
+    /// Requests a view later than `proposal`, whose decision cannot arrive any more.
     pub(super) fn request_later_view(&mut self, context: &Context<'_>, proposal: ViewId) {
         if self.newest <= proposal
             && let Some(later) = proposal.next_by(context.member.node)
@@ -146,14 +148,14 @@ impl ViewChange {
         self.request.request_now(context.now);
     }
 
-    /// Drops the outstanding proposal and requests a view, as after a restart with the record.
+    /// Drops the outstanding view proposal and requests a view, as after a restart with the stored votes.
     pub(crate) fn leave(&mut self, now: Instant) {
         self.proposed = None;
         self.circulation.withdraw();
         self.request.request_now(now);
     }
 
-    /// Handles a proposal or decision from a neighbour, for a mission that this relay holds.
+    /// Handles a view proposal or a decision from a neighbour, for a mission that this relay holds.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let all = context.member.all;
         match message {
@@ -207,7 +209,8 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on a proposal that `place` relays have forwarded. `None` if this relay has promised a later one.
+    /// Votes on a view proposal that `place` relays have forwarded. `None` if this relay has promised a later one.
+    /// `received` are the votes so far, `None` at the proposer.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -246,7 +249,7 @@ impl ViewChange {
         })
     }
 
-    /// Decides the outstanding proposal: the chain ends here, so every reachable relay has voted.
+    /// Decides the outstanding view proposal: the chain ends here, so every reachable relay has voted.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
         let Some(proposed) = self.outstanding() else {
             return Effects::NONE;
@@ -280,7 +283,7 @@ impl ViewChange {
         self.apply_verdict(context, verdict)
     }
 
-    /// Schedules a proposal after a refusal, because unreachable relays may return.
+    /// Schedules another view proposal after a refusal, because unreachable relays may return.
     pub(super) fn retry_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
         self.request.request_after_refusal(context.now, wait);
@@ -364,12 +367,12 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Forwards the outstanding proposal again: the next relay has become reachable.
+    /// Schedules the outstanding view proposal again, because the next relay has become reachable.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
 
-    /// Returns the proposal to forward to node `to`, if one is pending, and marks it as sent.
+    /// Returns the view proposal to forward to node `to`, if one is pending, and marks it as sent.
     pub(crate) fn poll_onward(&mut self, context: &Context<'_>, to: u16) -> Option<Message> {
         let proposal = self.outstanding()?.view;
         if !self.circulation.poll_forward() {
@@ -391,7 +394,7 @@ impl ViewChange {
         }))
     }
 
-    /// Returns the reply to the proposal, if one is pending, and marks it as sent.
+    /// Returns the reply to the view proposal, if one is pending, and marks it as sent.
     pub(crate) fn poll_back(&mut self) -> Option<Message> {
         let proposed = self.proposed?;
         Some(match self.circulation.poll_reply()? {
@@ -410,7 +413,8 @@ impl ViewChange {
         })
     }
 
-    /// Handles an "in progress" reply; returns true if message `number` is the outstanding proposal.
+    /// Handles a reply that a message is in progress. Returns true if message `number` is the outstanding view
+    /// proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .outstanding()
@@ -424,7 +428,8 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Handles retransmission and view requests. `leads`: there is no neighbour toward the leader; `fresh`: nothing received yet.
+    /// Handles the timers of retransmissions and view requests. `leads` is true if there is no neighbour toward the
+    /// leader, `fresh` if nothing was received since the start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -484,28 +489,29 @@ impl ViewChange {
     }
 }
 
-/// A proposal at one relay.
+/// View proposal that this relay has voted on, with its decision once it is known.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     pub(crate) view: ViewId,
-    /// Mission of the view.
+    /// Identifier of the mission that the proposed view is to fly.
     pub(crate) mission_id: MissionId,
-    /// Number of this relay on the proposal's path; the first relay is 1.
+    /// Rank of this relay on the way of the proposal: 1 for the proposer.
     pub(crate) place: u16,
-    /// Poll including this relay's vote.
+    /// Votes on the proposal, including that of this relay.
     pub(super) poll: Poll,
-    /// Node that the proposal was forwarded to. With a second one, two views with the same identifier would be possible.
+    /// Node to which the proposal was forwarded; `None` before. With a second one, two views with the same identifier
+    /// would be possible.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decision follows, once decided.
+    /// View that the decided view follows; before the decision the newest view known to be agreed on.
     pub(crate) base: View,
     /// Number of relays that the proposal has reached, once decided.
     pub(super) reached: u16,
-    /// Accepted view; `None` before the decision and without a quorum.
+    /// View that the decision accepted; `None` before the decision and without a quorum.
     pub(super) accepted: Option<View>,
     pub(super) usable_in: u16,
 }
 
-/// Decision on a proposal.
+/// Decision on a view proposal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ViewVerdict {
     pub(super) reached: u16,
@@ -514,21 +520,21 @@ pub(super) struct ViewVerdict {
     pub(super) usable_in: u16,
 }
 
-/// State of this relay's view request, and the time of the next request.
+/// State of this relay's request for a new view, and the time at which it is repeated.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewRequest {
     asks: bool,
     /// Number of view requests sent without a result.
     tries: u8,
     at: Option<Instant>,
-    /// Number of consecutive refusals.
+    /// Number of consecutive view proposals that were refused.
     refusals: u8,
-    /// Earliest time of the next request if anything changes.
+    /// Earliest time of the next view request if anything changes; `None` except after a refusal.
     soon: Option<Instant>,
     jitter: Jitter,
 }
 
-/// Maximum doublings of the wait after consecutive refusals.
+/// Maximum number of doublings of the wait after consecutive refusals of a view.
 const DOUBLINGS: u8 = 3;
 
 impl ViewRequest {
@@ -547,7 +553,7 @@ impl ViewRequest {
         self.asks
     }
 
-    /// Requests a view until it comes. After a refusal, a change shortens the wait.
+    /// Requests a view, repeatedly until one is accepted. After a refusal, a change shortens the wait.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.asks {
             self.request_now(now);
@@ -568,7 +574,7 @@ impl ViewRequest {
         self.at = Some(now + PAUSE);
     }
 
-    /// Repeats a pending request at once, because the neighbours are now certain.
+    /// Repeats a pending view request at once, because the neighbours are now certain.
     pub(crate) fn repeat_now(&mut self, now: Instant) {
         if self.asks {
             self.request_now(now);
@@ -586,24 +592,25 @@ impl ViewRequest {
         self.refusals = self.refusals.saturating_add(1);
     }
 
-    /// Ends the request: a view has come.
+    /// Ends the view request, because a view has been decided.
     pub(super) const fn stop(&mut self) {
         self.asks = false;
         self.at = None;
         self.soon = None;
     }
 
-    /// Expects the first pass by `at`; without it, a view is requested.
+    /// Starts the timer for the first pass: if none is received by `at`, a view is requested.
     pub(crate) const fn await_first(&mut self, at: Instant) {
         self.at = Some(at);
     }
 
-    /// Returns true if the request timer has expired.
+    /// Returns true if the timer of the view request, or of the first pass, has expired.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer; returns true if a request is due. `fresh`: nothing was received since start-up, so one is due.
+    /// Handles the expired timer; returns true if a view request is due. `fresh` is true if nothing was received
+    /// since the start; then a request is due, too.
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.asks {
@@ -618,7 +625,7 @@ impl ViewRequest {
         true
     }
 
-    /// Returns the wait until the next request, doubled each time, up to `probe_after`.
+    /// Returns the wait until the next view request, doubled each time, up to `probe_after`.
     fn patience(&mut self, settings: &Settings) -> Duration {
         let wait = settings.hop_time.times(8 << self.tries.min(12));
         self.tries = self.tries.saturating_add(1);
@@ -629,7 +636,7 @@ impl ViewRequest {
         self.at
     }
 
-    /// Creates a pending request that is due at `at`.
+    /// Creates a pending view request that is due at `at`.
     #[cfg(test)]
     pub(super) const fn due(at: Instant) -> Self {
         Self {

@@ -42,26 +42,26 @@ use crate::node::context::{OtherLeases, tenths};
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// Number of proposals without a known decision that a relay remembers.
+/// Number of view proposals without a known decision that a relay remembers.
 pub(super) const VOTES: usize = 8;
 
-/// Acceptor state of one relay.
+/// Acceptor state of one relay: its promises and votes on views, as in Paxos.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Electorate {
-    /// Newest view that is known to be agreed on, and true if this relay is a member of it.
+    /// Newest view that is known to be agreed on. `member` is true if this relay is a member of it.
     pub(super) agreed: View,
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// Accepted view that is not known to be agreed on.
+    /// View that this relay has accepted last, while it is not known to be agreed on.
     pub(super) accepted: Option<Successor>,
-    /// Proposals voted on that may become views with this relay as a member, latest first.
+    /// View proposals that this relay has voted on and that may still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
-    /// Leader of the initial view; the half of the initial chain with this node counts as the larger one.
+    /// Leader of the initial view. Of two equal halves of the initial chain, the one with this node decides.
     pub(super) initial_leader: u16,
 }
 
 impl Electorate {
-    /// Creates the initial state for a chain of `relays` relays with this initial leader.
+    /// Creates the initial voting state for a chain of `relays` relays with this initial leader.
     pub(crate) const fn new(relays: u16, initial_leader: u16) -> Self {
         Self {
             agreed: View {
@@ -76,7 +76,7 @@ impl Electorate {
         }
     }
 
-    /// Returns the latest proposal that this relay has promised.
+    /// Returns the latest view proposal that this relay has promised: it accepts no earlier one.
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
     }
@@ -87,8 +87,9 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on `proposal` and returns the poll with this vote. `None` if a later one, or this one, was promised before. `received` is
-    /// the poll so far (`None` at the proposer), `other_leases` the remaining leases of other relays.
+    /// Votes on the view proposal `proposal` and returns the votes including this one. `None` if a later proposal, or
+    /// this one, was promised before. `received` are the votes so far (`None` at the proposer), `other_leases` the
+    /// remaining leases of other relays.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -136,7 +137,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if this relay, polled alone for `proposal` of `node`, would find no quorum. Casts no vote.
+    /// Returns true if this relay's vote alone would be no quorum for `proposal` of `node`. Casts no vote.
     pub(super) fn is_refused_alone(
         &self,
         node: u16,
@@ -149,8 +150,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on `proposal`. If the list is full, its earlier half is kept: once relays have accepted a view, later
-    /// proposals that reach them decide on that view again.
+    /// Records the vote on the view proposal `proposal`. If the list is full, its earlier half is kept: once relays
+    /// have accepted a view, later proposals that reach them decide on that view again.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -160,7 +161,7 @@ impl Electorate {
         }
     }
 
-    /// Records that `view` is agreed on.
+    /// Records that `view` is known to be agreed on. An accepted view and older votes are dropped.
     fn learn(&mut self, view: View) {
         self.member = self.voted.contains(&view.id);
         self.agreed = view;
@@ -168,7 +169,7 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Removes votes on proposals that can no longer become views.
+    /// Removes the votes on proposals for which `over` returns true: they can no longer become views.
     fn forget(&mut self, over: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
         let voted = self.voted.iter().filter(|voted| !over(**voted));
@@ -197,14 +198,14 @@ impl Electorate {
         true
     }
 
-    /// Records that all members have accepted the view accepted last.
+    /// Records that all members have accepted the view that this relay accepted last.
     pub(crate) fn commit(&mut self) {
         if let Some(accepted) = self.accepted {
             self.learn(accepted.view);
         }
     }
 
-    /// Returns true if `view` is accepted and not known to be agreed on.
+    /// Returns true if this relay has accepted `view`, and does not know that it is agreed on.
     pub(crate) fn awaits(&self, view: ViewId) -> bool {
         self.accepted
             .is_some_and(|accepted| accepted.view.id == view)
@@ -219,7 +220,8 @@ pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
     poll.earlier_lease_left.max(lease_left).min(most)
 }
 
-/// Returns the decision on `proposal`, which has reached `relays` of `all` relays with this `poll`.
+/// Returns the decision on the view proposal `proposal`; `None` without a quorum. It has reached `relays` of the
+/// mission's `all` relays, with the votes `poll`.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,
@@ -239,7 +241,7 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
-    /// Removes the quorum rule, for the model: every decision counts as agreed on, and every relay votes.
+    /// Disables the quorum rule, for the model check. Every decision counts as agreed on, and every relay votes.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;

@@ -38,9 +38,9 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
-/// Checks chains of `relays` relays with at most this many cuts, proposals and reboots.
+/// Checks every order of events in a chain of `relays` relays. Cuts, proposals and reboots are limited in number.
 ///
-/// `heals` also checks in every state that a healed chain settles.
+/// `heals` also checks in every state that a healed chain agrees on a view.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,
@@ -59,7 +59,7 @@ fn chains_of_three_and_four_have_one_view_after_the_other_and_settle_once_healed
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Searches larger bounds; takes some minutes.
+/// Searches more events than the usual test; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_hold_through_more() {
@@ -70,7 +70,7 @@ fn chains_of_three_and_four_hold_through_more() {
     all_holds(4, (2, 3, 1), false);
 }
 
-/// Shows that the check finds faults: with every present relay voting, two views are in force together.
+/// Shows that the model check finds faults: if all relays present vote, two views are in force at once.
 #[test]
 fn a_rule_that_counts_everybody_is_found_to_break() {
     for relays in [3, 4] {
@@ -83,7 +83,7 @@ fn a_rule_that_counts_everybody_is_found_to_break() {
     }
 }
 
-/// Shows that the requirement is needed: without its record a relay breaks its promises.
+/// Shows that relays must store their votes: a relay that loses them breaks its promises.
 #[test]
 fn one_that_forgets_what_it_has_said_is_found_to_break_it() {
     let check = Check {
@@ -93,10 +93,10 @@ fn one_that_forgets_what_it_has_said_is_found_to_break_it() {
     assert!(check.search().is_some());
 }
 
-/// View and its size, as a sortable pair.
+/// View and its number of members, as a sortable pair.
 pub(super) type Sized = (ViewId, u16);
 
-/// Content of a frame.
+/// Content of a frame in the model.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) enum Body {
     Proposal {
@@ -127,7 +127,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug)]
 pub(super) struct Unit {
     pub(super) change: ViewChange,
-    /// Last accepted view, this relay's place in it, and its size.
+    /// Last accepted view, this relay's rank in it, and its number of members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -157,7 +157,7 @@ impl core::hash::Hash for Unit {
     }
 }
 
-/// New view that was decided on: its size and the view that it follows.
+/// New view that was decided on: its size, the view that it follows, and the voters.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) struct Decree {
     pub(super) view: Sized,
@@ -169,11 +169,11 @@ pub(super) struct Decree {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Chain {
     pub(super) units: Vec<Unit>,
-    /// Partition number of each relay.
+    /// Part of the partitioned chain in which each relay is: relays with equal numbers reach each other.
     pub(super) parts: Vec<u8>,
     /// Frames in the air, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// Lists of all views that were ever decided on, and of all that were ever agreed on.
+    /// List of all views that were ever decided on; `agreed` lists all that were ever agreed on.
     pub(super) decrees: Vec<Decree>,
     pub(super) agreed: Vec<Sized>,
     pub(super) cuts: u8,
@@ -182,7 +182,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
 }
 
-/// Event of the model.
+/// Event that the model check may let happen next.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Happens {
     Part(usize),
@@ -285,7 +285,7 @@ impl Body {
     }
 }
 
-/// Rule of voting.
+/// Rule that decides which votes on a view count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
@@ -304,11 +304,11 @@ pub(super) struct Check {
     pub(super) proposals: u8,
     pub(super) reboots: u8,
     pub(super) losses: u8,
-    /// True to check in every state that a healed chain settles.
+    /// True to check in every state that a healed chain agrees on a view.
     pub(super) heals: bool,
 }
 
-/// Returns all set partitions of `relays` relays.
+/// Returns all ways to divide `relays` relays into parts, as the part number of each relay.
 pub(super) fn partitions(relays: usize) -> Vec<Vec<u8>> {
     let mut all = vec![vec![]];
     for _ in 0..relays {
@@ -363,7 +363,7 @@ impl Check {
         }
     }
 
-    /// Returns the relays that have voted on `proposal`, as a bit mask.
+    /// Returns the relays that have voted on the view proposal `proposal`, as a bit mask.
     pub(super) fn asked(chain: &Chain, proposal: ViewId) -> u8 {
         let voters = chain.units.iter().zip(0..);
         let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
@@ -375,7 +375,7 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// Sends the pending messages of relay `at`, and records the decision in `effects`.
+    /// Sends the pending messages of relay `at`, and records a decision contained in `effects`.
     pub(super) fn settle(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
@@ -537,7 +537,7 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each relay's agreed view was agreed on and has at most as many members as its size.
+    /// Returns true if every relay's agreed view was agreed on, and has no more members than its size.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
             || chain.units.iter().all(|unit| {
@@ -557,7 +557,7 @@ impl Check {
 pub(super) const MOST: u8 = 3;
 
 impl Check {
-    /// Delivers all frames to the relays of `there` until nothing changes any more.
+    /// Delivers all frames among the relays in the bit mask `there`, until nothing changes any more.
     pub(super) fn drain(&self, chain: &mut Chain, there: u8) {
         loop {
             let before = chain.clone();
@@ -575,8 +575,8 @@ impl Check {
         }
     }
 
-    /// Returns true if the relays of `there` are a quorum of the newest view that they know. They must also be a quorum of all
-    /// views decided on since.
+    /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. They must
+    /// also be a quorum of all views decided on since.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.units.len()).filter(known);
@@ -593,9 +593,9 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals until the relays of `there` are in one view. It is a view of them all, and they know it to
-    /// be agreed on. Links between these relays are restored, all others are cut. Without a quorum the number is 0; `None` if
-    /// [`MOST`] are not enough.
+    /// Returns the number of proposals until the relays in the bit mask `there` are in one view. It is a view of them
+    /// all, and they know it to be agreed on. Links between these relays are restored, all others are cut. Without a
+    /// quorum the number is 0; `None` if [`MOST`] are not enough.
     pub(super) fn settles(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {
@@ -630,7 +630,7 @@ impl Check {
         None
     }
 
-    /// Returns true if every set of relays that is a quorum settles.
+    /// Returns true if every set of relays that is a quorum comes to one view once it is healed.
     pub(super) fn is_alive(&self, chain: &Chain) -> bool {
         let all = ((1_u16 << chain.units.len()) - 1) as u8;
         (1..=all).all(|there| {
@@ -641,7 +641,7 @@ impl Check {
     }
 }
 
-/// Property of all agreed views.
+/// Safety property that the model check verifies, in words.
 pub(super) const ONE_CHAIN: &str = "agreed views follow each other one by one";
 
 impl Model for Check {
@@ -731,14 +731,15 @@ impl Model for Check {
     }
 }
 
-/// Violated property and the events that lead to it.
+/// Property that the model check found violated, and the events that lead there.
 pub(super) struct Counterexample {
     pub(super) what: &'static str,
     pub(super) how: String,
 }
 
 impl Check {
-    /// Searches all states with two threads and prints their number.
+    /// Searches all states of the model with two threads, and prints their number. Returns a counterexample if there
+    /// is one.
     pub(super) fn search(&self) -> Option<Counterexample> {
         let began = std::time::Instant::now();
         let checker = self.clone().checker().threads(2);

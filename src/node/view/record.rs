@@ -5,7 +5,7 @@ use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::message::Successor;
 
-/// Format number of the stored record.
+/// Number of the stored record's format.
 const FORMAT: u32 = 1;
 
 /// Acceptor state that must survive a reboot in flight.
@@ -24,11 +24,11 @@ const FORMAT: u32 = 1;
 pub struct ViewRecord {
     /// Digest of the mission that was loaded before flight.
     base: u16,
-    /// Checked acceptor state; its `initial_leader` is not stored.
+    /// Votes on views (acceptor state), checked; its `initial_leader` is not stored.
     electorate: Electorate,
 }
 
-/// Reason why a record was rejected.
+/// Reason why a stored record was rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -50,8 +50,8 @@ impl core::fmt::Display for RecordError {
 
 impl core::error::Error for RecordError {}
 
-/// Writes numbers of one, two or four bytes, least significant byte first. Two functions that are called for every number need a
-/// third of the flash of an iterator over all bytes.
+/// Writer of numbers of one, two or four bytes, least significant byte first. Two functions that are called for every
+/// number need a third of the flash of an iterator over all bytes.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -71,7 +71,7 @@ impl RecordWriter<'_> {
     }
 }
 
-/// Reads the numbers that [`RecordWriter`] writes.
+/// Reader of the numbers that [`RecordWriter`] writes.
 #[derive(Debug)]
 struct Reader<'a>(core::slice::Iter<'a, u8>);
 
@@ -120,7 +120,8 @@ impl ViewRecord {
         }
     }
 
-    /// Returns the acceptor state, if the record is of the mission with digest `base` and `relays` relays. Node `initial_leader` leads it.
+    /// Returns the votes on views (acceptor state), if the record fits the mission. Its digest must be `base`, and it
+    /// has `relays` relays. `initial_leader` is the mission's leader.
     pub(super) fn electorate(
         &self,
         base: u16,
@@ -188,7 +189,7 @@ impl ViewRecord {
     }
 }
 
-/// Returns the encoding of "no successor of `agreed` accepted".
+/// Returns the encoding for a relay that has accepted no successor of the view `agreed`.
 const fn nothing_after(agreed: View) -> Successor {
     Successor {
         proposal: ViewId::LOADED,
@@ -196,7 +197,7 @@ const fn nothing_after(agreed: View) -> Successor {
     }
 }
 
-/// Returns true if a relay can have reached this state.
+/// Returns true if a relay can have reached the state `kept`, so that a record of it is valid.
 fn is_sound(kept: &Electorate) -> bool {
     let Electorate {
         agreed, promised, ..
@@ -237,7 +238,7 @@ mod tests {
         ViewId::from_bits(number << 10 | node)
     }
 
-    /// Returns a state with an accepted view and two votes on proposals without a known decision.
+    /// Returns the state of a relay that has accepted a view and voted on two later proposals.
     fn busy() -> Electorate {
         let mut electorate = Electorate::new(3, 1);
         let first = view(1, 1);
@@ -335,8 +336,8 @@ mod tests {
         assert_eq!(first.unpersisted(), None);
     }
 
-    /// Checks relay 2 of three on a shared channel. It searches for its silent neighbours while another record is stored than its
-    /// own.
+    /// Checks that relay 2 of three sends nothing before its record is stored. It searches on a shared channel for
+    /// its silent neighbours.
     #[test]
     fn nothing_is_sent_before_the_record_is_stored() {
         let mission = Mission::try_new(paper(3)).unwrap();

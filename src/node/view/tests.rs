@@ -17,7 +17,7 @@ pub(super) fn id(number: u32, node: u32) -> ViewId {
     ViewId::from_bits(number << 10 | node)
 }
 
-/// Relay in a chain of four that holds mission 4 and flies the loaded one.
+/// Relay under test, in a chain of four. It holds mission 4 and flies the loaded one.
 pub(super) struct Relay {
     pub(super) member: Member,
     pub(super) latest: MissionId,
@@ -57,7 +57,7 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Removes the next relay.
+    /// Removes the next relay, so that this relay decides an outstanding view proposal.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
@@ -77,7 +77,7 @@ impl Relay {
         self.view.poll_onward(&context, to)
     }
 
-    /// Returns a proposal of relay 1.
+    /// Returns a proposal of relay 1 for the view `view`.
     pub(super) fn proposal(&self, view: ViewId) -> Message {
         Message::Proposal(Proposal {
             mission_id: self.latest,
@@ -94,7 +94,7 @@ impl Relay {
         })
     }
 
-    /// Returns a decision sent by the next relay.
+    /// Returns a decision on `proposal` that the next relay has sent.
     pub(super) fn decision(&self, proposal: ViewId, view: Option<View>) -> Message {
         Message::Decision(Decision {
             mission_id: self.latest,
@@ -191,7 +191,8 @@ fn a_newer_one_takes_the_place_of_one_that_is_not_decided() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// The leader has restarted during a proposal and has received another mission.
+/// A proposal of the same view with another mission is another proposal. Its leader has restarted meanwhile and has
+/// received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -452,9 +453,10 @@ fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
     assert!(relay.handle(&later).news.is_some());
 }
 
-/// Regression test: when only relay 1 had lost relay 2, views with other members had one identifier.
+/// Regression test: a relay forwards a view proposal to one node only.
 ///
-/// One had relays 1 to 3, the other 1 and 4.
+/// When only relay 1 had lost relay 2, views of different members had the same identifier: one of relays 1 to 3, one
+/// of 1 and 4.
 #[test]
 fn a_proposal_is_handed_to_one_node_alone() {
     let mut relay = Relay::new(1);
@@ -508,7 +510,7 @@ fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
     }
 }
 
-/// Checks that a relay alone for hours uses one view number, not one every five seconds.
+/// Checks that a relay alone for hours does not use up a view number every five seconds.
 #[test]
 fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again() {
     let mut relay = Relay::second();

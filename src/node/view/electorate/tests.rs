@@ -24,7 +24,7 @@ fn count(nodes: &[u16]) -> u16 {
     u16::try_from(nodes.len()).unwrap()
 }
 
-/// Acceptor states of nodes 1 to N.
+/// Voting states (acceptors) of nodes 1 to N.
 struct Chain(Vec<Electorate>);
 
 impl Chain {
@@ -32,13 +32,13 @@ impl Chain {
         Self((0..relays).map(|_| Electorate::new(relays, 1)).collect())
     }
 
-    /// Makes the relay with list index `at` accept `view`; returns true if the relay accepts.
+    /// Makes the relay with list index `at` accept the decided view `view`. Returns true if it does.
     fn accept(&mut self, at: usize, view: View) -> bool {
         let base = self.0[at].agreed();
         self.0[at].accept(view.id, base, Some(view))
     }
 
-    /// Returns the poll of a proposal that visits `nodes`.
+    /// Returns the votes on a proposal that visits `nodes` in this order.
     fn poll(&mut self, nodes: &[u16], proposal: ViewId) -> Poll {
         let mut told = None;
         for &node in nodes {
@@ -49,7 +49,7 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the decision on a proposal to `nodes`; the last `accept` of them receive it.
+    /// Returns the decision on a proposal that visits `nodes`; the last `accept` of them receive it.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -79,7 +79,8 @@ const fn granted(id: ViewId, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks all parts of all initial chains of up to seven relays.
+/// Checks all parts of chains of up to seven relays: a part decides on a view if it is a quorum. That is more than
+/// half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_decide_or_half_with_the_elder() {
     for relays in 1..=7_u16 {
@@ -169,7 +170,8 @@ fn what_may_be_agreed_on_is_decided_on_again() {
     );
 }
 
-/// Checks that a view of all relays is accepted. Otherwise a chain with most relays restarted would never fly again.
+/// Checks that a view of all relays is accepted even if most of them have lost their votes. Otherwise a chain with
+/// most relays restarted would never fly again.
 #[test]
 fn all_of_the_mission_are_a_view_whatever_they_remember() {
     let mut chain = Chain::of(3);
@@ -257,7 +259,7 @@ fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Relays that vote before one that knows the newer view vote in the older view. Their votes do not count.
+/// A relay that votes before one that knows the newer view votes in the older view. Its vote does not count.
 #[test]
 fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
     let mut chain = Chain::of(3);
@@ -298,7 +300,8 @@ fn others_may_rely_on_members_alone() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Refused proposals free their places. Only a limited number of proposals without a decision is remembered.
+/// A refused proposal needs no room in the list of votes. The list holds a limited number of proposals without a
+/// known decision.
 #[test]
 fn votes_are_remembered_until_what_came_of_them_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -337,7 +340,8 @@ fn votes_are_remembered_until_what_came_of_them_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Requirement of the module's documentation. Node 3 is a member of the current view, forgets it, and votes in the initial view.
+/// Shows that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
+/// view, forgets it, and votes in the initial view.
 #[test]
 fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
     let mut chain = Chain::of(5);
