@@ -150,7 +150,7 @@ impl Flight {
         if let Some(positions) = &mut self.positions {
             let mut heard = |sample| relay.handle_sample(time, sample);
             if let Some(place) = positions.newest(time, log, &mut heard) {
-                relay.handle_position(time, time, place);
+                relay.handle_position(time, place, time);
             }
             drone = positions.place(time);
         }

@@ -91,7 +91,7 @@ const DEFENCES: u8 = 32;
 /// Number of claims after a frame from another node with this index that is no claim.
 ///
 /// With a key it is the number of claims after this relay has raised its claim number.
-const QUESTIONS: u8 = 8;
+const REPEATED_CLAIMS: u8 = 8;
 
 /// Returns the minimum interval between claims to this relay's index. Claims of two relays and their echoes do not
 /// fill the channel then.
@@ -231,7 +231,7 @@ impl IndexClaims {
                 let echoes = echoes.is_some_and(|at| now.since(at) < settings.probe_after);
                 if settings.auth.is_none() && !echoes {
                     self.had_position_before(now, has_lease, settings);
-                    self.defences = self.defences.max(QUESTIONS);
+                    self.defences = self.defences.max(REPEATED_CLAIMS);
                     self.schedule_unprompted(now, settings);
                     self.schedule_claim(now, settings);
                 }
@@ -272,7 +272,7 @@ impl IndexClaims {
             self.defend(now, rival, settings);
             if settings.auth.is_some() {
                 // A replayed frame does not have this effect again.
-                self.defences = QUESTIONS;
+                self.defences = REPEATED_CLAIMS;
                 self.schedule_unprompted(now, settings);
             }
             return false;

@@ -620,13 +620,13 @@ impl Relay {
     /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
     /// let mut relay = relay(Settings { guard: Some(guard), ..Settings::default() });
     /// let (measured, now) = (Instant::from_millis(990), Instant::from_millis(1_000));
-    /// relay.handle_position(now, measured, Placement { x_m: 10.0, y_m: 0.0, altitude_m: 20.0 });
+    /// relay.handle_position(now, Placement { x_m: 10.0, y_m: 0.0, altitude_m: 20.0 }, measured);
     /// # }
     /// ```
-    pub fn handle_position(&mut self, now: Instant, measured_at: Instant, place: Placement) {
+    pub fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {
         let now = self.clock.advance(now);
         self.node
-            .handle_position(now, self.clock.internal(measured_at), place);
+            .handle_position(now, place, self.clock.internal(measured_at));
     }
 
     /// Reports whether the drone flies to the setpoints from now on; initially true. Takes constant time.

@@ -166,7 +166,7 @@ impl Watched {
 
     /// Reports the position at time `at`.
     pub fn position(&mut self, now: Instant, at: Instant, place: Placement) {
-        heap::without(|| self.relay.handle_position(now, at, place));
+        heap::without(|| self.relay.handle_position(now, place, at));
     }
 
     /// Reports that the lost relays at `side` have landed.

@@ -61,7 +61,7 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
         expected.handle_control(now, vehicle.link.is_flown());
         if let Some(position) = position {
             assert!(is_news);
-            expected.handle_position(now, position.at, position.place);
+            expected.handle_position(now, position.place, position.at);
             positions.push(position.place);
         }
         assert!(format!("{relay:?}") == format!("{expected:?}"));
@@ -157,7 +157,7 @@ fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_si
     }
     second.handle_timeout(now);
     let at = second.setpoint().unwrap_or(place(start_m));
-    second.handle_position(now, now, at);
+    second.handle_position(now, at, now);
     for (port, bytes) in bench::sent(second, now) {
         if port == Port::Upstream {
             first.handle_bytes(now, Port::Downstream, &bytes);

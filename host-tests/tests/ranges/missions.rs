@@ -43,7 +43,7 @@ fn chain(
                 y_m: 0.0,
                 altitude_m: config.common.altitude_m,
             };
-            line.relays[usize::from(index) - 1].handle_position(begin, begin, at);
+            line.relays[usize::from(index) - 1].handle_position(begin, at, begin);
         }
     }
     Some((line, mission, common))

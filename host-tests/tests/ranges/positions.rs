@@ -46,7 +46,7 @@ fn fly(seed: u64) {
                 1 => Instant::ZERO,
                 _ => now,
             };
-            relay.handle_position(now, at, anywhere(&mut rng));
+            relay.handle_position(now, anywhere(&mut rng), at);
             match rng.random_range(0..10) {
                 0 => relay.handle_control(now, rng.random()),
                 1 => relay.clear_lost(now, Side::Upstream),
@@ -66,7 +66,7 @@ fn fly(seed: u64) {
                 y_m: 0.0,
                 altitude_m: 20.0,
             };
-            relay.handle_position(now, now, at);
+            relay.handle_position(now, at, now);
         }
         line.run_for(Duration::from_millis(1_000));
         check(&line);

@@ -120,7 +120,7 @@ impl Wires {
                 y_m: step(place.y_m, to.y_m),
                 altitude_m: step(place.altitude_m, to.altitude_m),
             };
-            relay.handle_position(now, now, *place);
+            relay.handle_position(now, *place, now);
         }
     }
 

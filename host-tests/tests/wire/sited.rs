@@ -195,7 +195,7 @@ fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let mut until = |relay: &mut uav_relay::Relay, end: Instant, x_m: f32| {
         while now < end {
             now = now + Duration::from_millis(100);
-            relay.handle_position(now, now, Placement::on_line(x_m, 20.0));
+            relay.handle_position(now, Placement::on_line(x_m, 20.0), now);
             relay.handle_timeout(now);
             let mut frame = [0; uav_relay::MAX_FRAME];
             relay.persist(|_| true);

@@ -825,7 +825,7 @@ impl Autopilot {
         let mut is_news = relay.control(now, self.is_flown());
         let position = self.poll_position();
         if let Some(Position { at, place, .. }) = position {
-            relay.handle_position(now, at, place);
+            relay.handle_position(now, place, at);
             is_news = true;
         }
         if let Some(sample) = self.poll_sample() {

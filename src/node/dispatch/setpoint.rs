@@ -25,7 +25,7 @@ impl Node {
         }
     }
 
-    pub(crate) fn handle_position(&mut self, now: Instant, measured_at: Instant, place: Placement) {
+    pub(crate) fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {
         self.steering.handle_position(measured_at, place);
         self.steer(now);
     }

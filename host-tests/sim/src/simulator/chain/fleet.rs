@@ -257,7 +257,7 @@ impl Chain {
                 continue;
             }
             if let Some(at) = at {
-                member.relay.handle_position(now, now, placement(at));
+                member.relay.handle_position(now, placement(at), now);
             }
             if let Some(place) = member.relay.setpoint()
                 && let Some(drone) = flight.drones.get_mut(index)
