@@ -7,7 +7,8 @@ use super::auth::KEY;
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
 
-/// Measures relay 1 receiving the offer of its loaded mission as version 1 from the transmitter.
+/// Measures relay 1 when it accepts an offered mission from the transmitter's ground station. The offer is its own
+/// mission as version 1.
 pub(crate) fn upload() {
     const THREE: Mission = mission(3);
     let now = Instant::ZERO;
