@@ -32,8 +32,8 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// Returns an error if the command line overrides the altitude or power that all relays have in the file. Relay
-    /// `index`, which has a `[[relay]]` profile of its own, would ignore that.
+    /// Rejects `--altitude` or `--uav-power` for all relays, if relay `index` has a profile of its own. The relay
+    /// would ignore the option, because the file has a `[[relay]]` for it.
     ///
     /// # Errors
     /// One line that names the option and the file's table.

@@ -40,7 +40,8 @@ const EVERY: Duration = Duration::from_millis(2_000);
 /// Minimum number of frames rejected for a reason between two checks before the reason is reported.
 const MANY: u32 = 3;
 
-/// Minimum number of damaged frames between two checks, with no intact one, that suggests a wrong baud rate.
+/// Minimum number of damaged frames between two checks that suggests a wrong baud rate. No frame may have been
+/// intact.
 const DAMAGED: u32 = 10;
 
 /// Detector of reasons for rejected frames. It has the counters at the last check, and the reasons already reported.

@@ -110,8 +110,8 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// Sleeps until the time `wake`, a signal, a status request, or until one of `ttys` or `others` is ready. Without
-    /// `wake` it has no time limit.
+    /// Sleeps until `wake`, a signal, a status request, or until one of `ttys` or `others` is ready. `wake` is a
+    /// time; without it there is no time limit.
     ///
     /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
     ///

@@ -26,7 +26,7 @@ impl SiteOptions {
         Some(Sites { tx, rx })
     }
 
-    /// Returns the sites of transmitter and receiver, if given, and checks that they are `distance_m` apart.
+    /// Returns the sites of transmitter and receiver, if given. Checks that they are `distance_m` apart.
     ///
     /// # Errors
     /// One line that names the option and the right distance.

@@ -19,11 +19,11 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// Uninhabited type: there is no autopilot.
+/// Placeholder without values for the autopilot, which this image lacks.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {
-    /// Returns `None`: this image does not fly.
+    /// Returns `None`: an image without an autopilot link needs no guard.
     pub(crate) const fn guard(_: &Sites, _: GuardConfig) -> Option<GuardConfig> {
         None
     }

@@ -42,7 +42,8 @@ pub struct Views {
 }
 
 impl Views {
-    /// Restores the votes from before the reboot into `relay`, which may have got an upload, but no frames.
+    /// Restores the votes from before the reboot into a new `relay`. Only a stored upload may have been restored
+    /// before.
     ///
     /// If a record exists, `stands_by` gets true if the relay accepts it; a record of another firmware may be
     /// refused.
