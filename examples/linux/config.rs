@@ -32,8 +32,8 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// Rejects `--altitude` or `--uav-power` for all relays, if relay `index` has a profile of its own. The relay
-    /// would ignore the option, because the file has a `[[relay]]` for it.
+    /// Rejects `--altitude` and `--uav-power` for a relay that has its own `[[relay]]` profile in the file. Relay
+    /// `index` would ignore these options.
     ///
     /// # Errors
     /// One line that names the option and the file's table.

@@ -119,7 +119,7 @@ impl Fifo {
         self.fd.as_fd()
     }
 
-    /// Passes each line received since the last call to `line`. Work: at most 64 KiB.
+    /// Reads the lines that have arrived since the last call, and passes each one to `line`. Work: at most 64 KiB.
     pub fn read(&mut self, mut line: impl FnMut(&[u8])) {
         let mut buffer = [0; 4096];
         for _ in 0..READS {

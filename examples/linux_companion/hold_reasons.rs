@@ -11,7 +11,8 @@ const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns the reasons why the drone must wait: toward the transmitter, and toward the receiver.
+/// Returns why the drone waits for its two neighbours: that toward the transmitter, that toward the receiver. `None`
+/// if it does not wait.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }

@@ -12,7 +12,7 @@ use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// Relays that this relay has lost since its start.
+/// Relays that this relay has lost (no longer receives) since its start.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,

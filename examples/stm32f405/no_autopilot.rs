@@ -19,7 +19,7 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// Placeholder without values for the autopilot, which this image lacks.
+/// Placeholder type for the autopilot link, which this image lacks. It has no values.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {

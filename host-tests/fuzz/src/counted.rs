@@ -2,7 +2,7 @@
 
 use uav_relay::Stats;
 
-/// Returns the number of received frames with a valid CRC. Each of them is in exactly one of the added counters.
+/// Returns the number of received frames with a valid CRC. Each such frame is in exactly one of the summed counters.
 ///
 /// Unsigned frames count only with a `key`: without one they are messages, counted as received.
 pub const fn intact(stats: &Stats, key: bool) -> u32 {

@@ -334,8 +334,8 @@ impl Bench {
         assert_eq!(before.poll_timeout(), after.poll_timeout());
     }
 
-    /// Builds a frame with this body. It is signed if the relay requires authentication tags, or made as an attacker
-    /// would.
+    /// Builds a frame with this body. It is signed if the relay requires authentication tags; now and then it is made
+    /// as an attacker would.
     fn said(&mut self, side: usize, header: Header, body: &[u8], input: &mut Input<'_>) -> Said {
         let Some(Some(member)) = self.members.get_mut(side) else {
             let (wire, fate) = (stuffed(&unsigned(header, body)), Fate::Counted);

@@ -26,10 +26,10 @@ const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
 const MOST_EVENTS: usize = 14;
 
-/// Length on the wire of the shortest frame whose CRC is computed: header, no body, CRC. Bytes.
+/// Length on the wire, bytes, of the shortest frame whose CRC is computed: header, no body, CRC.
 const LEAST_CHECKED: usize = 16;
 
-/// Length on the wire of the shortest frame with a message, a Busy. Bytes.
+/// Length on the wire, bytes, of the shortest frame with a message, a Busy.
 const LEAST_MESSAGE: usize = 19;
 
 /// Frame sent by a relay.

@@ -27,7 +27,7 @@ pub struct Storage<F> {
     pub flash: F,
     /// Offset of the configuration block in the flash, bytes.
     pub block: u32,
-    /// Two flash sectors that store the signing epoch.
+    /// Two flash sectors that store the epoch, a number that rises at every start.
     pub epochs: [Range<u32>; 2],
     /// Two flash sectors that store the relay's votes on the chain's membership. One is erased in flight when both
     /// are full; an erase of a smaller sector takes less time.

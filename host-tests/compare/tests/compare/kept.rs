@@ -32,8 +32,8 @@ fn the_results_have_the_run_that_is_kept() {
     );
 }
 
-/// Checks the recorded run: SLSQP from its best start alone takes at least twenty times our time. The problems have
-/// eight and fifty relays and free altitudes.
+/// Checks the recorded run: SLSQP from its best start alone takes at least 20 times this crate's time. The problems
+/// have eight and fifty relays and free altitudes.
 ///
 /// With a lateral range this crate has more than twice as many starts to try.
 #[test]

@@ -14,8 +14,8 @@ const OTHER: [u8; 32] = *b"somebody without it has this one";
 /// Length of a MAVLink signature, bytes: link number, time stamp and tag.
 const SIGNATURE: usize = 13;
 
-/// Largest time stamp of a signature. Then a minute in units of time stamps, and the number of senders that a link
-/// remembers.
+/// Largest time stamp of a signature. The next two constants are a minute in units of time stamps, and the number of
+/// senders that a link remembers.
 const LAST: u64 = (1 << 48) - 1;
 const MINUTE: u64 = 6_000_000;
 const SENDERS: usize = 8;

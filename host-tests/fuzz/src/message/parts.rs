@@ -56,7 +56,7 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Appends a pass number, and the digest of mission and view; rarely that of another view.
+    /// Appends a pass (message round) number, and the digest of mission and view, rarely of another view.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.known.view);

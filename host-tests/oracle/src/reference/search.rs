@@ -18,8 +18,8 @@ impl Link {
         self.best_from(1, 0.0, points)
     }
 
-    /// Returns the best SIR of hops `k` to N+1 that the relays from `k` on can reach. The SIR is that of the worst of
-    /// these hops; relay k-1 is at `from_x`.
+    /// Returns the best SIR of hops `k` to N+1 over all positions of the relays from `k` on. The SIR of several hops
+    /// is that of the worst one; relay k-1 is at `from_x`.
     fn best_from(&self, k: usize, from_x: f64, points: u32) -> f64 {
         let worst_hop = |x: f64| {
             let here = self.sir_relay(k, from_x, x).unwrap_or(0.0);

@@ -15,8 +15,8 @@ impl Link {
     /// Returns the positions, m, of a chain that meets `target` (linear SIR). Each relay is as far toward Rx as
     /// possible.
     ///
-    /// `None` only if there is no such chain, whatever the altitudes. Per relay and interval about 300 SIR
-    /// evaluations; there are seldom more than three intervals.
+    /// `None` only if there is no such chain, whatever altitudes the relays have. Per relay and interval about 300
+    /// SIR evaluations; there are seldom more than three intervals.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let sets = self.sets(target, 0.0)?;
         let mut limit = self.distance_m;
