@@ -34,7 +34,7 @@ fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     }
 }
 
-/// Measures authentication tags, a signed sweep message through relay 2 of 3, and a rejected replay.
+/// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay.
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));

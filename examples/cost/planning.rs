@@ -10,7 +10,7 @@ use uav_relay::planning::single::theorems;
 use super::counter::instructions;
 use super::missions::{HIGH, MISSION, WIDE};
 
-/// Measures Theorems 1 to 3, which place one relay, and the search for the fewest relays for an SIR.
+/// Measures the instructions for Theorems 1 to 3 and for finding the fewest relays that reach an SIR.
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
@@ -53,7 +53,7 @@ fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     }
 }
 
-/// Measures the solver of the joint method alone, without messages between relays.
+/// Measures the instructions of the joint method's solver alone, without messages between relays.
 pub(crate) fn joint() {
     let (all, most, portions) = solved(&HIGH, 8);
     hprintln!("solved_8 {}", all);

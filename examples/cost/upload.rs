@@ -7,7 +7,7 @@ use super::auth::KEY;
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
 
-/// Measures relay 1 when it accepts an offered mission from the transmitter's ground station. The offer is its own
+/// Measures the instructions that relay 1 takes to accept a mission offered by a ground station. The offer is its own
 /// mission as version 1.
 pub(crate) fn upload() {
     const THREE: Mission = mission(3);

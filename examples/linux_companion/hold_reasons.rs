@@ -11,8 +11,8 @@ const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns why the drone waits for its two neighbours: that toward the transmitter, that toward the receiver. `None`
-/// if it does not wait.
+/// Returns why the drone waits for its neighbours: toward the transmitter, and toward the receiver. `None` if it does
+/// not wait.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
@@ -26,7 +26,8 @@ pub(crate) struct HoldReasonLog {
 }
 
 impl HoldReasonLog {
-    /// Logs changed reasons for waiting; returns the time of the next check, if one is pending.
+    /// Logs changes in the reasons why the drone waits for its neighbours. Returns the time of the next check, if
+    /// any.
     pub(crate) fn tend(
         &mut self,
         now: Instant,

@@ -13,7 +13,7 @@ use super::flash;
 use super::{board, config, log, persistent};
 use crate::autopilot::{Autopilot, Uart};
 
-/// Relay with its stored votes and, for a drone with sites, its autopilot. In static RAM, to save stack.
+/// Relay with its stored votes and, if the drone flies with one, its autopilot. In static RAM, to save stack.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut persistent::Views,
