@@ -124,7 +124,7 @@ fn before() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Measures the instructions for a sweep message through relay 2, with the blocking and the async runner.
+/// Measures the instructions for a sweep message through relay 2, by the blocking and the async runner.
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = before() else {
         return;
