@@ -162,7 +162,7 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the instructions of the calls in which the leader of 100 relays solves its chain in advance. Prints the
+/// Measures the instructions of the calls in which a leader of 100 relays solves its chain in advance. Prints the
 /// largest cost and the number of calls.
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
