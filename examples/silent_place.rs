@@ -7,7 +7,7 @@
 use uav_relay::channel::{AirGround, Channel};
 use uav_relay::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
-/// 2 GHz, excess losses of 0.1 dB and 21 dB as factors. A number out of range fails the build.
+/// Channel at 2 GHz; the excess losses are 0.1 dB and 21 dB, as factors. A number out of range fails the build.
 const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
     Ok(channel) => channel,
     Err(_) => panic!("a channel parameter is out of range"),
@@ -54,7 +54,7 @@ use panic_halt as _;
 #[cfg(target_os = "none")]
 use stm32f4xx_hal as _;
 
-/// Leaves the result to the debugger on the target.
+/// Computes the position of relay 3 on the target, where a debugger can read it.
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {

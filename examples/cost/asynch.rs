@@ -18,7 +18,7 @@ use super::missions::mission;
 /// Bit rate of the ports, bit/s.
 const BAUD: u32 = 115_200;
 
-/// Port in memory: a frame to receive, the range of its unread bytes, and the number of bytes sent.
+/// Serial port in memory: a frame to receive, the range of its unread bytes, number of bytes sent.
 struct Memory {
     coming: Cell<([u8; MAX_FRAME], usize, usize)>,
     gone: Cell<usize>,
@@ -107,7 +107,7 @@ impl Clock for Still {
     }
 }
 
-/// Returns the middle of three relays, and the first relay's sweep for it.
+/// Returns relay 2 of 3, the first sweep message that relay 1 sends to it, its length, and the time.
 fn before() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -124,7 +124,7 @@ fn before() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Measures the blocking and the asynchronous runner, which start at the same time.
+/// Measures the instructions for a sweep message through relay 2, by the blocking and the async runner.
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = before() else {
         return;

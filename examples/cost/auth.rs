@@ -10,7 +10,8 @@ use super::missions::mission;
 
 pub(crate) const KEY: Key = Key::new([0xA5; 32]);
 
-/// Returns the cost of one tag of a frame with `body` bytes, at the sender and again at the receiver.
+/// Returns the instructions for the authentication tag of a frame with `body` bytes. Sender and receiver each compute
+/// it once.
 fn tag(body: usize) -> u32 {
     const LONGEST: [u8; 231] = [0x5A; 231];
     let signed = black_box(LONGEST.get(..10 + body).unwrap_or_default());
@@ -33,7 +34,7 @@ fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     }
 }
 
-/// Measures a full sweep through a middle relay, and a frame that this relay rejects.
+/// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay.
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));

@@ -13,7 +13,7 @@ pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
     before.wrapping_sub(SYST::get_current()) & TOP
 }
 
-/// Returns the number of instructions of `work`, at most 780 000, without the measurement itself.
+/// Returns the number of instructions of `work`, without those of the measurement. The counter wraps after 780 000.
 pub(crate) fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
     let empty = ticks(|| ());
     // 128 ns at 168 MHz are 21.504 ticks, 2 688 / 125: the largest count of ticks times 125 is still a u32.
@@ -29,14 +29,14 @@ pub(crate) fn relay(index: u16, settings: Settings, of: Mission) -> Relay {
     stop()
 }
 
-/// Returns the next frame that `relay` sends, if any.
+/// Returns the next frame that `relay` sends, and its length; `None` if nothing is pending.
 pub(crate) fn sends(relay: &mut Relay, now: Instant) -> Option<([u8; MAX_FRAME], usize)> {
     let mut frame = [0; MAX_FRAME];
     let transmit = relay.poll_transmit(now, &mut frame)?;
     Some((frame, transmit.len))
 }
 
-/// Sleeps for good, if QEMU does not exit.
+/// Sleeps for ever, if the emulator QEMU does not exit.
 pub(crate) fn stop() -> ! {
     loop {
         cortex_m::asm::wfi();

@@ -6,10 +6,10 @@ use uav_relay::{Adjust, Instant, MAX_FRAME, Method, Mission, Phase, Port, Relay,
 use super::counter::{instructions, relay};
 use super::missions::{HIGH, UNEVEN};
 
-/// Chain of three relays, and the cost of its calls.
+/// Simulated chain of three relays that records the cost of every call.
 pub(crate) struct Flight {
     relays: [Relay; 3],
-    /// Cost of the most expensive call, and length of the longest frame.
+    /// Instructions of the most expensive call so far. The next field is the length of the longest frame.
     most: u32,
     longest: usize,
 }
@@ -46,7 +46,8 @@ impl Flight {
         }
     }
 
-    /// Runs until all relays hold their positions, at most `turns` turns; returns true if they do.
+    /// Runs the chain until all relays hold their positions, for at most `turns` rounds of timers. Returns true if
+    /// they do.
     fn settle(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {
@@ -76,14 +77,14 @@ impl Flight {
     }
 }
 
-/// Result of a chain: whether it settled, its most expensive call and its longest frame.
+/// Result of a chain: 1 if it settled, instructions of its most expensive call, longest frame.
 struct Flown {
     settled: u32,
     most: u32,
     longest: usize,
 }
 
-/// Runs one chain, because the stack has no room for several at once.
+/// Runs one chain to its end. Not inlined, because the stack has no room for several chains at once.
 #[inline(never)]
 fn fly(mission: Mission, settings: Settings) -> Flown {
     let mut flight = Flight::new(mission, settings);

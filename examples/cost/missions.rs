@@ -6,7 +6,8 @@ use uav_relay::{
     Band, Field, FieldPoint, Interference, Interferer, Mission, MissionConfig, Profile,
 };
 
-/// 2 GHz, excess losses of 0.1 dB and 21 dB as factors.
+/// Channel at 2 GHz with line of sight. The excess losses are 0.1 dB with and 21 dB without line of sight, as
+/// factors.
 pub(crate) const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
     Ok(channel) => channel,
     Err(_) => panic!("a channel parameter is out of range"),
@@ -45,7 +46,7 @@ pub(crate) const INTERFERER: Interferer = Interferer {
     y_m: 150.0,
 };
 
-/// Mission with altitudes to choose from.
+/// Mission of three relays that may choose altitudes of 20 to 300 m.
 pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     band: Band {
         least_m: 20.0,
@@ -55,7 +56,7 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
-/// Mission with altitudes and lateral positions to choose from.
+/// Mission of three relays that may choose altitudes, and lateral positions 280 m to either side.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,
@@ -83,7 +84,7 @@ pub(crate) const POINTS: [FieldPoint; 4] = [
     },
 ];
 
-/// Mission in a non-uniform interference field.
+/// Mission of three relays in a non-uniform interference field.
 pub(crate) const UNEVEN: Mission = Mission::new(MissionConfig {
     interference: Interference::Field(Field::new(&POINTS)),
     ..*mission(3).config()

@@ -10,7 +10,7 @@ use uav_relay::planning::single::theorems;
 use super::counter::instructions;
 use super::missions::{HIGH, MISSION, WIDE};
 
-/// Measures the theorems with a band of altitudes, and the search for the fewest relays for a target.
+/// Measures the instructions for Theorems 1 to 3 and for finding the fewest relays that reach an SIR.
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
@@ -29,9 +29,9 @@ pub(crate) fn planning() {
     hprintln!("fewest_relays {}", relays);
 }
 
-/// Solves a chain of `relays` relays by the joint method.
+/// Solves a chain of `relays` relays by the joint method, in several calls of the solver.
 ///
-/// Returns the total instructions, those of the most expensive portion, and the number of portions.
+/// Returns the total instructions, those of the most expensive call, and the number of calls.
 fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
@@ -53,7 +53,7 @@ fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     }
 }
 
-/// Measures the joint method without messages.
+/// Measures the instructions of the joint method's solver alone, without messages between relays.
 pub(crate) fn joint() {
     let (all, most, portions) = solved(&HIGH, 8);
     hprintln!("solved_8 {}", all);

@@ -11,7 +11,7 @@ use uav_relay::{Local, Placement};
 use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
 
-/// Measures the local search of Algorithm 2, and an estimate of the interference.
+/// Measures the instructions for one relay's local search (Algorithm 2) and interference estimate.
 pub(crate) fn shares() {
     let place = Placement::on_line;
     let beside = |place| HopEnd {

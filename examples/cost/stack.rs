@@ -41,7 +41,7 @@ pub(crate) const PAINTED: usize = 1024;
 
 pub(crate) const PAINT: u32 = 0xC0FF_EE11;
 
-/// Returns the bytes of stack that `work` uses below this frame.
+/// Returns the bytes of stack that `work` uses below this function's frame.
 #[inline(never)]
 pub(crate) fn used_stack(work: impl FnOnce()) -> u32 {
     paint();
@@ -59,7 +59,7 @@ pub(crate) fn paint() {
     black_box(&words);
 }
 
-/// Returns the number of bytes that no longer have the pattern.
+/// Returns the number of stack bytes that no longer have the pattern.
 ///
 /// Its array lies where that of `paint` was, and is not written.
 #[inline(never)]

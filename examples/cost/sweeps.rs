@@ -32,7 +32,8 @@ pub(crate) fn reach() {
     reach_in_noise();
 }
 
-/// Measures the same hops with noise of 1e-4 to 100 times the interference 100 m from the interferer.
+/// Measures the instructions of `Hop::reach` with receiver noise. The noise is 1e-4 to 100 times the interference 100
+/// m from the interferer.
 fn reach_in_noise() {
     const LEVELS: usize = 4;
     let mut all = [0; LEVELS * 30];
@@ -63,7 +64,7 @@ fn reach_in_noise() {
     hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
-/// Measures a full sweep through a middle and the last relay of three, and the verdict on its way back.
+/// Measures the instructions for a sweep message at relays 2 and 3 of 3, and for the verdict sent back.
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -132,7 +133,7 @@ pub(crate) fn sweep() {
     hprintln!("settled {}", u32::from(head.phase() == Phase::Holding));
 }
 
-/// Measures a full frame through the deframer and the checks.
+/// Measures the instructions for deframing and checking one sweep message, the first of eight relays.
 pub(crate) fn deframe() {
     let settings = Settings {
         predict: false,
@@ -161,7 +162,8 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the largest portion of the leader's prediction for a hundred relays; counts the portions.
+/// Measures the instructions of the calls in which a leader of 100 relays solves its chain in advance. Prints the
+/// largest cost and the number of calls.
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

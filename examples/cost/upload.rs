@@ -7,7 +7,8 @@ use super::auth::KEY;
 use super::counter::{instructions, relay, sends};
 use super::missions::mission;
 
-/// Measures relay 1 receiving the offer of its loaded mission as version 1 from the transmitter.
+/// Measures the instructions that relay 1 takes to accept a mission offered by a ground station. The offer is its own
+/// mission as version 1.
 pub(crate) fn upload() {
     const THREE: Mission = mission(3);
     let now = Instant::ZERO;

@@ -5,13 +5,14 @@ use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{Answer, Message, MessageError};
 
-/// First output, once it can receive.
+/// First bytes that the golden firmware sends, once it can receive.
 pub const READY: &[u8] = b"ready\0";
 
-/// Answers received frames.
+/// Answers received frames, so that a test can compare the results of target and PC.
 ///
-/// A valid frame is answered with itself, decoded and encoded again; a sweep also with a verdict that repeats its targets as
-/// slacks and its `chosen` field as `own`; an invalid frame with a digit for the error, and a delimiter.
+/// A valid frame is answered with itself, decoded and encoded again. A sweep is also answered with a verdict that
+/// repeats the sweep's targets as slacks and its `chosen` field as `own`. An invalid frame is answered with a digit
+/// for the error, and a delimiter.
 pub struct Answerer {
     deframer: Deframer,
 }

@@ -25,7 +25,7 @@ pub fn read<T: Parser>(section: fn(&Deployment, &mut Given)) -> Result<(T, Beyon
     Ok((options, beyond))
 }
 
-/// Extracts clap's first paragraph and the suggested spelling. The other tips and the usage are dropped.
+/// Returns clap's error as one line, with the suggested spelling. The other tips and the usage are dropped.
 fn first(text: &str) -> String {
     let mut lines = text.lines().map(str::trim);
     let wrong: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
@@ -42,7 +42,7 @@ fn first(text: &str) -> String {
     }
 }
 
-/// Prints the mistake and returns exit status 2.
+/// Prints the mistake `line` to standard error, and returns exit status 2.
 pub fn refuse(line: &str) -> ExitCode {
     complain(line);
     ExitCode::from(2)
@@ -53,7 +53,7 @@ pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Parser of an option's value, as clap takes it.
+/// Parser of an option's value, in the form that clap takes.
 pub trait Parse<T>: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {}
 
 impl<T, F: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static> Parse<T> for F {}

@@ -18,21 +18,22 @@ use crate::site::degrees;
 
 const TOLERANCE: f64 = 1e-4;
 
-/// Settings that only a file can give.
+/// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
 pub struct Beyond {
-    /// Channel of the file; `None` for the paper's.
+    /// Channel given by the file; `None` for the paper's channel.
     pub channel: Option<Channel>,
-    /// Interference field of the file, if any.
+    /// Interference field given by the file, if any.
     pub field: Option<Interference>,
-    /// Profiles of single relays, with their indices.
+    /// Profiles (altitude and power) of single relays, with the indices of these relays.
     pub profiles: Vec<(u16, Profile)>,
     /// Options of the command line that override the file.
     pub overrides: Vec<Override>,
 }
 
 impl Beyond {
-    /// Refuses an option for all relays that relay `index` would ignore for its own `[[relay]]` profile.
+    /// Rejects `--altitude` and `--uav-power` for a relay that has its own `[[relay]]` profile in the file. Relay
+    /// `index` would ignore these options.
     ///
     /// # Errors
     /// One line that names the option and the file's table.
@@ -50,7 +51,7 @@ impl Beyond {
 /// Command-line option that overrides a different value in the file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Override {
-    /// Option and its value.
+    /// Option of the command line and its value, as one text.
     pub option: String,
     /// Value in the file that is overridden.
     pub instead: String,
@@ -82,7 +83,7 @@ pub fn tell(overrides: &[Override], log: &Log) {
     }
 }
 
-/// Options given by a file: names and values; `None` for flags without a value.
+/// Options given by the `--config` file: names and values; `None` for flags without a value.
 #[derive(Debug, Default)]
 pub struct Given {
     options: Vec<(&'static str, Option<OsString>)>,
@@ -90,13 +91,13 @@ pub struct Given {
 }
 
 impl Given {
-    /// Adds an option if it has a value.
+    /// Adds an option if the file has a value for it.
     pub fn value(&mut self, name: &'static str, value: Option<impl ToString>) {
         let value = value.map(|value| value.to_string().into());
         self.options.extend(value.map(|value| (name, Some(value))));
     }
 
-    /// Adds an option with a path relative to the file's folder.
+    /// Adds an option whose value is a path relative to the file's folder, if the file has it.
     pub fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
         let path = path.map(|path| self.folder.join(path).into_os_string());
         self.options.extend(path.map(|path| (name, Some(path))));
@@ -134,7 +135,8 @@ impl Given {
         })
     }
 
-    /// Removes options that the command line also gives or excludes. Returns the rest and the overrides with a different value.
+    /// Removes the file's options that the command line also gives or excludes. Returns the remaining options, and
+    /// the removed ones with a different value as overrides.
     fn less(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {
@@ -169,7 +171,8 @@ impl Given {
     }
 }
 
-/// Returns the command line's value for the option `name`; an empty text at the end of the line.
+/// Returns the command line's value for the option `name`; `None` without this option. The value is empty if nothing
+/// follows the option.
 fn said(line: &[OsString], name: &str) -> Option<String> {
     let with_value = format!("{name}=");
     line.iter().enumerate().find_map(|(at, word)| {
@@ -182,7 +185,7 @@ fn said(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Returns true if the values `one` and `other` are the same text or the same list of numbers.
+/// Returns true if both values are the same text or the same list of numbers, or if `other` is empty.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
@@ -192,14 +195,14 @@ fn is_same(one: &str, other: &str) -> bool {
     one == other || other.is_empty() || numbers(one).is_some_and(|one| Some(one) == numbers(other))
 }
 
-/// Autopilot options, and the file's keys for them.
+/// Options that need an autopilot, and the file's keys for them.
 const OF_AUTOPILOTS: [(&str, &str); 3] = [
     ("--autopilot-baud", "autopilot_baud"),
     ("--autopilot-key-file", "autopilot_key_file"),
     ("--speed", "speed_m_s"),
 ];
 
-/// Command-line options, and the file's options that they exclude.
+/// Command-line options, and the file's options that each of them excludes.
 const OTHERWISE: [(&str, &[&str]); 6] = [
     ("--shared", &["--upstream", "--downstream"]),
     ("--upstream", &["--shared"]),
@@ -217,7 +220,8 @@ const OTHERWISE: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Returns the words of the `--config` file and the command line. The settings that only a file can give come with them.
+/// Merges the `--config` file into the command line. Returns the arguments, the file's first, and the settings that
+/// only a file can give.
 ///
 /// `section` adds the program's own section of the file.
 ///
@@ -287,7 +291,7 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
     })
 }
 
-/// Adds the scenario's mission as options; returns the settings that have no option.
+/// Adds the scenario's mission to `given` as options; returns the settings that have no option.
 fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
     // The mission is built for one relay, because the number of relays is in another section or on the command line.
     let (mission, profiles) =
@@ -354,7 +358,7 @@ fn unspaced(scenario: &Scenario) -> Scenario {
     }
 }
 
-/// Adds the `[network]` section, which every program reads.
+/// Adds the options of the file's `[network]` section, which every program reads.
 pub fn network(deployment: &Deployment, given: &mut Given) {
     let network = &deployment.network;
     given.value("--network", network.id);

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use uav_relay::{Duration, Instant, Stats};
 
-/// Returns every counter of `stats`.
+/// Returns every counter of `stats` as a JSON object.
 #[must_use]
 pub fn counted(stats: &Stats) -> Value {
     json!({
@@ -34,16 +34,17 @@ pub fn counted(stats: &Stats) -> Value {
     })
 }
 
-/// Interval between two checks of the counters.
+/// Interval between two checks of the frame counters.
 const EVERY: Duration = Duration::from_millis(2_000);
 
-/// Rejected frames between two checks before a reason is reported.
+/// Minimum number of frames rejected for a reason between two checks before the reason is reported.
 const MANY: u32 = 3;
 
-/// Damaged frames between two checks, with no intact one, before a wrong baud rate is suspected.
+/// Minimum number of damaged frames between two checks that suggests a wrong baud rate. No frame may have been
+/// intact.
 const DAMAGED: u32 = 10;
 
-/// Counters at the last check, and reasons already reported.
+/// Detector of reasons for rejected frames. It has the counters at the last check, and the reasons already reported.
 #[derive(Debug, Default)]
 pub struct Refusals {
     last: Stats,
@@ -52,7 +53,8 @@ pub struct Refusals {
 }
 
 impl Refusals {
-    /// Returns the next new reason for rejected frames; `None` if all reasons were reported.
+    /// Returns a text for the next new reason of rejected frames; `None` if there is none. `signs` is true if this
+    /// relay signs.
     pub fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.look_at {
             return None;

@@ -11,7 +11,7 @@ use uav_relay_scenario::number::{narrow, watts};
 
 use crate::log::Log;
 
-/// Longest accepted line, bytes.
+/// Maximum length of an input line, bytes; a longer one is rejected.
 pub const LONGEST: usize = 200;
 
 /// Description of a valid power, for error messages.
@@ -34,14 +34,14 @@ pub fn power_w(words: &[&str]) -> Option<f32> {
     (1e-30..=1e6).contains(&power_w).then_some(power_w)
 }
 
-/// Splits a line into words; `None` for one that is too long or no UTF-8.
+/// Splits a line into words; `None` if the line is too long or not UTF-8.
 #[must_use]
 pub fn words(line: &[u8]) -> Option<Vec<&str>> {
     let text = std::str::from_utf8(line).ok()?;
     (text.len() <= LONGEST).then(|| text.split_whitespace().collect())
 }
 
-/// Counter of invalid lines. The first one is logged.
+/// Counter of invalid input lines. The first one is logged.
 #[derive(Debug, Default)]
 pub struct InvalidLines(u64);
 
@@ -65,7 +65,7 @@ impl InvalidLines {
 
 const READS: usize = 16;
 
-/// Open FIFO.
+/// Open FIFO, from which lines are read.
 #[derive(Debug)]
 pub struct Fifo {
     fd: OwnedFd,
@@ -73,13 +73,13 @@ pub struct Fifo {
     begun: Begun,
 }
 
-/// Incomplete line: at most one byte more than [`LONGEST`], which marks it as too long.
+/// Incomplete line, as received so far. It has at most one byte more than [`LONGEST`], which marks it as too long.
 #[derive(Debug, Default)]
 pub struct Begun(Vec<u8>);
 
 impl Begun {
-    /// Appends bytes and passes each completed line to `line` without its line feed. Cuts a line to one byte more than
-    /// [`LONGEST`].
+    /// Appends received bytes, and passes each completed line to `line` without its line feed. Cuts a line to one
+    /// byte more than [`LONGEST`].
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
         for &byte in bytes {
             if byte == b'\n' {
@@ -93,7 +93,7 @@ impl Begun {
 }
 
 impl Fifo {
-    /// Opens the FIFO.
+    /// Opens the FIFO `path`, which `option` names.
     ///
     /// # Errors
     /// One line that names `option` and the fault.
@@ -119,7 +119,7 @@ impl Fifo {
         self.fd.as_fd()
     }
 
-    /// Passes each line received since the last call to `line`. Work: at most 64 KiB.
+    /// Reads the lines that have arrived since the last call, and passes each one to `line`. Work: at most 64 KiB.
     pub fn read(&mut self, mut line: impl FnMut(&[u8])) {
         let mut buffer = [0; 4096];
         for _ in 0..READS {

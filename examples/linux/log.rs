@@ -15,7 +15,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use uav_relay::Instant;
 
-/// Maximum number of lines waiting for the writer.
+/// Maximum number of log lines waiting for the writer thread; further ones are dropped.
 const QUEUE: usize = 1_024;
 
 /// Options of the log.
@@ -30,14 +30,15 @@ pub struct LogOptions {
     log_file: Option<PathBuf>,
 }
 
-/// Program that writes the lines. Logs of several programs are read side by side, so every line names it.
+/// Identity of the program that writes the log. Logs of several programs are read side by side, so every line names
+/// the program.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// Name in a line of text: `relay 2`.
+    /// Name of the program in a line of text, such as `relay 2`.
     pub name: String,
-    /// Field of a JSON line that identifies the program: `index`.
+    /// Name of the field that identifies the program in a JSON line, such as `index`.
     pub key: &'static str,
-    /// Value of that field.
+    /// Value of the field that identifies the program in a JSON line.
     pub value: Value,
 }
 
@@ -49,11 +50,11 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Acknowledges that all earlier lines have been written or dropped.
+    /// Request to confirm that all earlier lines have been written or dropped.
     Flush(SyncSender<()>),
 }
 
-/// State shared by the two ends of the queue.
+/// State shared by the log's callers and its writer thread.
 #[derive(Debug, Default)]
 struct Shared {
     dropped: AtomicU64,
@@ -124,23 +125,23 @@ impl Log {
         self.say(now, event, Value::Null, text);
     }
 
-    /// Logs that frames are signed.
+    /// Logs that frames are signed, with this epoch.
     pub fn signed(&self, epoch: u32) {
         let what = format_args!("frames are signed, epoch {epoch}");
         self.say(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
     }
 
-    /// Reopens the file before the next line, for log rotation.
+    /// Reopens the log file before the next line, for log rotation.
     pub fn reopen(&self) {
         self.shared.reopen.store(true, Ordering::Relaxed);
     }
 
-    /// Returns the number of dropped lines.
+    /// Returns the number of log lines dropped so far.
     pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 
-    /// Waits until all lines are written, at most `at_most`.
+    /// Waits until all log lines are written, for at most the time `at_most`.
     pub fn flush(&self, at_most: Duration) {
         let end = Clock::now() + at_most;
         let (done, heard) = sync_channel(1);
@@ -163,9 +164,9 @@ fn appended(path: &Path) -> std::io::Result<File> {
 struct Writer {
     file: File,
     path: Option<PathBuf>,
-    /// True if the last line was written only in part.
+    /// True if the last log line was written only in part.
     torn: bool,
-    /// Number of dropped lines that the log has reported.
+    /// Number of dropped lines that have already been reported in the log.
     told: u64,
     format: Arc<Format>,
     shared: Arc<Shared>,
@@ -224,7 +225,7 @@ impl Writer {
 }
 
 impl Format {
-    /// Formats a line: time of day in UTC, time since the start, source, event, text and a line feed.
+    /// Formats a log line: time of day in UTC, time since the start, source, event, text and a line feed.
     fn line(&self, now: Instant, event: &str, fields: Value, text: &str) -> String {
         let time = humantime::format_rfc3339_millis(SystemTime::now()).to_string();
         let micros = now.as_micros();

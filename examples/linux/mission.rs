@@ -7,28 +7,28 @@ use uav_relay::{Adjust, Band, Channel, Interference, Interferer, Mission, Missio
 
 use crate::command::{named, number};
 
-/// Range of a distance from transmitter to receiver, m.
+/// Permitted range of the distance from transmitter to receiver, m.
 pub const DISTANCE_M: [f32; 2] = [1.0, 1e6];
 
-/// Range of an altitude, m.
+/// Permitted range of an altitude, m.
 pub const ALTITUDE_M: [f32; 2] = [0.1, 1e4];
 
-/// Range of the left limit of the lateral positions, y in m.
+/// Permitted range of the left limit of lateral positions, y in m.
 pub const LEFT_M: [f32; 2] = [-1e5, 0.0];
 
-/// Range of the right limit of the lateral positions, y in m.
+/// Permitted range of the right limit of lateral positions, y in m.
 pub const RIGHT_M: [f32; 2] = [0.0, 1e5];
 
-/// Range of a transmit power, W.
+/// Permitted range of a transmit power, W.
 pub const POWER_W: [f32; 2] = [1e-6, 1e6];
 
-/// Range of a noise power, W.
+/// Permitted range of a noise power, W.
 pub const NOISE_W: [f32; 2] = [0.0, 1.0];
 
-/// Range of the SIR needed on the way back, relative to that on the way there.
+/// Permitted range of `--reverse`: SIR needed toward the transmitter / SIR needed toward the receiver.
 pub const REVERSE: [f32; 2] = [0.0, 1.0];
 
-/// Range of a minimum separation, m.
+/// Permitted range of the minimum separation of two relays, m.
 pub const SEPARATION_M: [f32; 2] = [0.0, 1e5];
 
 const PAPERS: Interference = Interference::Source(Interferer {
@@ -102,12 +102,12 @@ pub struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// Returns the given interferer, else the `field` of a file, else the paper's interferer.
+    /// Returns the interferer of the command line, else the `field` of a file, else the paper's interferer.
     pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
-    /// Returns the parameters for `relays` relays; without a channel, the paper's.
+    /// Returns the mission's parameters for `relays` relays. Without a `channel` it has the paper's.
     ///
     /// # Errors
     /// One line that says what is wrong.
@@ -147,7 +147,7 @@ impl MissionOptions {
     }
 }
 
-/// Checks the parameters. Messages name options with their `prefix`, "--" or "--new-".
+/// Checks a mission's parameters. Error messages name options with their `prefix`, "--" or "--new-".
 ///
 /// # Errors
 /// One line that names the option and the fault.
@@ -172,7 +172,7 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
     })
 }
 
-/// Parses `unknown`, or an interferer's power, W, and position, m.
+/// Parses an interferer's power (W) and position (m), or the word `unknown`.
 ///
 /// # Errors
 /// The expected form or range.
@@ -183,7 +183,7 @@ pub fn guess(text: &str) -> Result<Interference, String> {
     interferer(text).map(Interference::Source)
 }
 
-/// Parses an interferer's power, W, and position, m.
+/// Parses an interferer: its power (W) and position x, y (m), separated by commas.
 ///
 /// # Errors
 /// The expected form or range.
@@ -198,7 +198,7 @@ pub fn interferer(text: &str) -> Result<Interferer, String> {
     })
 }
 
-/// Parses the lowest and the highest altitude of a range, m.
+/// Parses a range of altitudes: the lowest and the highest (m), separated by a comma.
 ///
 /// # Errors
 /// The expected form or range.

@@ -5,18 +5,19 @@ use std::os::unix::net::{SocketAddr, UnixDatagram};
 
 use uav_relay::{Duration, Instant};
 
-/// Socket of systemd's notifications.
+/// Socket for notifications to systemd.
 #[derive(Debug)]
 pub struct Notify {
     socket: UnixDatagram,
     to: SocketAddr,
-    /// Interval of watchdog messages, half the period that systemd requests; `None` without one.
+    /// Interval of the messages to systemd's watchdog, half its timeout; `None` without a watchdog.
     every: Option<Duration>,
     due: Instant,
 }
 
 impl Notify {
-    /// Opens the socket named by the environment. `None` without one or if it can not be reached: the relay flies all the same.
+    /// Opens the socket that `NOTIFY_SOCKET` names. `None` without one or if it can not be reached: the relay flies
+    /// all the same.
     pub fn open() -> Option<Self> {
         let to = address(&std::env::var_os("NOTIFY_SOCKET")?)?;
         let socket = UnixDatagram::unbound().ok()?;
@@ -29,12 +30,13 @@ impl Notify {
         })
     }
 
-    /// Reports that the program has started.
+    /// Reports to systemd that the program has started.
     pub fn ready(&self) {
         self.send("READY=1");
     }
 
-    /// Reports that the program is alive when due; returns the time of the next report.
+    /// Reports to systemd's watchdog that the program is alive, if due. Returns the time of the next report; `None`
+    /// without a watchdog.
     pub fn tend(&mut self, now: Instant) -> Option<Instant> {
         let every = self.every?;
         if self.due <= now {
@@ -44,7 +46,7 @@ impl Notify {
         Some(self.due)
     }
 
-    /// Reports that the program stops on request.
+    /// Reports to systemd that the program stops on request.
     pub fn stopping(&self) {
         self.send("STOPPING=1");
     }
@@ -54,7 +56,7 @@ impl Notify {
     }
 }
 
-/// Parses a path, or `@` and an abstract socket name.
+/// Parses the name of a Unix socket: a path, or `@` and an abstract name.
 fn address(name: &OsStr) -> Option<SocketAddr> {
     #[cfg(target_os = "linux")]
     if let Some(name) = name.to_str().and_then(|name| name.strip_prefix('@')) {
@@ -64,7 +66,7 @@ fn address(name: &OsStr) -> Option<SocketAddr> {
     SocketAddr::from_pathname(name).ok()
 }
 
-/// Returns half of the watchdog timeout that systemd requests of this process.
+/// Returns half of the watchdog timeout that systemd requests of this process; `None` without one.
 fn watchdog() -> Option<Duration> {
     let micros: u64 = std::env::var("WATCHDOG_USEC").ok()?.parse().ok()?;
     let pid = std::env::var("WATCHDOG_PID").ok();

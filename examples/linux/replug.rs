@@ -14,11 +14,12 @@ use crate::log::Log;
 use crate::tap::Tap;
 use crate::tty::Tty;
 
-/// Pause before the first retry; each further pause doubles, up to [`LONGEST`].
+/// Pause before the first attempt to reopen a tty; each further pause doubles, up to [`LONGEST`].
 const FIRST: Duration = Duration::from_millis(250);
 const LONGEST: Duration = Duration::from_millis(4_000);
 
-/// Tty identified by its name, present or not. All its traffic passes through `read` and `write`.
+/// Tty that may be unplugged and plugged in again, known by its name. All its traffic passes through `read` and
+/// `write`.
 #[derive(Debug)]
 pub struct Replug {
     option: &'static str,
@@ -28,16 +29,16 @@ pub struct Replug {
     again_at: Instant,
     pause: Duration,
     counts: Counts,
-    /// Capture of its traffic, if enabled.
+    /// Capture of this tty's traffic, if enabled.
     tap: Option<Tap>,
 }
 
-/// Traffic counters of a port.
+/// Traffic counters of a tty, in bytes and interruptions.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     read: u64,
     written: u64,
-    /// Bytes written while the port was missing.
+    /// Bytes to send that were discarded while the tty was missing.
     lost: u64,
     times_gone: u32,
 }
@@ -60,7 +61,7 @@ impl Replug {
         })
     }
 
-    /// Captures all further traffic with `tap`.
+    /// Captures all further traffic of this tty with `tap`.
     pub fn tapped(&mut self, tap: Tap) {
         self.tap = Some(tap);
     }
@@ -103,17 +104,17 @@ impl Replug {
         json!({ "option": self.option, "port": self.path.display().to_string() })
     }
 
-    /// Returns the time of the next retry.
+    /// Returns the time of the next attempt to reopen the tty; `None` while it is open.
     pub fn wake(&self) -> Option<Instant> {
         self.tty.is_none().then_some(self.again_at)
     }
 
-    /// Returns the file descriptor and the events to poll.
+    /// Returns the tty's file descriptor and the events to poll; `None` while it is closed.
     pub fn interest(&self) -> Option<(BorrowedFd<'_>, PollFlags)> {
         self.tty.as_ref().map(|tty| (tty.as_fd(), tty.interest()))
     }
 
-    /// Records the events that poll(2) reported.
+    /// Records the events that poll(2) reported for this tty.
     pub fn noticed(&mut self, events: PollFlags) {
         if let Some(tty) = &mut self.tty {
             tty.noticed(events);
@@ -125,7 +126,7 @@ impl Replug {
         self.tty.is_some()
     }
 
-    /// Returns the name of the tty.
+    /// Returns the path of the tty.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -140,7 +141,7 @@ impl Replug {
         self.counts.read
     }
 
-    /// Returns the state and the counters as JSON.
+    /// Returns the tty's state and traffic counters as JSON.
     pub fn status(&self) -> Value {
         json!({
             "option": self.option,

@@ -64,7 +64,7 @@ impl Service {
         })
     }
 
-    /// Returns the time since the start.
+    /// Returns the time since the start of the program.
     #[must_use]
     pub fn now(&self) -> Instant {
         let micros = self.clock.elapsed().as_micros();
@@ -76,10 +76,11 @@ impl Service {
         self.notify.iter().for_each(Notify::ready);
     }
 
-    /// Handles signals and status requests, and reports to the watchdog; returns the time of the next call.
+    /// Handles signals and status requests, and reports to the watchdog. Returns the time by which to call it again,
+    /// if any.
     ///
-    /// `answer` gets `None` for a status request, or a command and its sender. `who` names the program in the line after a
-    /// SIGHUP.
+    /// `answer` gets `None` for a status request, or a command and its sender. `who` names the program in the line
+    /// after a SIGHUP.
     pub fn tend(
         &mut self,
         time: Instant,
@@ -109,7 +110,8 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// Sleeps until `wake`, a signal, a status request, or one of `ttys` or `others` is ready. Without `wake` it sleeps for ever.
+    /// Sleeps until `wake`, a signal, a status request, or until one of `ttys` or `others` is ready. `wake` is a
+    /// time; without it there is no time limit.
     ///
     /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
     ///
@@ -168,13 +170,14 @@ impl Service {
         self.notify.iter().for_each(Notify::stopping);
     }
 
-    /// Writes the last log lines.
+    /// Waits until the last log lines are written, for at most 0.5 s.
     pub fn end(&self) {
         self.log.flush(LAST_LINES);
     }
 }
 
-/// Registers the signals. SIGXFSZ becomes a write error, like a full disk, and does not end the program.
+/// Registers the signals that the program handles. SIGXFSZ becomes a write error, like a full disk, and does not end
+/// the program.
 fn signals() -> std::io::Result<SignalDelivery<UnixStream, SignalOnly>> {
     signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let (ours, theirs) = UnixStream::pair()?;

@@ -13,15 +13,15 @@ use uav_relay::{Duration, Instant};
 
 use crate::lines::LONGEST;
 
-/// Maximum number of connections accepted by one call.
+/// Maximum number of connections that one call accepts.
 const ANSWERS: usize = 4;
 
-/// Maximum number of unanswered connections; the oldest beyond that get the state at once.
+/// Maximum number of clients that may wait. Of any more, the oldest get the state at once.
 const CLIENTS: usize = 16;
 
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// Listening socket; its file is removed on drop.
+/// Unix socket that accepts status requests and commands; its file is removed on drop.
 #[derive(Debug)]
 pub struct StatusSocket {
     listener: UnixListener,
@@ -36,7 +36,7 @@ struct Client {
     until: Instant,
 }
 
-/// Complete request of a client.
+/// Complete request of a client at the status socket.
 #[derive(Debug)]
 pub struct Question {
     stream: UnixStream,
@@ -72,13 +72,14 @@ impl StatusSocket {
         })
     }
 
-    /// Returns the file descriptors to poll.
+    /// Returns the file descriptors to poll: the listening socket, and the connected clients.
     pub fn fds(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         let clients = self.clients.iter().map(|client| client.stream.as_fd());
         std::iter::once(self.listener.as_fd()).chain(clients)
     }
 
-    /// Accepts connections and reads from them. Returns the complete requests, and the time of the next call.
+    /// Accepts connections and reads from them. Returns the complete requests, and the time of the next call; `None`
+    /// without clients.
     pub fn questions(&mut self, now: Instant) -> (Vec<Question>, Option<Instant>) {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
         let accepted = accepted.filter(|(stream, _)| stream.set_nonblocking(true).is_ok());
@@ -100,7 +101,7 @@ impl StatusSocket {
 }
 
 impl Client {
-    /// Reads; returns true after a line, the end of the stream, an overlong line or a timeout.
+    /// Reads from the client. Returns true after a line, the end of the stream, an overlong line or a timeout.
     fn is_complete(&mut self, now: Instant) -> bool {
         let mut bytes = [0; LONGEST];
         let has_ended = match self.stream.read(&mut bytes) {
@@ -126,7 +127,7 @@ impl Client {
 }
 
 impl Question {
-    /// Returns the user and the process at the other end, as reported by the system.
+    /// Returns the user and the process that sent the request, as reported by the system.
     #[must_use]
     pub fn user(&self) -> String {
         #[cfg(target_os = "linux")]
@@ -137,7 +138,8 @@ impl Question {
         "an unknown user".to_owned()
     }
 
-    /// Sends the answer and closes the connection. A client that leaves no room in the kernel's buffer gets only a part.
+    /// Sends the answer to the client and closes the connection. A client that leaves no room in the kernel's buffer
+    /// gets only a part.
     pub fn answer(mut self, answer: &Value) {
         let _ = self.stream.write_all(format!("{answer}\n").as_bytes());
     }

@@ -36,8 +36,8 @@ fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     new.sync_all()
 }
 
-/// Returns this start's epoch, one more than in `file`, and writes it to the file before it is used. No power failure makes a
-/// relay use a number twice.
+/// Returns this start's epoch, one more than in `file`, and writes it to the file before it is used. No power failure
+/// makes a relay use an epoch twice.
 ///
 /// A missing file counts as the clock's seconds since 1970, so that the epoch does not restart from 1.
 ///
@@ -63,26 +63,28 @@ pub fn next_epoch(file: &Path) -> Result<u32, String> {
     Ok(epoch)
 }
 
-/// Pause after a failed write of a record.
+/// Pause before a failed write of a record is tried again.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Maximum time for the last write, at exit.
+/// Maximum wait, at exit, for a write that is in progress.
 const LAST: Span = Span::from_millis(500);
 
 type Done = (std::io::Result<()>, Span);
 
-/// Record in a file, followed by a CRC-32C. A separate thread writes it, so that a slow or full disk never blocks the program.
+/// Record in a file, followed by a CRC-32C. A separate thread writes it, so that a slow or full disk never blocks the
+/// program.
 ///
-/// After a failed write the program flies on; the failure is logged once, counted, and retried every second.
+/// After a failed write the program flies on; the failure is logged once and counted, and the write is tried again
+/// every second.
 #[derive(Debug)]
 pub struct StoredFile {
     option: &'static str,
     file: PathBuf,
     orders: SyncSender<Vec<u8>>,
     done: Receiver<Done>,
-    /// Receives a byte for each finished write, for poll(2).
+    /// Socket that becomes readable when a write has ended, for poll(2).
     ended: UnixStream,
-    /// Newest record.
+    /// Newest record to store.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
     /// Record of the last write, successful or not.
@@ -95,7 +97,8 @@ pub struct StoredFile {
 }
 
 impl StoredFile {
-    /// Starts the writer thread of `file`, given by `option`. `record` is that of an earlier start, if any.
+    /// Starts the writer thread of `file`, which `option` names. `record` is the file's record from an earlier start,
+    /// if any.
     ///
     /// # Errors
     /// One line that names the file and the fault.
@@ -152,7 +155,8 @@ impl StoredFile {
         is_tried
     }
 
-    /// Finishes a write, and begins the next one or retries a failed one when due. Returns the time of the next retry.
+    /// Finishes a write, and begins the next one or retries a failed one when due. Returns the time of the next
+    /// retry, if a write has failed.
     pub fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         let mut bytes = [0; 8];
         let _ = (&self.ended).read(&mut bytes);
@@ -178,7 +182,7 @@ impl StoredFile {
         }
     }
 
-    /// Waits at most 0.5 s for a write in progress, at exit.
+    /// Waits at most 0.5 s for a write in progress. Called at exit.
     pub fn finish(&mut self, now: Instant, log: &Log) {
         if self.writing.is_some()
             && let Ok((result, took)) = self.done.recv_timeout(LAST)
@@ -222,7 +226,7 @@ impl StoredFile {
         self.writes
     }
 
-    /// Returns the time of the slowest write, ms.
+    /// Returns the duration of the slowest write, ms.
     pub fn slowest_ms(&self) -> f64 {
         1e3 * self.slowest.as_secs_f64()
     }
@@ -233,7 +237,7 @@ impl StoredFile {
     }
 }
 
-/// Reads the file given by `option`; `None` if there is none.
+/// Reads the file that `option` names; `None` if it does not exist.
 ///
 /// # Errors
 /// One line that names the file and the fault.
@@ -248,7 +252,8 @@ pub fn load(option: &str, file: &Path) -> Result<Option<Vec<u8>>, String> {
     }
 }
 
-/// Returns the record of a file written by [`StoredFile`]; `None` for another length or a wrong CRC.
+/// Returns the record in `bytes`, the content of a file written by [`StoredFile`]. `None` for another length or a
+/// wrong CRC.
 pub fn record(bytes: &[u8], length: usize) -> Option<&[u8]> {
     let (record, check) = bytes.split_at_checked(length)?;
     (sum(record) == *check).then_some(record)

@@ -16,7 +16,7 @@ use uav_relay_capture::{Capture, Cut, Direction, Frame, Interface};
 use crate::log::Log;
 use crate::replug::Replug;
 
-/// Maximum number of pieces waiting to be written.
+/// Maximum number of reads and writes waiting to be captured; further ones are left out.
 const WAITING: usize = 1_024;
 
 const MOST: u32 = 9_999;
@@ -29,7 +29,7 @@ struct Piece {
     bytes: Vec<u8>,
 }
 
-/// State of a capture, shared by all its taps.
+/// State of a capture, shared by the taps of all ports.
 #[derive(Debug, Default)]
 struct Fate {
     /// Error that ended the capture early.
@@ -37,7 +37,7 @@ struct Fate {
     is_told: AtomicBool,
 }
 
-/// Tap of one port.
+/// Tap of one port, which passes the port's traffic to the writer thread of the capture.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
@@ -74,7 +74,7 @@ impl Tap {
         self.is_over
     }
 
-    /// Returns the error that ended the capture, at the first call on any of its taps only.
+    /// Returns the error that ended the capture. Further calls return `None`, also on other taps of that capture.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let is_told = self.fate.is_told.swap(true, Ordering::Relaxed);
@@ -86,16 +86,16 @@ impl Tap {
         (!is_told).then_some(fault)
     }
 
-    /// Returns the number of pieces left out of the capture.
+    /// Returns the number of reads and writes left out of the capture, because its queue was full.
     pub const fn left_out(&self) -> u64 {
         self.left_out
     }
 }
 
-/// Captures all further traffic of `ttys`. Logs the name of the written file if it differs from `asked`.
+/// Captures all further traffic of `ttys` in a file. Logs the name of that file if it differs from `asked`.
 ///
-/// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if `asked` exists, the
-/// file is `numbered`.
+/// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if
+/// `asked` exists, the file is `numbered`.
 ///
 /// # Errors
 /// One line that names the file.
@@ -137,7 +137,7 @@ pub fn attach<'a>(
     Ok(())
 }
 
-/// Creates the file under the first free name; opens a device or a FIFO directly.
+/// Creates the capture file under the first free name; opens a device or a FIFO directly.
 fn create(path: &Path) -> Result<(File, PathBuf), String> {
     let named = |error: io::Error| format!("--capture {}: {error}", path.display());
     let is_other = path.metadata().is_ok_and(|it| !it.is_file());
@@ -159,7 +159,7 @@ fn create(path: &Path) -> Result<(File, PathBuf), String> {
     ))
 }
 
-/// Returns the name of capture `number`: `relay2.pcapng`, `relay2-2.pcapng`, `relay2-3.pcapng`.
+/// Returns the name of capture file `number`: `relay2.pcapng`, `relay2-2.pcapng`, `relay2-3.pcapng`.
 fn numbered(path: &Path, number: u32) -> PathBuf {
     if number == 1 {
         return path.to_owned();
@@ -173,7 +173,7 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Splits pieces into frames and writes them; flushes whenever the queue is empty.
+/// Splits the traffic into frames and writes them to the capture; flushes whenever the queue is empty.
 fn write(
     capture: &mut Capture<BufWriter<File>>,
     interfaces: &[Interface],

@@ -11,7 +11,7 @@ use rustix::termios::{
 };
 use uav_relay::serial::{Fault, SerialPort};
 
-/// Open tty.
+/// Open tty of a serial port.
 #[derive(Debug)]
 pub struct Tty {
     fd: OwnedFd,
@@ -22,7 +22,7 @@ pub struct Tty {
 }
 
 impl Tty {
-    /// Opens the tty given by `option`.
+    /// Opens the tty `path`, which `option` names, at `baud` bit/s.
     ///
     /// # Errors
     /// One line that names the option, the path and the fault.
@@ -56,14 +56,15 @@ impl Tty {
         }
     }
 
-    /// Records the events of poll(2). An unplugged adapter stays ready for ever and would otherwise cause a busy loop.
+    /// Marks the tty as failed if poll(2) reported a hang-up or an error. An unplugged adapter stays ready for ever
+    /// and would otherwise cause a busy loop.
     pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
             self.fail("is gone");
         }
     }
 
-    /// Returns the error that made this tty unusable.
+    /// Returns the error that made this tty unusable; `None` while it works.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }
@@ -74,7 +75,7 @@ impl Tty {
             .get_or_insert_with(|| format!("{name}: {what}"));
     }
 
-    /// Returns the number of bytes of a read or write; `None` if it must be retried later.
+    /// Returns the number of bytes that a read or write transferred; `None` if it must be retried later.
     fn done(&mut self, result: Result<usize, Errno>) -> Result<Option<usize>, Fault> {
         match result {
             Ok(count) => Ok(Some(count)),

@@ -32,7 +32,7 @@ const WAITING: usize = 4_096;
 
 const EVENT: &str = "autopilot";
 
-/// MAVLink link number in signatures.
+/// MAVLink link number that the signatures of this program carry.
 const LINK: u8 = 0;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -82,12 +82,13 @@ pub(crate) struct Companion {
     state: Option<&'static str>,
     answers: AnswerMonitor,
     astray: OffLineMonitor,
-    /// Lost relays cleared by the operator over MAVLink, until collected.
+    /// Numbers of lost relays that the operator has cleared over MAVLink, because they have landed. Not yet
+    /// collected.
     cleared: Vec<u16>,
 }
 
 impl Companion {
-    /// Opens the port. This must succeed at the start, because a wrong name is a mistake.
+    /// Opens the autopilot's port. This must succeed at the start, because a wrong name is a mistake.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
         let port = port(&plan.place)?;
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
@@ -108,7 +109,7 @@ impl Companion {
         })
     }
 
-    /// Logs the port, the speed limit and signing.
+    /// Logs the autopilot's port, the drone's speed limit, and signing.
     pub(crate) fn started(&self, log: &Log) {
         let (place, pace) = (&self.plan.place, self.plan.pace);
         let from = match place {
@@ -152,7 +153,7 @@ impl Companion {
         })
     }
 
-    /// Returns the drone's position along the line, unless it is older than 3 s.
+    /// Returns the drone's position relative to the line; `None` if it is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         self.astray.place(now)
     }
@@ -193,12 +194,13 @@ impl Companion {
         self.tell_astray(now, log, sites, relay.mission().config().lateral);
     }
 
-    /// Returns and removes the lost relays that the operator has cleared over MAVLink.
+    /// Returns and removes the numbers of lost relays that the operator has cleared over MAVLink.
     pub(crate) fn take_cleared(&mut self) -> Vec<u16> {
         std::mem::take(&mut self.cleared)
     }
 
-    /// Reports a drone that is far from its line in the log and to the operator, if a report is due.
+    /// Reports a drone far from the line between transmitter and receiver, if a report is due. It goes to the log,
+    /// and may go to the operator.
     fn tell_astray(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
@@ -228,7 +230,7 @@ impl Companion {
         }
     }
 
-    /// Returns the best kind of data received; `None` once the autopilot is found.
+    /// Returns the most specific kind of data received so far; `None` once the autopilot is found.
     fn heard(&self) -> Option<Answer> {
         // A rejected signature is logged separately.
         if self.link.state() != State::Silent || self.link.refused() > 0 {
@@ -276,7 +278,7 @@ impl Companion {
         self.link.handle_event(event);
     }
 
-    /// Returns the time of the next call of [`drive`](Self::drive).
+    /// Returns the time by which [`drive`](Self::drive) must be called again.
     pub(crate) fn wake(&self, now: Instant) -> Instant {
         let link = self.link.poll_timeout(now);
         let again = match &self.port {
@@ -300,7 +302,7 @@ impl Companion {
         }
     }
 
-    /// Reads bytes; returns their number, or `None` if there are none.
+    /// Reads bytes from the autopilot's port; returns their number, or `None` if there are none.
     fn read(&mut self, into: &mut [u8]) -> Option<usize> {
         let count = match &mut self.port {
             Port::Tty(tty) => tty.read(into).ok(),
@@ -375,7 +377,7 @@ fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
     relays.into_iter().filter(|node| *node != 0)
 }
 
-/// Logs an operator's command over MAVLink, with its sender.
+/// Logs an operator's MAVLink command, its sender and its result.
 fn commanded(
     now: Instant,
     log: &Log,
@@ -455,7 +457,8 @@ const fn mistrusted(why: Mistrust) -> &'static str {
     }
 }
 
-/// Returns this machine's time as a MAVLink stamp. A clock behind the autopilot's follows the stamps it receives.
+/// Returns this machine's time as a MAVLink time stamp, for signatures. If this clock is behind the autopilot's, the
+/// link follows the stamps that it receives.
 fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());

@@ -22,7 +22,7 @@ pub(crate) struct Datagrams {
 }
 
 impl Datagrams {
-    /// Binds the local port; accepts datagrams only from the autopilot's address and port.
+    /// Binds the local UDP port; accepts datagrams only from the autopilot's address and port.
     pub(crate) fn open(endpoint: &Endpoint) -> Result<Self, String> {
         let Endpoint {
             host, port, local, ..
@@ -61,7 +61,8 @@ impl Datagrams {
         count
     }
 
-    /// Sends a frame. A frame that does not fit is dropped, because the next one is newer.
+    /// Sends a frame as one datagram. If the kernel's buffer is full the frame is dropped, because the next one is
+    /// newer.
     pub(crate) fn send(&mut self, frame: &[u8]) {
         let count = self.call(|socket| socket.send(frame));
         self.written += count as u64;
@@ -86,7 +87,7 @@ impl Datagrams {
         self.read
     }
 
-    /// Returns the address that does not answer, and what to check.
+    /// Returns a text for the log: the address that does not answer, and what to check.
     pub(crate) fn silence(&self) -> String {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {

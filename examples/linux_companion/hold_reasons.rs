@@ -6,17 +6,18 @@ use uav_relay::{Duration, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;
 
-/// Time that a reason must hold before it is logged: short ones occur while an agreement spreads.
+/// Time that a reason for waiting must last before it is logged. Shorter ones occur while an agreement spreads.
 const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns the reasons of a hold toward the transmitter and toward the receiver.
+/// Returns why the drone waits for its neighbours: toward the transmitter, and toward the receiver. `None` if it does
+/// not wait.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Logged reasons, and newer reasons that have not lasted long enough to be logged.
+/// Logged reasons why the drone waits, and newer ones that have not lasted long enough to be logged.
 #[derive(Debug, Default)]
 pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],
@@ -25,7 +26,8 @@ pub(crate) struct HoldReasonLog {
 }
 
 impl HoldReasonLog {
-    /// Logs changed reasons; returns the time of the next check.
+    /// Logs changes in the reasons why the drone waits for its neighbours. Returns the time of the next check, if
+    /// any.
     pub(crate) fn tend(
         &mut self,
         now: Instant,

@@ -12,11 +12,11 @@ use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// Relays that this relay has lost since its start.
+/// Relays that this relay has lost (no longer receives) since its start.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,
-    /// Number of relays in the loaded mission.
+    /// Number of relays in the mission that this relay was started with.
     relays: u16,
     nodes: BTreeSet<u16>,
 }
@@ -46,7 +46,7 @@ impl Lost {
         &self.nodes
     }
 
-    /// Executes and logs a command of `user`; returns the answer for the socket.
+    /// Executes and logs an operator's command from the status socket; returns the answer.
     pub(crate) fn command(
         &mut self,
         now: Instant,
@@ -98,12 +98,12 @@ impl Lost {
         Ok(cleared(named, side))
     }
 
-    /// Removes relays that the operator has cleared over MAVLink.
+    /// Forgets lost relays that the operator has cleared over MAVLink.
     pub(crate) fn are_cleared(&mut self, named: &[u16]) {
         self.nodes.retain(|node| !named.contains(node));
     }
 
-    /// Parses the number of a relay that may be cleared.
+    /// Parses the number of a lost relay in a command, and checks that this relay may be cleared.
     fn number(&self, relay: &Relay, word: &str) -> Result<u16, String> {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
@@ -125,7 +125,7 @@ impl Lost {
     }
 }
 
-/// Logs a command of an operator, and its result; returns the answer for the socket.
+/// Logs an operator's command and its result; returns the answer for the status socket.
 pub(crate) fn log_command(
     now: Instant,
     log: &Log,
@@ -144,7 +144,7 @@ pub(crate) fn log_command(
     json!({ "done": is_done, "text": text })
 }
 
-/// Returns the log line for cleared relays of one side.
+/// Returns the log text for lost relays, `named`, that the operator has cleared on one side.
 pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
     let stream = match side {
         Side::Upstream => "upstream",

@@ -14,27 +14,27 @@ const STEP_M: f32 = 0.5;
 /// Maximum distance from the agreed position at arrival, m. Autopilots hover up to 0.9 m off their target.
 const NEAR_M: f32 = 1.0;
 
-/// Time that setpoint and drone must stay at the end of a move, because an overshoot is no arrival.
+/// Time without movement before a move counts as ended, because a drone may overshoot its target.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Step {
     Setpoint(Placement),
-    /// Agreed position that the drone has reached, and its remaining distance, m.
+    /// Arrival of the drone: the agreed position, and the remaining distance to it, m.
     Arrived(Placement, f32),
 }
 
-/// Setpoint and position of the drone, and the state of their log lines.
+/// State of the log lines about a drone's flight: logged and newest setpoint, and pending lines.
 #[derive(Debug)]
 pub(crate) struct Movement {
-    /// True if only changes above [`STEP_M`] are logged.
+    /// True if only setpoint changes above [`STEP_M`] are logged, and the end of each move.
     is_sparse: bool,
     logged: Option<Placement>,
     newest: Option<Placement>,
     changed_at: Instant,
-    /// True from a change above [`STEP_M`] until the exact end of the move is logged.
+    /// True from a setpoint change above [`STEP_M`] until the exact end of the move is logged.
     is_moving: bool,
-    /// True from a change above [`STEP_M`] until the arrival is logged.
+    /// True from a setpoint change above [`STEP_M`] until the drone's arrival is logged.
     is_on_its_way: bool,
     near_since: Option<Instant>,
 }
@@ -52,7 +52,7 @@ impl Movement {
         }
     }
 
-    /// Handles a setpoint change; returns the line to log, if any.
+    /// Handles a changed setpoint of `relay`; returns the line to log, if any.
     pub(crate) fn changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
         if self.is_sparse {
             return self.next(now, relay.setpoint(), relay.agreed_place());
@@ -83,7 +83,7 @@ impl Movement {
         (step, end.into_iter().chain(near).min())
     }
 
-    /// Returns the setpoint if it must be logged.
+    /// Returns the setpoint as a line to log, if it must be logged.
     fn next(
         &mut self,
         now: Instant,
@@ -118,7 +118,8 @@ impl Movement {
         self.near_since = None;
     }
 
-    /// Returns the arrival at `goal`, which is the setpoint once it equals the agreed position.
+    /// Returns the drone's arrival at `goal`, if it must be logged. `goal` is the setpoint once that equals the
+    /// agreed position.
     fn arrival(
         &mut self,
         now: Instant,
@@ -141,8 +142,9 @@ impl Movement {
 }
 
 impl Step {
-    /// Writes the line. A setpoint has `x_m` metres from the transmitter toward the receiver, `y_m` to the right of that line
-    /// seen from above, and `altitude_m` above the ground; each number also as the bits of its f32.
+    /// Writes this setpoint or arrival to the log. A setpoint has `x_m` metres from the transmitter toward the
+    /// receiver, `y_m` to the right of that line seen from above, and `altitude_m` above the ground; each number also
+    /// as the bits of its f32.
     pub(crate) fn tell(self, now: Instant, log: &Log) {
         match self {
             Self::Setpoint(place) => {
@@ -195,7 +197,8 @@ mod tests {
         }
     }
 
-    /// A setpoint moving 0.1 m every 0.2 s is logged every 0.6 m and where it stops. A small later change is not.
+    /// Moves a setpoint by 0.1 m every 0.2 s. It is logged every 0.6 m and where it stops; a small later change is
+    /// not logged.
     #[test]
     fn a_line_for_each_half_metre_and_the_exact_end() {
         let mut movement = Movement::new(true);
@@ -215,7 +218,7 @@ mod tests {
         }
     }
 
-    /// An overshoot within 2 s is no arrival; each move has one arrival.
+    /// Flies a drone past its goal and back. The overshoot within 2 s is no arrival; the final stay is one.
     #[test]
     fn a_drone_that_stays_has_arrived_once() {
         let mut movement = Movement::new(true);

@@ -17,10 +17,10 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// Distance outside the geofence that is not reported, m.
+/// Distance outside the geofence up to which nothing is reported, m.
 const FENCE_M: f64 = 100.0;
 
-/// Factor by which swapped sites must be nearer to the drone before the log asks about a swap.
+/// Factor by which the line must be nearer to the drone with swapped sites, before a swap is suggested.
 const NEARER: f64 = 10.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -29,17 +29,17 @@ enum Kind {
     Fence,
 }
 
-/// Drone outside its area.
+/// Report of a drone that is far from its line or outside its geofence.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Off {
     kind: Kind,
     away_m: f64,
     outside_m: f64,
-    /// True where swapping latitude and longitude of both sites brings the line to the drone.
+    /// True if swapping latitude and longitude of both sites brings the line near the drone.
     is_swapped: bool,
 }
 
-/// Compares the drone's position with its line and geofence.
+/// Monitor of the drone's distance from its line and from its geofence.
 #[derive(Debug, Default)]
 pub(crate) struct OffLineMonitor {
     newest: Option<(Instant, Placement)>,
@@ -59,13 +59,13 @@ impl OffLineMonitor {
         fresh.map(|(_, place)| place)
     }
 
-    /// Returns the report for a drone that the autopilot link has found off the line between `sites`.
+    /// Returns the report for a drone that the autopilot link has found far off the line between `sites`.
     pub(crate) fn is_off_line(&mut self, sites: Sites, off_line: OffLine) -> Option<Off> {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Returns a geofence report if one is due. Compares the position, off the line or the newest one, with the line between
-    /// `sites` and the mission's `lateral` range.
+    /// Returns the report of a drone outside its geofence, if one is due. Compares `off_line`, else the newest
+    /// position, with the line between `sites` and the mission's `lateral` range.
     pub(crate) fn look(
         &mut self,
         now: Instant,
@@ -104,7 +104,7 @@ impl OffLineMonitor {
         self.lines.as_ref()
     }
 
-    /// Returns the distance from the line and the deviation as JSON.
+    /// Returns the drone's distance from its line as JSON, and the limit that it exceeds, if any.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from_line_m": self.away_m,
@@ -117,7 +117,7 @@ impl OffLineMonitor {
     }
 }
 
-/// Line between two sites, and the line with latitude and longitude swapped where both are valid.
+/// Line between two sites, and the line with latitude and longitude swapped, if these are valid.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,
@@ -145,13 +145,14 @@ impl Lines {
         }
     }
 
-    /// Returns the horizontal distance from a position to the line, m.
+    /// Returns the horizontal distance from a position to the line between the sites, m.
     fn away_m(&self, place: Placement) -> f64 {
         let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
         along_m.hypot(place.y_m.into())
     }
 
-    /// Evaluates a drone at `place`, given the mission's lateral range.
+    /// Returns a report if a drone at `place` is outside the geofence with the mission's `lateral` range. `None`
+    /// inside, or up to [`FENCE_M`] outside.
     fn off_fence(&self, place: Placement, lateral: Band) -> Option<Off> {
         let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
         let aside_m = beyond(
@@ -169,7 +170,7 @@ impl Lines {
     }
 }
 
-/// Returns the distance of a number from a range.
+/// Returns the distance of `value` from the range `least` to `most`; 0 inside.
 fn beyond(value: f64, least: f64, most: f64) -> f64 {
     (least - value).max(value - most).max(0.0)
 }
@@ -209,7 +210,7 @@ impl fmt::Display for Off {
     }
 }
 
-/// Displays a distance, m, rounded for people.
+/// Distance, m, displayed as m or km and rounded for people.
 struct Far(f64);
 
 impl fmt::Display for Far {

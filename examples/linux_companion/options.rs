@@ -146,7 +146,7 @@ struct ListenOptions {
 }
 
 impl ListenOptions {
-    /// Returns the sensing settings for `relays` relays; `None` if they do not listen.
+    /// Returns the settings for estimating an unknown interferer; `None` without `--listen`.
     fn listen(&self, relays: u16) -> Option<Listen> {
         let default = if self.following {
             Listen::following(relays)
@@ -178,13 +178,13 @@ pub(crate) struct Plan {
     pub(crate) overrides: Vec<Override>,
 }
 
-/// Reads the command line; otherwise returns the exit status after help or a mistake has been printed.
+/// Reads and checks the command line. The error is the exit status after help or a mistake was printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     let (options, beyond) = command::read(section)?;
     plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
-/// Adds the `[network]` and `[companion]` sections of the file.
+/// Adds the options of the file's sections `[network]` and `[companion]`.
 fn section(deployment: &Deployment, given: &mut Given) {
     config::network(deployment, given);
     let own = &deployment.companion;
@@ -286,7 +286,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     }))
 }
 
-/// Returns the load of a shared channel, and checks that the channel can carry all relays.
+/// Returns the load of the shared radio channel, and checks that the channel can carry all relays.
 fn carried(options: &Options) -> Result<ChannelLoad, String> {
     let load = ChannelLoad::of_radios(options.of);
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
@@ -341,7 +341,7 @@ fn mission(options: &Options, beyond: &Beyond) -> Result<Mission, String> {
     mission::mission(config, "--")
 }
 
-/// Parses a field. Its points are leaked, because the mission refers to them until the program ends.
+/// Parses an interference field. Its points are leaked, because the mission refers to them until the program ends.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text

@@ -10,7 +10,7 @@ use crate::options::Options;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 
-/// Tty, or `None` at an end of the chain.
+/// Tty toward a neighbour, or `None` at an end of the chain.
 #[derive(Debug)]
 pub(crate) struct End(Option<Replug>);
 
@@ -36,7 +36,7 @@ pub(crate) enum Ports {
 }
 
 impl Ports {
-    /// Opens the ttys.
+    /// Opens the ttys that the options name.
     pub(crate) fn open(options: &Options) -> Result<Self, String> {
         let link = |name, path: &Option<PathBuf>| {
             let tty = path.as_deref();
@@ -52,7 +52,8 @@ impl Ports {
         Ok(Self::Pair(Box::new(Pair::new(upstream, downstream))))
     }
 
-    /// Exchanges bytes with the relay, and passes a changed record to `store` before it sends. Returns the time of the next call.
+    /// Exchanges bytes with the relay. Passes the relay's changed votes to `store` before it sends. Returns the time
+    /// of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -65,7 +66,7 @@ impl Ports {
         }
     }
 
-    /// Reopens lost ttys when due; returns the time of the next retry.
+    /// Reopens lost ttys when due; returns the time of the next attempt, if any.
     pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         self.ttys()
             .filter_map(|tty| {

@@ -19,7 +19,7 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
-    /// Opens the FIFO; `listens` permits lines with a power.
+    /// Opens the FIFO `path`. `listens` permits lines with a measured interference power.
     pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
@@ -33,8 +33,8 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position received since the last call. Passes measurements to `heard` and logs the first invalid line.
-    /// Work: that of [`Fifo::read`].
+    /// Returns the drone's newest position received since the last call. Passes measurements to `heard` and logs the
+    /// first invalid line. Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
@@ -61,7 +61,7 @@ impl Positions {
         newest
     }
 
-    /// Returns the newest position, unless it is older than 3 s.
+    /// Returns the drone's newest position, unless it is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
         fresh.map(|(_, place)| place)
@@ -91,7 +91,7 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Parses a position, with a measured power or without, or the word `receiver` and a power.
+/// Parses a line: a position with or without a measured power, or the word `receiver` and a power.
 fn news(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
     let words = lines::words(text)?;
     let number = |word: &str| word.parse::<f32>().ok().filter(|number| number.is_finite());

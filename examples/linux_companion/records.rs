@@ -16,11 +16,11 @@ use crate::relay::Refusal;
 const VIEWS: &str = "--view-file";
 const UPLOADS: &str = "--upload-file";
 
-/// Restores the votes of an earlier start into `relay`. Returns their file, and true if it held any.
+/// Restores the votes of an earlier start into `relay`. Returns the file of votes, and true if it held any.
 ///
 /// # Errors
-/// One line that names the file, the fault and the remedy: a relay that has lost its votes must not vote again in the same
-/// flight.
+/// One line that names the file, the fault and the remedy: a relay that has lost its votes must not vote again in the
+/// same flight.
 pub(crate) fn resume_views(
     file: &Path,
     relay: &mut Relay,
@@ -47,7 +47,8 @@ pub(crate) fn resume_views(
     Ok((StoredFile::new(VIEWS, file, stored)?, stored.is_some()))
 }
 
-/// Resumes with the mission uploaded before this start to relays configured with `mission`. Returns true if there is one.
+/// Restores a mission that was uploaded before this start into `relay`. Returns true if there is one. `mission` is
+/// the mission of the relay's options, on which the upload is based.
 ///
 /// An unusable file is logged and ignored.
 pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, log: &Log) -> bool {
@@ -85,7 +86,7 @@ pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
     StoredFile::new(UPLOADS, file, None)
 }
 
-/// Begins to store an upload. A mission that can not be stored is flown all the same.
+/// Begins to store an uploaded mission. A mission that can not be stored is flown all the same.
 pub(crate) fn store_upload(file: &mut StoredFile, upload: &Upload) {
     let mut bytes = [0; Upload::LENGTH];
     // The buffer has room for every upload.

@@ -27,7 +27,7 @@ struct Flight {
     ports: Ports,
     positions: Option<Positions>,
     autopilot: Option<Companion>,
-    /// Votes of the relay, and its newest upload.
+    /// File with the relay's votes. The next field is the file with the newest uploaded mission.
     views: Option<StoredFile>,
     uploads: Option<StoredFile>,
     refusals: Refusals,
@@ -39,7 +39,8 @@ struct Flight {
 #[derive(Debug)]
 pub(crate) struct Refusal {
     pub(crate) line: String,
-    /// True if another start fails until somebody changes something; false for a port that may come back.
+    /// True if another start would fail as well, until somebody changes something. False for a port that may come
+    /// back.
     pub(crate) is_final: bool,
 }
 
@@ -273,7 +274,7 @@ fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     }))
 }
 
-/// Returns a random number, from the seed of std's hash maps.
+/// Returns a random number, taken from the random seed of std's hash maps.
 pub(crate) fn seed() -> u32 {
     let [a, b, c, d, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
     u32::from_le_bytes([a, b, c, d])

@@ -29,7 +29,7 @@ impl fmt::Display for Exact {
 pub(crate) struct Report {
     log: Log,
     identity: Identity,
-    /// Number of loaded relays; nodes keep their numbers when some are lost.
+    /// Number of relays in the mission of the options. Relays keep their numbers when some are lost.
     relays: u16,
     digest: u16,
     fence: Option<Geofence>,
@@ -37,7 +37,8 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Writes to `log`; `flies` is true if the companion itself sends setpoints to an autopilot.
+    /// Creates the report, which writes to `log`. `flies` is true if the companion itself sends setpoints to an
+    /// autopilot.
     pub(crate) fn new(
         log: Log,
         identity: Identity,
@@ -55,7 +56,7 @@ impl Report {
         }
     }
 
-    /// Logs the relay's identity, ports and mission digest, which is equal at relays with the same mission.
+    /// Logs the relay's identity, ports and mission digest. The digest is equal at relays with the same mission.
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
@@ -100,7 +101,7 @@ impl Report {
         );
     }
 
-    /// Logs that the relay's votes on views from an earlier start were restored.
+    /// Logs that the relay's votes on the chain's membership were restored from an earlier start.
     pub(crate) fn stands_by(&self) {
         self.log.tell(
             Instant::ZERO,
@@ -263,12 +264,13 @@ impl Report {
         );
     }
 
-    /// Returns the relay's own number, which it keeps in every view.
+    /// Returns the relay's own number, which never changes when other relays are lost.
     pub(crate) const fn index(&self) -> u16 {
         self.identity.index
     }
 
-    /// Returns the name of a node by its initial number. 0 is the transmitter, N + 1 the receiver.
+    /// Returns the name of a node for the log. `node` is its initial number: 0 is the transmitter, N + 1 the
+    /// receiver.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
             0 => "the transmitter".to_owned(),
@@ -277,7 +279,7 @@ impl Report {
         }
     }
 
-    /// Returns the digest of the mission in use, loaded or uploaded.
+    /// Returns the digest of the mission that the relay flies, which is the loaded or an uploaded one.
     fn flown(&self, relay: &Relay) -> u16 {
         match relay.upload() {
             Some(upload) if relay.version() == upload.version() => upload.id().digest,
@@ -285,7 +287,7 @@ impl Report {
         }
     }
 
-    /// Logs the adopted mission and its sites, if they differ from the loaded ones.
+    /// Logs that a new mission was adopted, and its sites, if they differ from the loaded ones.
     fn adopted(&self, now: Instant, relay: &Relay) {
         let version = relay.version();
         let fields = json!({ "version": version });

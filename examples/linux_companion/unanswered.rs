@@ -2,23 +2,24 @@
 
 use uav_relay::{Duration, Instant};
 
-/// Time that an autopilot has to answer. It sends a HEARTBEAT every second.
+/// Time that an autopilot has to answer before it is reported. It sends a HEARTBEAT every second.
 const PATIENCE: Duration = Duration::from_millis(3_000);
 
-/// Kind of the most specific data received from the port since the start.
+/// Kind of the data received from the autopilot's port since the start; the most specific kind counts.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Answer {
-    /// No byte has been received.
+    /// No byte has been received from the autopilot's port.
     Nothing,
-    /// Bytes without an intact MAVLink 2 frame.
+    /// Bytes were received, but no intact MAVLink 2 frame.
     Noise,
-    /// Frames, but none from a known autopilot.
+    /// MAVLink 2 frames were received, but none from a known autopilot.
     Others,
 }
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Best kind of data received, and the time of its first receipt. `None` once the autopilot is found.
+    /// Kind of the data received so far (the most specific), and the time of its first receipt. `None` once the
+    /// autopilot is found.
     newest: Option<(Answer, Instant)>,
     told: Option<Answer>,
 }
@@ -31,7 +32,8 @@ impl AnswerMonitor {
         }
     }
 
-    /// Handles the best kind of data received, `None` for an autopilot. Returns a fault to report, once for each kind.
+    /// Handles the most specific kind of data received so far. `None` means that the autopilot was found. Returns a
+    /// fault to report, once for each kind.
     pub(crate) fn look(&mut self, now: Instant, heard: Option<Answer>) -> Option<Answer> {
         let (answer, since) = self.newest?;
         let Some(heard) = heard else {
@@ -49,7 +51,7 @@ impl AnswerMonitor {
         self.told
     }
 
-    /// Returns the reported fault while no autopilot is found.
+    /// Returns the fault that was reported, while no autopilot is found.
     pub(crate) fn missing(&self) -> Option<Answer> {
         self.newest.and(self.told)
     }

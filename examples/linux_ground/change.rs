@@ -22,7 +22,7 @@ pub(crate) fn tell(log: &Log, now: Instant, before: &Basis, after: &Basis) {
     }
 }
 
-/// Returns the values of a mission with their names, each as text with its unit.
+/// Returns the values of a mission with their names, each value as text with its unit.
 fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     let MissionConfig {
         distance_m,

@@ -10,12 +10,12 @@ use uav_relay::{
     Profile, Relay, Settings, Sites, Upload,
 };
 
-/// Latency of a frame between simulated relays, µs.
+/// Time that a frame takes from one simulated relay to the next, µs.
 const TURN_US: u64 = 1_000;
 
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Mission loaded into the relays, as needed for a forecast.
+/// Mission loaded into the relays, with all that a forecast of their positions needs.
 #[derive(Clone, Debug)]
 pub(crate) struct Loaded {
     pub(crate) mission: Mission,
@@ -29,7 +29,7 @@ struct Letter {
     bytes: Vec<u8>,
 }
 
-/// Chain of simulated relays on perfect wires.
+/// Simulated chain of relays, whose links lose nothing.
 struct Chain {
     relays: Vec<Relay>,
     agreed: Vec<bool>,
@@ -38,7 +38,7 @@ struct Chain {
 }
 
 impl Chain {
-    /// Creates relays that fly `flown`, or else the loaded mission.
+    /// Creates simulated relays that fly the uploaded mission `flown`, or else the loaded mission.
     fn flying(loaded: &Loaded, flown: Option<&Upload>) -> Option<Self> {
         let relays = (1..=loaded.mission.relays()).map(|index| {
             let identity = Identity { network: 0, index };
@@ -69,7 +69,8 @@ impl Chain {
         })
     }
 
-    /// Delivers the frames that relays sent in the previous turn, and collects the frames of this turn.
+    /// Delivers the frames that relays sent in the previous turn, and collects the frames of this turn. Notes the
+    /// relays that agree on positions in mission `version`.
     fn turn(&mut self, version: u16) {
         self.now = Instant::from_micros(self.now.as_micros() + TURN_US);
         let now = self.now;
@@ -97,7 +98,8 @@ impl Chain {
         }
     }
 
-    /// Runs until all relays agree on positions in mission `version`; returns `None` at the time `end`.
+    /// Runs the chain until all relays agree on positions in mission `version`. Returns `None` if they do not before
+    /// the time `end`.
     fn positions(&mut self, version: u16, end: Clock) -> Option<Vec<Placement>> {
         self.agreed.fill(false);
         while !self.agreed.iter().all(|agreed| *agreed) {
@@ -119,10 +121,10 @@ pub(crate) struct Move {
     pub(crate) metres: f64,
 }
 
-/// Returns the move of each relay from `flown` to `new`; `flown` is `None` for the loaded mission.
+/// Returns the move of each relay from the mission `flown` to `new`. `flown` is `None` for the loaded mission.
 ///
-/// The two pairs of sites are the lines before and after. `None` if the positions can not be predicted: the relays measure the
-/// interference, or do not agree within ten seconds of computing.
+/// The two pairs of sites define the lines before and after. `None` if the positions can not be predicted: the relays
+/// measure the interference, or do not agree within ten seconds of computing.
 pub(crate) fn moves(
     loaded: &Loaded,
     flown: Option<&Upload>,
@@ -155,7 +157,8 @@ pub(crate) fn moves(
     Some(moves.collect())
 }
 
-/// Returns the distance, m, of positions along two lines, treated as one line if either is unknown.
+/// Returns the distance, m, between a relay's positions before and after, each relative to its line. Without both
+/// lines they count as the same line.
 fn apart_m(lines: &[Option<Axis>; 2], before: Placement, after: Placement) -> f64 {
     let on_earth = |axis: &Option<Axis>, place| axis.as_ref().and_then(|axis| axis.point(place));
     let [one, other] = lines;
@@ -168,7 +171,7 @@ fn apart_m(lines: &[Option<Axis>; 2], before: Placement, after: Placement) -> f6
         .hypot(step(before.altitude_m, after.altitude_m))
 }
 
-/// Returns the straight distance of two points near each other on a sphere, m.
+/// Returns the straight distance between two points on earth near each other, m.
 fn straight_m(one: Geodetic, other: Geodetic) -> f64 {
     /// Metres per 1e-7 degree of latitude.
     const UNIT_M: f64 = 0.011_131_949;

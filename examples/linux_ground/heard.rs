@@ -7,7 +7,7 @@ use uav_relay_linux::log::Log;
 
 use crate::report;
 
-/// Time that an answer may take: a lost handshake is repeated with the next measurement.
+/// Time without an answer after which a relay is lost. A lost handshake is repeated with the next measurement.
 const PATIENCE: Duration = Duration::from_millis(5_000);
 
 /// State of a relay that has answered before.
@@ -22,7 +22,7 @@ enum State {
 pub(crate) struct Hearing(BTreeMap<u16, State>);
 
 impl Hearing {
-    /// Updates and logs the states of the relays; returns the time of the next check.
+    /// Updates and logs which nearby relays answer this station. Returns the time of the next check, if any.
     pub(crate) fn look(&mut self, now: Instant, ground: &Ground, log: &Log) -> Option<Instant> {
         for (node, answers) in ground.near() {
             let before = self.0.get(&node).copied();

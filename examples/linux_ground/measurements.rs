@@ -19,13 +19,13 @@ const LOOK: Duration = Duration::from_millis(500);
 
 const READS: usize = 16;
 
-/// Length of the end of a file that is read, bytes: the last line and the one before.
+/// Number of bytes read from the end of a file: enough for its last line and the one before.
 const TAIL: u64 = 1_024;
 
-/// Minimum time between two forwarded measurements, so that they do not fill the channel.
+/// Minimum interval of forwarded measurements, so that they do not fill the channel.
 const EVERY: Duration = Duration::from_millis(500);
 
-/// Silence after which missing measurements are logged.
+/// Time without a measurement after which the log reports that they are missing.
 const SILENCE: Duration = Duration::from_millis(60_000);
 
 #[derive(Debug)]
@@ -35,7 +35,7 @@ enum Source {
     File(Watched),
 }
 
-/// Watched file with the state of its last read: inode, length, and modification time, s and ns.
+/// Watched file, and its state at the last read: inode, length, and modification time, s and ns.
 #[derive(Debug)]
 struct Watched {
     path: PathBuf,
@@ -48,10 +48,10 @@ pub(crate) struct Measurements {
     source: Source,
     name: String,
     end: Side,
-    /// Newest measurement that is not forwarded yet, W.
+    /// Newest measured power that has not been forwarded yet, W.
     newest_w: Option<f32>,
     next_at: Instant,
-    /// Time of the last valid line, once there was one.
+    /// Time of the last valid line; `None` before the first.
     last_at: Option<Instant>,
     is_silent: bool,
     last_w: Option<f32>,
@@ -60,7 +60,7 @@ pub(crate) struct Measurements {
 }
 
 impl Measurements {
-    /// Opens the FIFO, the file or the socket `name`.
+    /// Opens the FIFO, file or UDP socket `name`; `end` is the end of the chain that this station is at.
     pub(crate) fn open(name: &str, end: Side) -> Result<Self, String> {
         let named = |error: &str| format!("{OPTION} {name}: {error}");
         let path = Path::new(name);
@@ -90,7 +90,7 @@ impl Measurements {
         })
     }
 
-    /// Returns the newest measurement, W, if one may be forwarded now. Work: at most 64 KiB of lines.
+    /// Returns the newest measured power, W, if it may be forwarded now. Work: at most 64 KiB of lines.
     pub(crate) fn newest(&mut self, now: Instant, log: &Log) -> Option<f32> {
         self.read(now, log);
         let silent_at = self.last_at.map(|at| at + SILENCE);
@@ -190,7 +190,7 @@ impl Measurements {
 }
 
 impl Watched {
-    /// Returns the last complete line if the file has changed.
+    /// Returns the last complete line of the file; `None` if the file has not changed.
     fn last(&mut self, now: Instant) -> Option<Vec<u8>> {
         if now < self.look_at {
             return None;
@@ -219,7 +219,7 @@ impl Watched {
     }
 }
 
-/// Binds a UDP socket, on the loopback address if no host is given.
+/// Binds a UDP socket for measurements, on the loopback address if no host is given.
 fn socket(address: &str) -> std::io::Result<UdpSocket> {
     let wrong =
         || std::io::Error::other("must be udp:PORT or udp:HOST:PORT, PORT within 1 to 65535");
@@ -241,7 +241,8 @@ pub(crate) const fn name(end: Side) -> &'static str {
     }
 }
 
-/// Parses a power, W or dBm, alone or behind the name of this end; returns W.
+/// Parses a measured power in W or dBm, and returns it in W. The word `transmitter` or `receiver` for this `end` may
+/// precede it.
 fn level(text: &[u8], end: Side) -> Option<f32> {
     let words = lines::words(text)?;
     match words.as_slice() {

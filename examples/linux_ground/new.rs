@@ -61,23 +61,24 @@ pub(crate) struct NewOptions {
     new_min_separation: Option<f32>,
 }
 
-/// Distance along the line at which the order of two relays is certain, m. Twice the companion's default position error.
+/// Minimum distance along the line at which the order of two relays is certain, m. Twice the companion's default
+/// position error.
 const ORDER_M: f32 = 2.0;
 
-/// Maximum distance of the new line's ends from the present line, beyond the new line's length, m.
+/// Maximum distance between a new line and the present line, m. The length of the new line is added to it.
 const FAR_M: f64 = 100_000.0;
 
-/// Mission that supplies the values which are not given.
+/// Mission that supplies the values which the `--new-` options do not give.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Basis {
     pub(crate) config: MissionConfig,
     pub(crate) line: Option<Sites>,
-    /// Upload of this mission; `None` for the loaded mission.
+    /// Upload that brought this mission to the relays; `None` for the loaded mission.
     pub(crate) upload: Option<Upload>,
 }
 
 impl Basis {
-    /// Returns the loaded mission, flown between `sited` if given.
+    /// Returns the loaded mission as the basis. It is flown between the sites `sited`, if given.
     pub(crate) const fn loaded(loaded: &Mission, sited: Option<Sites>) -> Self {
         Self {
             config: *loaded.config(),
@@ -86,7 +87,7 @@ impl Basis {
         }
     }
 
-    /// Returns an uploaded mission; without sites of its own it is flown between `sited`.
+    /// Returns an uploaded mission as the basis. Without sites of its own it is flown between `sited`.
     pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
         Self {
             config: *upload.config(),
@@ -97,7 +98,8 @@ impl Basis {
 }
 
 impl NewOptions {
-    /// Returns the upload that replaces `basis` at relays loaded with `loaded` and, if given, `sited`.
+    /// Returns the upload that changes the mission `basis` by these options. The relays were loaded with `loaded`
+    /// and, if given, with the sites `sited`.
     pub(crate) fn upload(
         &self,
         version: u16,
@@ -131,7 +133,7 @@ impl NewOptions {
         }
     }
 
-    /// Returns the sites of the new mission and their distance, m, if one has moved.
+    /// Returns the sites of the new mission and their distance, m; `None` if neither site changes.
     fn moved(
         &self,
         line: Option<Sites>,
@@ -198,7 +200,7 @@ impl NewOptions {
     }
 }
 
-/// Refuses a line far from the present line, because the drones would have no position along it.
+/// Returns an error if the new line is far from the present one. The drones would have no position along it.
 fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     let away_m = |tx, rx| {
         let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));
@@ -223,9 +225,11 @@ fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     ))
 }
 
-/// Returns the largest turn of the line, degrees, that keeps the relays' order. Position errors are up to 1 m.
+/// Returns the largest turn of the line, degrees, that keeps the relays' order along it. Position errors are up to 1
+/// m.
 ///
-/// For the minimum separation s and the width w of the lateral range, t solves s cos t - w sin t = min(2 m, s / 2).
+/// For the minimum separation s and the width w of the lateral range, the angle t solves s cos t - w sin t = min(2 m,
+/// s / 2).
 fn most_turn_deg(config: &MissionConfig) -> f32 {
     let (separation_m, width_m) = (
         config.min_separation_m,

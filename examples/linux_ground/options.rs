@@ -130,7 +130,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Returns the time until an upload is given up.
+    /// Returns the maximum duration of an upload, after which it has failed.
     pub(crate) const fn timeout(&self) -> Duration {
         Duration::from_millis(1_000 * self.options.timeout)
     }
@@ -144,7 +144,7 @@ impl Plan {
     }
 }
 
-/// Reads the command line; otherwise returns the exit status after help or a mistake has been printed.
+/// Reads and checks the command line. The error is the exit status after help or a mistake was printed.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     if std::env::args_os()
         .next_back()
@@ -158,7 +158,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
     plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
-/// Adds the `[network]` and `[ground]` sections of the file.
+/// Adds the options of the file's sections `[network]` and `[ground]`.
 fn section(deployment: &Deployment, given: &mut Given) {
     config::network(deployment, given);
     let own = &deployment.ground;

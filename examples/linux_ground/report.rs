@@ -13,7 +13,7 @@ use crate::forecast::Move;
 use crate::measurements::name;
 use crate::options::Plan;
 
-/// Logs the end of the chain, the port and the signing epoch.
+/// Logs the station's end of the chain (transmitter or receiver), its port and the signing epoch.
 pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
     let (end, relays, network) = (
         name(plan.end),
@@ -73,7 +73,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
     }
 }
 
-/// Returns the error for a version that is not newer than the relays' one.
+/// Returns the error text for an upload whose version is not above `held`, the relays' version.
 pub(crate) fn outdated(version: u16, held: u16) -> String {
     match held.checked_add(1) {
         Some(next) => {
@@ -89,7 +89,7 @@ pub(crate) fn outdated(version: u16, held: u16) -> String {
     }
 }
 
-/// Logs the mission that the chain flies, as reported by a relay.
+/// Logs which mission the chain flies, as reported by a relay.
 pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     let FlownMission {
         by, version, flies, ..
@@ -103,7 +103,7 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     log.say(now, "current", fields, what);
 }
 
-/// Returns the error for an upload refused by a relay, with the value that most likely causes it.
+/// Returns the error text for an upload that relay `by` refused. It names the value that most likely caused it.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
     let who = format!("--version {version}: relay {by}, or a relay beyond it, rejects the upload");
@@ -113,19 +113,19 @@ pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     }
 }
 
-/// Value of an upload that leaves the geofence of the relays.
+/// Value of an uploaded mission that exceeds the relays' geofence.
 pub(crate) struct Outside {
-    /// The value and its range.
+    /// Text for the operator: the value and the permitted range.
     what: String,
     name: &'static str,
-    /// Coordinate of a position that the range limits, m.
+    /// Function that returns the coordinate limited by the range, m.
     coordinate: fn(&Placement) -> f32,
     range_m: [f32; 2],
 }
 
 impl Outside {
-    /// Returns the first value of `upload` that leaves the geofence. Assumes that the relays have the geofence of the loaded
-    /// mission, the default.
+    /// Returns the first value of `upload` that exceeds the geofence, if any. The relays are assumed to have the
+    /// default geofence, that of the loaded mission.
     pub(crate) fn of(plan: &Plan, upload: &Upload) -> Option<Self> {
         let (loaded, new) = (plan.loaded.mission.config(), upload.config());
         let fence = |config: &MissionConfig| {
@@ -183,7 +183,7 @@ impl Outside {
         })
     }
 
-    /// Returns the value and its range, and the relay that would fly farthest outside.
+    /// Returns a text with the value, its permitted range, and the relay that would fly farthest outside.
     pub(crate) fn line(&self, moves: Option<&[Move]>) -> String {
         let Self { what, name, .. } = self;
         let [least, most] = self.range_m;
@@ -204,7 +204,7 @@ impl Outside {
     }
 }
 
-/// Returns the error for an upload that exceeds its time, with the most likely cause.
+/// Returns the error text for an upload that exceeds its time limit, with the most likely cause.
 pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.options.timeout;
     let state = match progress {
@@ -228,7 +228,7 @@ pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Groun
     format!("--timeout {seconds}: {state}; {refused} frames refused")
 }
 
-/// Returns the most likely fault according to the counters.
+/// Returns the most likely reason, by the frame counters, why no relay has answered as needed.
 fn why(plan: &Plan, stats: &Stats) -> String {
     let faults = [
         (
@@ -301,7 +301,7 @@ pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
     log.say(now, event, json!({ "node": node }), text);
 }
 
-/// Logs the counters at the end of a station that ran with `--stand`.
+/// Logs the frame counters when a station that ran with `--stand` stops.
 pub(crate) fn stopped(log: &Log, now: Instant, end: Side, ground: &Ground) {
     let stats = ground.stats();
     log.say(

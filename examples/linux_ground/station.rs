@@ -27,17 +27,17 @@ struct Station<'a> {
     service: Service,
     ground: Ground,
     tty: Replug,
-    /// Bytes that the port has not accepted yet.
+    /// Bytes of a frame that the tty has not accepted yet.
     outgoing: Vec<u8>,
     measurements: Option<Measurements>,
     hearing: Hearing,
     refusals: Refusals,
     uploading: Option<Uploading>,
-    /// True once standard input has bytes while a confirmation is awaited.
+    /// True once the operator's answer can be read from standard input, while a confirmation is awaited.
     is_answered: bool,
 }
 
-/// Runs until the chain flies the new mission; with `--stand` until SIGINT or SIGTERM.
+/// Runs the station until the chain flies the new mission; with `--stand` until SIGINT or SIGTERM.
 ///
 /// # Errors
 /// One line that says why it could not start, or why the chain does not fly the mission.
@@ -161,7 +161,7 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Advances the upload; returns its result if that ends the program.
+    /// Advances the upload; returns its result if the program must end with it.
     fn uploading(&mut self, time: Instant) -> Over {
         let Self {
             plan,
@@ -223,7 +223,7 @@ impl<'a> Station<'a> {
         })
     }
 
-    /// Sleeps until input or a timer needs work; returns the result after a signal to end.
+    /// Sleeps until input or a timer needs work. Returns the program's result after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> Over {
         let measured = self.measurements.as_ref().and_then(Measurements::fd);
         let mut others: Vec<_> = measured.into_iter().map(|fd| (fd, PollFlags::IN)).collect();
@@ -252,7 +252,7 @@ impl<'a> Station<'a> {
     }
 }
 
-/// Reads the operator's answer, which is available. The text is empty at the end of standard input.
+/// Reads the operator's answer from standard input, which has one. The text is empty at the end of the input.
 fn answered() -> String {
     let mut line = String::new();
     match std::io::stdin().read_line(&mut line) {

@@ -20,7 +20,7 @@ use crate::new::Basis;
 use crate::options::Plan;
 use crate::report::{self, Outside};
 
-/// Time that a relay has to send the values of its mission.
+/// Maximum time that a relay may take to send the values of its mission.
 const VALUES: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
 
 #[derive(Debug)]
@@ -35,12 +35,13 @@ impl From<String> for Fault {
     }
 }
 
-/// Result of the upload; `None` while it goes on.
+/// Result of an upload or of the program; `None` while it goes on.
 pub(crate) type Over = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Waits for the flown mission; `Some` is when a relay first reported it without its values.
+    /// Waiting for a relay to report the flown mission. The time is when a relay first reported it without its
+    /// values.
     Asking(Option<Instant>),
     Confirming,
     Uploading,
@@ -51,15 +52,15 @@ enum Stage {
 pub(crate) struct Uploading {
     version: u16,
     stage: Stage,
-    /// Upload, once its values are known.
+    /// Mission to upload; `None` until its values are known.
     upload: Option<Upload>,
     progress: Progress,
-    /// Deadline of the stage; `None` while a confirmation is awaited, and at the end.
+    /// Deadline of the present stage of the upload; `None` while a confirmation is awaited, and at the end.
     late_at: Option<Instant>,
 }
 
 impl Uploading {
-    /// Starts by asking the chain for the mission that it flies.
+    /// Starts an upload by asking the chain for the mission that it flies.
     pub(crate) fn begin(now: Instant, plan: &Plan, version: u16, ground: &mut Ground) -> Self {
         ground.ask_flown(now);
         Self {
@@ -87,7 +88,7 @@ impl Uploading {
         self.upload.as_ref()
     }
 
-    /// Handles the operator's answer: a line, empty at the end of standard input.
+    /// Handles the operator's answer to the request for confirmation. `line` is empty at the end of standard input.
     pub(crate) fn answer(
         &mut self,
         now: Instant,
@@ -108,7 +109,7 @@ impl Uploading {
         ))
     }
 
-    /// Advances the upload; returns its result at the end.
+    /// Advances the upload; returns its result once it has ended.
     pub(crate) fn turn(
         &mut self,
         now: Instant,
@@ -160,7 +161,7 @@ impl Uploading {
         over(report::late(plan, version, Progress::Idle, ground))
     }
 
-    /// Builds the upload from the flown mission and shows its changes.
+    /// Builds the upload from the flown mission, shows its changes, and starts it or asks for confirmation.
     fn decide(
         &mut self,
         now: Instant,
@@ -226,7 +227,7 @@ impl Uploading {
         None
     }
 
-    /// Logs the progress; returns the result of the upload at its end.
+    /// Logs the upload's progress; returns its result once it has ended.
     fn follow(
         &mut self,
         now: Instant,
@@ -253,7 +254,7 @@ impl Uploading {
     }
 }
 
-/// Ends the upload with a fault.
+/// Returns the result of an upload that has failed for the reason `line`.
 #[expect(clippy::unnecessary_wraps, reason = "as the stages return it")]
 fn over(line: String) -> Over {
     Some(Err(line.into()))

@@ -24,7 +24,8 @@ use crate::firmware::config::{self, Sites};
 use crate::firmware::port::{self, OUTGOING, Port, Queues, Slot};
 use crate::firmware::{board, chip, log};
 
-/// Capacity of the receive queue, bytes: 44 ms. An autopilot sends bursts, and the main loop may be busy with a sweep.
+/// Capacity of the receive queue, bytes: 44 ms. It must hold an autopilot's bursts while the main loop is busy with a
+/// sweep.
 const RECEIVED: usize = 512;
 
 /// Maximum position error of a hovering drone, m.
@@ -33,7 +34,7 @@ const POSITION_ERROR_M: f32 = 1.5;
 /// Length of the longest frame to send, bytes.
 const LONGEST: usize = size_of::<FrameBytes>();
 
-/// Pause before the next attempt on a full port; 115 bytes leave meanwhile.
+/// Pause before the next attempt to write to a full port; 115 bytes are sent meanwhile.
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
@@ -63,7 +64,8 @@ impl Autopilot {
         })
     }
 
-    /// Creates the link along the line between `sites`, in static RAM. `None` if the mission can not be flown there.
+    /// Creates the autopilot link along the line between `sites`, in static RAM. `None` if the mission can not be
+    /// flown there.
     #[inline(never)] // its stack frame is released
     pub(crate) fn begin(
         uart: Uart,
@@ -77,7 +79,8 @@ impl Autopilot {
         Self::along(&course, uart, now)
     }
 
-    /// Creates the link along a course. A separate function keeps its stack frame out of the computation of the course.
+    /// Creates the autopilot link along a course. A separate function keeps its stack frame out of the computation of
+    /// the course.
     #[inline(never)]
     fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;
@@ -94,7 +97,8 @@ impl Autopilot {
         Some(autopilot)
     }
 
-    /// Processes received bytes, and exchanges data with the relay. Its next frames carry the newest position.
+    /// Processes bytes from the autopilot, and exchanges data with the relay. The relay's next frames carry the
+    /// newest position.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         self.receive(now);
         self.link.exchange(relay, now);
@@ -117,12 +121,13 @@ impl Autopilot {
         }
     }
 
-    /// Shows an event of the relay on the operator's ground station.
+    /// Shows an event of the relay on the ground station of the autopilot's operator.
     pub(crate) fn tell(&mut self, event: Event) {
         self.link.handle_event(event);
     }
 
-    /// Sends frames for the relay's state; returns the time of the next call. `now` must be that of [`listen`](Self::listen).
+    /// Sends the autopilot frames for the relay's state; returns the time of the next call. `now` must be that of
+    /// [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &mut Relay) -> Instant {
         // Its ports have been served since the last exchange: the newest setpoint is sent in this turn.
         self.link.exchange(relay, now);
@@ -142,7 +147,8 @@ impl Autopilot {
     }
 }
 
-/// Hands the port to its interrupt. A separate function, because the queues pass over the stack on their way to RAM.
+/// Opens the autopilot's port, served by its interrupt. A separate function, because the queues pass over the stack
+/// on their way to RAM.
 #[inline(never)]
 fn open(uart: Uart) -> Option<Port> {
     Some(port::open(
@@ -153,10 +159,11 @@ fn open(uart: Uart) -> Option<Port> {
     ))
 }
 
-/// Error: a signing key is configured, but this image can not sign.
+/// Error: an autopilot signing key is configured, but this image can not sign.
 struct CannotSign;
 
-/// Enables signing if the block has a key. Without a clock the link takes the time from received stamps.
+/// Enables signing to the autopilot if the configuration block has a key. Without a clock the link takes the time
+/// from received stamps.
 #[cfg(feature = "mavlink-signing")]
 #[expect(clippy::unnecessary_wraps, reason = "as where it cannot")]
 fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
@@ -167,7 +174,7 @@ fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
     Ok(())
 }
 
-/// Refuses to fly with a signing key, because this image was built without signing.
+/// Returns an error if the block has an autopilot signing key, because this image can not sign.
 #[cfg(not(feature = "mavlink-signing"))]
 fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
     if config::autopilot_key(board::block()).is_none() {

@@ -10,7 +10,7 @@ use uav_relay::Instant;
 use crate::firmware::chip;
 use crate::firmware::clock::{self, Clock};
 
-/// Clock of the board, and the earliest wake-up time of the task.
+/// Clock of the board, and the earliest time at which the task asked to be woken.
 pub(crate) struct Time {
     clock: RefCell<Clock>,
     next: Cell<Option<Instant>>,
@@ -45,7 +45,7 @@ impl uav_relay::asynch::Clock for Time {
     }
 }
 
-/// Polls `task` after an interrupt, a wake-up or at its time, and calls `also` after each poll.
+/// Runs `task` for ever: polls it after an interrupt, a wake-up or at its time, then calls `also`.
 pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {
     let waker = waker();
     let mut cx = Context::from_waker(&waker);

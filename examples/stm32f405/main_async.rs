@@ -85,7 +85,7 @@ fn fly(
     })
 }
 
-/// Logs events and stores uploads.
+/// Logs the relay's events, and stores uploaded missions.
 #[cfg(target_os = "none")]
 async fn tell(relay: &uav_relay::asynch::AsyncRelay<'_>) -> core::convert::Infallible {
     loop {

@@ -14,8 +14,8 @@ use crate::firmware::log;
 use crate::firmware::persistent;
 
 pub(crate) trait Links {
-    /// Exchanges bytes between the ports and the relay, and stores its votes between receiving and sending. Returns the time of
-    /// the next call.
+    /// Exchanges bytes between ports and relay, and stores the relay's votes between receiving and sending. Returns
+    /// the time of the next call.
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
     fn log_counters(&self);
@@ -86,9 +86,9 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
     }
 }
 
-/// Returns no measurement. Replace it by your receiver's newest one if the configuration has the relay measure or listen; to
-/// listen it needs the drone's position, too. After enough samples of a field `Relay::restart` at the leader lets the chain agree
-/// again.
+/// Returns no measurement. Replace it by your receiver's newest one, if the relay measures a field or listens for an
+/// interferer. To listen, the relay needs the drone's position, too. After enough samples of a field `Relay::restart`
+/// at the leader lets the chain agree again.
 const fn measured() -> Option<Sample> {
     None
 }

@@ -19,11 +19,11 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// Uninhabited type: there is no autopilot.
+/// Placeholder type for the autopilot link, which this image lacks. It has no values.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {
-    /// Returns `None`: this image does not fly.
+    /// Returns `None`: an image without an autopilot link needs no guard.
     pub(crate) const fn guard(_: &Sites, _: GuardConfig) -> Option<GuardConfig> {
         None
     }

@@ -18,7 +18,7 @@ use crate::firmware::port::{self, Port, Queues, Slot};
 
 static DOWNSTREAM: Slot<USART3> = Mutex::new(RefCell::new(None));
 
-/// Sets up the board, once: clock, the ports of both neighbours, and the UART of the autopilot.
+/// Sets up the board, once. Returns the clock, the ports toward transmitter and receiver, and the autopilot's UART.
 pub(crate) fn start() -> Option<(Clock, Port, Port, Uart)> {
     let Pins {
         clock,

@@ -9,7 +9,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, Unaligned};
 
 use super::{ConfigError, MAX_POINTS, Room, Sites};
 
-/// Block by the table of `lib.rs`.
+/// Configuration block as a structure: the fields of the table in `lib.rs`, byte for byte.
 #[derive(FromBytes, IntoBytes, Immutable, Unaligned)]
 #[repr(C)]
 pub(super) struct Layout {
@@ -24,13 +24,13 @@ pub(super) struct Layout {
     pub(super) distance_m: F32,
     pub(super) min_separation_m: F32,
     pub(super) tx_power_w: F32,
-    /// Altitude and power.
+    /// Altitude (m) and transmit power (W) of every relay that has no values of its own.
     pub(super) common: [F32; 2],
     pub(super) own: [F32; 2],
-    /// Power, x and y.
+    /// Interferer's power (W), x and y (m). All are 0 if there is a field, or if the relays must find the interferer.
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
-    /// Carrier frequency, excess losses, and weight of line of sight.
+    /// Carrier frequency (Hz), excess losses with and without line of sight, line-of-sight weight (0 to 1).
     pub(super) channel: [F64; 4],
     pub(super) band: [F32; 2],
     pub(super) lateral: [F32; 2],
@@ -73,7 +73,7 @@ fn is_zero(numbers: &[F32]) -> bool {
 }
 
 impl Layout {
-    /// Returns the method; the parameters of adjust must be 0 for the others.
+    /// Returns the placement method. The parameters of `Adjust` must be 0 with any other method.
     pub(super) fn method(&self) -> Result<Method, ConfigError> {
         let (explore_m, rounds) = (self.explore_m.get(), self.rounds.get());
         let unused = explore_m.to_bits() == 0 && rounds == 0;
@@ -101,7 +101,7 @@ impl Layout {
         }
     }
 
-    /// Returns the sensing settings; `None` if all are 0.
+    /// Returns the settings for estimating an unknown interferer; `None` if all are 0.
     pub(super) fn listen(&self) -> Result<Option<Listen>, ConfigError> {
         let [every, half_life] = self.listen_us;
         let listen = Listen {
@@ -116,7 +116,7 @@ impl Layout {
         }
     }
 
-    /// Returns the sites and the speed; `None` if all are 0, without an autopilot.
+    /// Returns the sites of transmitter and receiver, and the speed limit. `None` if all are 0: no autopilot.
     pub(super) fn sites(&self) -> Result<Option<Sites>, ConfigError> {
         let ends = self.ends.map(|site| site.map(I32::get));
         let speed_m_s = self.speed_m_s.get();
@@ -131,8 +131,8 @@ impl Layout {
         }
     }
 
-    /// Returns the field, with its points stored in `room`, or the interferer of a block without points. An interferer of zeros
-    /// is unknown to relays that listen.
+    /// Returns the block's interference: its field, or its interferer if it has no field points. The field's points
+    /// are stored in `room`. An interferer of zeros is unknown, if `listens` is true: the relays then measure.
     pub(super) fn interference(
         &self,
         listens: bool,

@@ -86,48 +86,49 @@ pub use types::{ChannelNumbers, Config, ConfigError, Secret, Sites};
 #[cfg(not(target_os = "none"))]
 pub use write::write;
 
-/// Address of the block: the last sector of the flash of an STM32F405.
+/// Address of the configuration block: the last flash sector of an STM32F405.
 pub const ADDRESS: u32 = 0x080E_0000;
 
-/// Bit rate of every port of the firmware, bit/s, independent of the block.
+/// Bit rate of every port of the firmware, bit/s. The configuration block can not change it.
 pub const BAUD: u32 = 115_200;
 
-/// First bytes of a block.
+/// First bytes of every configuration block, which identify it.
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
-/// Version of the table above.
+/// Version of the configuration block's format.
 pub const VERSION: u16 = 10;
 
-/// Length of a block, bytes.
+/// Length of a configuration block, bytes.
 pub const LEN: usize = 388;
 
-/// Maximum number of points of a field in a block.
+/// Maximum number of points of an interference field in a configuration block.
 pub const MAX_POINTS: usize = 16;
 
-/// Number of bytes covered by the CRC.
+/// Number of bytes covered by the block's CRC: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
-/// Longest silence until a neighbour is probed, ms.
+/// Maximum configurable silence of a neighbour until a heartbeat is requested from it, ms.
 pub const MOST_PROBE_AFTER_MS: u32 = 1_200_000;
 
-/// Value of [`LEN`] in the block.
+/// Value of the block's length field: [`LEN`] as a `u16`.
 const LEN_FIELD: u16 = 388;
 
-/// Block as stored.
+/// Configuration block as stored in flash.
 pub type Block = [u8; LEN];
 
-/// Storage for the points of a mission's field.
+/// Storage for the points of a mission's interference field.
 pub type Room = [FieldPoint; MAX_POINTS];
 
-/// Storage before a field is read.
+/// Initial content of the storage for field points, before a block is read.
 pub const EMPTY: Room = [FieldPoint {
     x_m: 0.0,
     upsilon_per_w: 0.0,
 }; MAX_POINTS];
 
-/// Reads and checks a block of arbitrary bytes. The points of a field are stored in `room`.
+/// Reads and checks a configuration block of arbitrary bytes. The points of its field are stored in `room`.
 ///
-/// A relay accepts every configuration that this function returns.
+/// A relay accepts every returned configuration if its build has the features for it. It rejects the joint method for
+/// more than 100 relays.
 ///
 /// # Errors
 /// [`ConfigError`] names the fault, and for a number out of range which one.
@@ -215,10 +216,10 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     })
 }
 
-/// Returns the signing key and epoch of a block that [`read`] has accepted.
+/// Returns the signing key and epoch of a block that [`read`] has accepted; `None` without a key.
 ///
 /// # Errors
-/// [`ConfigError::Secret`] for a key without an epoch, or an epoch without a key.
+/// [`ConfigError::Secret`] for a key without a valid epoch, or an epoch without a key.
 pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
     let raw: &Layout = zerocopy::transmute_ref!(block);
     let (key, epoch) = (raw.key, raw.epoch.get());
@@ -229,7 +230,7 @@ pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
     }
 }
 
-/// Returns the autopilot's signing key in a block that [`read`] has accepted.
+/// Returns the autopilot's signing key in a block that [`read`] has accepted; `None` without a key.
 pub fn autopilot_key(block: &Block) -> Option<[u8; 32]> {
     let raw: &Layout = zerocopy::transmute_ref!(block);
     let key = raw.autopilot_key;

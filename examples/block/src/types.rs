@@ -10,34 +10,35 @@ use uav_relay::{
 
 use super::BAUD;
 
-/// Silence until a neighbour is probed where the block has 0, ms.
+/// Default silence of a neighbour until it is probed, ms. It applies if the block's value is 0.
 const USUAL_PROBE_AFTER_MS: u64 = 5_000;
 
-/// Checked content of a block.
+/// Checked content of a configuration block.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
     /// Network and index of this relay.
     pub identity: Identity,
     /// Mission shared by all relays.
     pub mission: Mission,
-    /// Altitude and power of this relay.
+    /// Altitude and transmit power of this relay.
     pub profile: Profile,
-    /// True if the relay keeps that altitude when altitudes are chosen.
+    /// True if the relay keeps its configured altitude when the method chooses altitudes.
     pub hold_altitude: bool,
-    /// Method used by the leader.
+    /// Placement method that the leader runs.
     pub method: Method,
-    /// Measurement of the interference, if enabled.
+    /// Settings for measuring an interference field at the relay's position; `None` for no measurement.
     pub measure: Option<Measure>,
-    /// Sensing of the interferer, if enabled.
+    /// Settings for estimating an unknown interferer from measurements; `None` if it is not estimated.
     pub listen: Option<Listen>,
-    /// Ends of the line on earth. `uav_relay::flight::course` checks that they form a valid line.
+    /// Geodetic positions of transmitter and receiver, and speed limit; `None` without an autopilot.
+    /// `uav_relay::flight::course` checks that the positions form a valid line.
     pub sites: Option<Sites>,
-    /// Silence until a neighbour is probed, ms; 0 for the default.
+    /// Silence of a neighbour until it is probed, ms; 0 for the default, 5 s.
     pub probe_after_ms: u32,
 }
 
 impl Config {
-    /// Returns the settings of the relay, without the key and the guard.
+    /// Returns the relay's settings by this configuration. The caller adds the signing key and the guard.
     pub fn settings(&self, wiring: Wiring) -> Settings {
         let common = self.mission.config().common;
         let preset = match wiring {
@@ -61,17 +62,17 @@ impl Config {
     }
 }
 
-/// Line and speed of a drone with an autopilot.
+/// Sites of transmitter and receiver on earth, and speed limit of a drone with an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sites {
     /// Sites of transmitter and receiver: latitude and longitude, 1e-7 degrees, and ground height, mm.
     pub ends: [[i32; 3]; 2],
-    /// Maximum speed of the drone, m/s: 0.1 to 20, or 0 for the default.
+    /// Maximum speed of the drone, m/s: 0.1 to 20, or 0 for the default, 5 m/s.
     pub speed_m_s: f32,
 }
 
 impl Sites {
-    /// Returns the sites as geodetic positions.
+    /// Returns the sites of transmitter and receiver as geodetic positions.
     pub fn on_earth(&self) -> uav_relay::Sites {
         let [tx, rx] = self.ends.map(|[lat_e7, lon_e7, amsl_mm]| Geodetic {
             lat_e7,
@@ -82,37 +83,38 @@ impl Sites {
     }
 }
 
-/// Signing key and epoch.
+/// Signing key of the network, and smallest epoch to sign frames with.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Secret {
-    /// Key of the network, not all 0.
+    /// Signing key of the network, not all 0.
     pub key: [u8; 32],
-    /// Smallest epoch to sign with after a start, 1 to 4294967294.
+    /// Smallest epoch to sign frames with, 1 to 4294967294. The epoch is a number that rises at every start.
     pub epoch: u32,
 }
 
 impl core::fmt::Debug for Secret {
-    /// Hides the key, which does not belong in logs.
+    /// Prints `Secret(..)` instead of the key, which does not belong in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Secret(..)")
     }
 }
 
-/// Channel parameters as stored; a [`Channel`] does not keep these numbers.
+/// Channel parameters as stored in a configuration block. A [`Channel`] does not keep these numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChannelNumbers {
-    /// Carrier, Hz.
+    /// Carrier frequency, Hz.
     pub carrier_hz: f64,
     /// Excess loss with line of sight, as a factor.
     pub excess_los: f64,
     /// Excess loss without line of sight, as a factor.
     pub excess_nlos: f64,
-    /// Weight of line of sight between drone and ground.
+    /// Weight of the path loss with line of sight between drone and ground, 0 to 1.
     pub los_weight: f64,
 }
 
 impl ChannelNumbers {
-    /// Returns the channel. A weight of exactly 1 or 0 gives bit-identical [`AirGround::Los`] or [`AirGround::Nlos`].
+    /// Returns the channel with these parameters. A weight of exactly 1 or 0 gives bit-identical [`AirGround::Los`]
+    /// or [`AirGround::Nlos`].
     ///
     /// # Errors
     /// [`ChannelError`] names the number that is out of range.
@@ -126,48 +128,48 @@ impl ChannelNumbers {
     }
 }
 
-/// Fault of a block.
+/// Fault of a configuration block.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfigError {
-    /// Blank block: all ones as erased, or all zeros.
+    /// Blank configuration block: all bits one, as after an erase, or all zero.
     Blank,
-    /// Wrong first bytes, not [`MAGIC`](super::MAGIC).
+    /// Wrong first bytes: the block does not begin with [`MAGIC`](super::MAGIC).
     Magic,
-    /// Wrong version, or wrong length for that version.
+    /// Wrong format version of the block, or wrong length for that version.
     Version,
     /// Wrong CRC: the block was cut short or damaged.
     Crc,
-    /// Index not within 1 to N.
+    /// Index of the relay is not within 1 to the number of relays.
     Index,
     /// Altitude or power of this relay out of range.
     Profile,
-    /// Altitude flag neither 0 nor 1.
+    /// Flag for keeping this relay's altitude is neither 0 nor 1.
     Hold,
-    /// Unknown method, or one other than align with a field.
+    /// Unknown placement method, or a method other than align together with an interference field.
     Method,
-    /// Parameters of adjust out of range, or not 0 with another method.
+    /// Parameters of the method adjust out of range, or not 0 with another method.
     Adjust,
-    /// Measurement settings out of range, or not 0 without samples.
+    /// Settings of the field measurement out of range, or a maximum power without a number of samples.
     Measure,
-    /// Sensing settings out of range, or together with a field.
+    /// Settings for estimating an unknown interferer out of range, or together with an interference field.
     Listen,
-    /// A way back together with another method than align, or with sensing.
+    /// Traffic from receiver to transmitter together with a method other than align, or with sensing.
     Reverse,
-    /// Interferer is not 0 in a block with a field.
+    /// Interferer given in a block that has an interference field.
     Interferer,
-    /// The number of points exceeds a block's capacity.
+    /// Number of field points exceeds the capacity of a block.
     Points,
-    /// Non-zero bytes behind the last point.
+    /// Non-zero bytes of the block behind its last field point.
     Unused,
-    /// Key without an epoch, epoch without a key, or the last possible epoch.
+    /// Signing key without an epoch, epoch without a key, or an epoch of 4294967295.
     Secret,
-    /// Maximum speed out of range, or given without sites.
+    /// Maximum speed out of range, or given without the sites of transmitter and receiver.
     Speed,
-    /// Autopilot key without sites.
+    /// Signing key of the autopilot without the sites of transmitter and receiver.
     AutopilotKey,
-    /// Silence until a neighbour is probed out of range.
+    /// Silence of a neighbour until it is probed exceeds the maximum.
     Silence,
-    /// Parameter of the field out of range.
+    /// Parameter of the interference field out of range.
     Field(FieldError),
     /// Parameter of the channel out of range.
     Channel(ChannelError),

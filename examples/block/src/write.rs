@@ -7,9 +7,11 @@ use zerocopy::{FromZeros as _, IntoBytes as _};
 use super::layout::Layout;
 use super::{Block, CHECKED, ChannelNumbers, Config, LEN_FIELD, MAGIC, Secret, VERSION, crc};
 
-/// Returns the block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of its channel.
+/// Returns the configuration block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of the
+/// mission's channel.
 ///
-/// A block can not hold adjust's grid search or more than `MAX_POINTS` points; such a configuration is read back differently.
+/// A block can not hold the grid search of adjust, which is read back as the fine search, or more than `MAX_POINTS`
+/// field points, which are rejected when read back.
 pub fn write(
     config: &Config,
     numbers: &ChannelNumbers,

@@ -14,16 +14,17 @@
 use crate::crystal::{self, Crystal, HSI_HZ};
 use crate::registers::{Register, Registers};
 
-/// Clock hardware of a board.
+/// Clock hardware of a board: crystal and over-drive.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Plan {
-    /// Crystal, if there is one.
+    /// Crystal or external clock of the board, if it has one.
     pub crystal: Option<Crystal>,
-    /// True for a chip with over-drive, the STM32F446.
+    /// True for a chip with the over-drive that 180 MHz needs: the STM32F446.
     pub over_drive: bool,
 }
 
-/// STM32F405 with a crystal of 8 MHz; with another one, or none, it runs from the HSI.
+/// Board with an STM32F405 and a crystal of 8 MHz. With another crystal, or none, the chip runs from its internal
+/// oscillator.
 pub const STM32F405: Plan = Plan {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -32,7 +33,7 @@ pub const STM32F405: Plan = Plan {
     over_drive: false,
 };
 
-/// NUCLEO-F446RE: the ST-LINK supplies 8 MHz at OSC_IN.
+/// Board NUCLEO-F446RE, whose ST-LINK supplies a clock of 8 MHz at the pin OSC_IN.
 pub const NUCLEO_F446RE: Plan = Plan {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -44,27 +45,27 @@ pub const NUCLEO_F446RE: Plan = Plan {
 /// Source of the PLL's input.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Source {
-    /// Crystal oscillator.
+    /// Crystal oscillator as the input of the PLL.
     Crystal,
-    /// Internal oscillator (HSI).
+    /// Internal oscillator (HSI) as the input of the PLL.
     Internal,
 }
 
-/// Clock frequencies reached.
+/// Clock frequencies that the chip runs at after [`start`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Clocks {
-    /// Core and `SysTick`, Hz.
+    /// Frequency of the core and of its timer `SysTick`, Hz.
     pub core_hz: u32,
-    /// APB1, for USART2, USART3, UART4 and others, Hz.
+    /// Frequency of the peripheral bus APB1, which clocks USART2, USART3, UART4 and others, Hz.
     pub apb1_hz: u32,
-    /// APB2, for USART1 and USART6, Hz.
+    /// Frequency of the peripheral bus APB2, which clocks USART1 and USART6, Hz.
     pub apb2_hz: u32,
-    /// Source of the PLL; `None` for the HSI alone.
+    /// Input of the PLL; `None` if the core runs from the internal oscillator (HSI) without the PLL.
     pub pll: Option<Source>,
 }
 
 impl Clocks {
-    /// Clock frequencies of the HSI alone.
+    /// Clock frequencies without the PLL: core and buses run from the internal oscillator (HSI).
     pub const HSI: Self = Self {
         core_hz: HSI_HZ,
         apb1_hz: HSI_HZ,
@@ -89,9 +90,9 @@ const PLL_INPUT_HZ: u32 = 2_000_000;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Speed {
     over_drive: bool,
-    /// Multiplier, PLLN.
+    /// Multiplier of the PLL, PLLN. The core gets half the PLL's input of 2 MHz times this number.
     factor: u32,
-    /// Divisor PLLQ, for 48 MHz or less.
+    /// Divisor PLLQ for the PLL's USB clock, which may be 48 MHz or less.
     usb: u32,
 }
 
@@ -106,50 +107,51 @@ const FAST: Speed = Speed {
     usb: 7,
 };
 
-/// Bits of RCC_CR.
+/// Bits of the register RCC_CR: internal oscillator (HSI) on, HSI ready, PLL on, PLL ready.
 const HSI_ON: u32 = 1;
 const HSI_READY: u32 = 1 << 1;
 const PLL_ON: u32 = 1 << 24;
 const PLL_READY: u32 = 1 << 25;
 
-/// Bits of RCC_PLLCFGR: PLLM, PLLN, PLLP, PLLSRC and PLLQ.
+/// Mask of the fields of RCC_PLLCFGR that are set: PLLM, PLLN, PLLP, PLLSRC and PLLQ.
 const PLL_FIELDS: u32 = 0x3F | 0x1FF << 6 | 0b11 << 16 | PLL_FROM_CRYSTAL | 0xF << 24;
 const PLL_FROM_CRYSTAL: u32 = 1 << 22;
 
-/// Bits of RCC_CFGR: SW and SWS; HPRE, PPRE1 and PPRE2.
+/// Bits of the register RCC_CFGR: clock switch (SW), its status (SWS), and all prescalers.
 const SWITCH: u32 = 0b11;
 const SWITCH_PLL: u32 = 0b10;
 const SWITCHED: u32 = 0b11 << 2;
 const SWITCHED_PLL: u32 = 0b10 << 2;
 const PRESCALERS: u32 = 0xF << 4 | 0b111 << 10 | 0b111 << 13;
-/// Prescalers: APB1 by 4, APB2 by 2.
+/// Prescaler bits of RCC_CFGR: bus APB1 at a quarter of the core's clock, APB2 at half.
 const APB_BY_4_AND_2: u32 = 0b101 << 10 | 0b100 << 13;
 
-/// RCC_APB1ENR, PWREN.
+/// Bit PWREN of RCC_APB1ENR: clock of the power controller.
 const POWER_ON: u32 = 1 << 28;
 
-/// PWR_CR: voltage scale 1 (one bit on the STM32F405, two on the STM32F446), ODEN and ODSWEN. PWR_CSR has their states.
+/// Bits of PWR_CR: voltage scale 1 (one bit on the STM32F405, two on the STM32F446) and over-drive. The register
+/// PWR_CSR has their states at the same positions.
 const SCALE_1: u32 = 1 << 14;
 const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
 const SCALE_READY: u32 = 1 << 14;
 const OVER_DRIVE: u32 = 1 << 16;
 const OVER_DRIVE_SWITCH: u32 = 1 << 17;
 
-/// Bits of FLASH_ACR.
+/// Bits of FLASH_ACR: the field of wait states, its value at full speed, prefetch and caches.
 const LATENCY: u32 = 0xF;
 const WAIT_STATES: u32 = 5;
 const PREFETCH: u32 = 1 << 8;
 const CACHES: u32 = 0b11 << 9;
 
-/// ID of the STM32F405 with a defective prefetch: revision A (ES0182).
+/// Chip ID of an STM32F405 of revision A, whose flash prefetch is defective (ES0182).
 const NO_PREFETCH: u32 = 0x1000_0413;
 
-/// Maximum reads of a register while a PLL, a voltage or a switch settles: some 10 ms at 16 MHz. The data sheets allow at most
-/// 0.3 ms.
+/// Maximum number of reads of a register while a PLL, a voltage or a clock switch settles. They take some 10 ms at 16
+/// MHz; the data sheets allow at most 0.3 ms.
 const POLLS: u32 = 20_000;
 
-/// Sets up the clock tree; returns the frequencies reached. Call it once after a reset, with interrupts off. Bounded work: at
-/// most 0.2 s.
+/// Sets up the clocks of a board, and returns the frequencies reached. Call it once after a reset, with interrupts
+/// off. It takes at most 0.2 s.
 pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     if !back_to_hsi(chip) {
         // An emulator without a clock tree.
@@ -182,7 +184,8 @@ pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     Clocks::HSI
 }
 
-/// Finds out what [`start`] reaches, and returns to the HSI. For a HAL whose own clock set-up has unbounded waits.
+/// Returns the frequencies that [`start`] reaches, and switches back to the internal oscillator. For a HAL whose own
+/// clock set-up has unbounded waits: it gets only clocks that work.
 pub fn probe(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     let clocks = start(chip, plan);
     if clocks.pll.is_some() && back_to_hsi(chip) {
@@ -192,7 +195,7 @@ pub fn probe(chip: &mut impl Registers, plan: &Plan) -> Clocks {
     clocks
 }
 
-/// Sets the wait states and caches of the flash; returns true once the wait states are in effect.
+/// Sets the wait states of the flash and enables its caches; returns true once the wait states apply.
 fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     let prefetch = if chip.read(Register::ChipId) & 0xFFFF_0FFF == NO_PREFETCH {
         0
@@ -207,13 +210,13 @@ fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     chip.wait(Register::FlashAccess, LATENCY, wait_states, POLLS)
 }
 
-/// Enables the flash caches, which a HAL has left off; the wait states stay.
+/// Enables the flash caches, which a HAL has left off. The wait states do not change.
 pub fn cache_flash(chip: &mut impl Registers) {
     let wait_states = chip.read(Register::FlashAccess) & LATENCY;
     cache(chip, wait_states);
 }
 
-/// Runs the core from the HSI, undivided; returns false if that fails.
+/// Runs the core from the internal oscillator (HSI), undivided; returns false if that fails.
 fn back_to_hsi(chip: &mut impl Registers) -> bool {
     chip.modify(Register::ClockControl, 0, HSI_ON);
     if !chip.wait(Register::ClockControl, HSI_READY, HSI_READY, POLLS) {
@@ -239,7 +242,8 @@ fn off(chip: &mut impl Registers) -> bool {
     chip.wait(Register::ClockControl, PLL_READY, 0, POLLS)
 }
 
-/// Prepares the PLL, which must be off, and the voltage for `speed`; returns false if that fails.
+/// Starts the PLL, which must be off, at the settings of `speed`; returns false if that fails. `divisor` turns the
+/// source into 2 MHz; `scale` are the voltage bits of PWR_CR.
 fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Speed, scale: u32) -> bool {
     chip.modify(Register::PowerControl, scale, scale);
     let from = match source {
@@ -261,7 +265,7 @@ fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Speed, sc
         })
 }
 
-/// Switches the core to the PLL; returns false if that fails.
+/// Switches the core to the running PLL; returns false if that fails.
 fn switch(chip: &mut impl Registers) -> bool {
     if !cache(chip, WAIT_STATES) {
         return false;
@@ -312,7 +316,8 @@ mod tests {
         }
     }
 
-    /// The mock panics at a write that the reference manuals forbid.
+    /// Starts the clocks under every combination of faults. The mock panics at a write that the reference manuals
+    /// forbid.
     #[test]
     fn whatever_fails_the_clocks_are_those_that_the_chip_has() {
         let none = Plan {
@@ -357,7 +362,7 @@ mod tests {
         }
     }
 
-    /// The baud rate is 115 200 within 0.2 % at every clock.
+    /// Checks that the baud rate is within 0.2 % of 115 200 bit/s at every possible clock.
     #[test]
     fn the_baud_rate_is_that_of_the_clock_reached() {
         for hz in [16, 42, 45, 84, 90].map(|mhz| mhz * 1_000_000) {

@@ -4,36 +4,37 @@
 
 use crate::registers::{Register, Registers};
 
-/// Crystal, or external clock.
+/// Crystal or external clock of a board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Crystal {
     /// Frequency, Hz: a multiple of 2 MHz.
     pub hz: u32,
-    /// True for an external clock at OSC_IN.
+    /// True for an external clock at the pin OSC_IN, false for a crystal.
     pub bypass: bool,
 }
 
-/// Frequency of the HSI, Hz: within 8 % over all temperatures.
+/// Frequency of the chip's internal oscillator (HSI), Hz: within 8 % over all temperatures.
 pub const HSI_HZ: u32 = 16_000_000;
 
-/// Bits of RCC_CR.
+/// Bits of the register RCC_CR: crystal oscillator (HSE) on, HSE ready, external clock in its place.
 const HSE_ON: u32 = 1 << 16;
 const HSE_READY: u32 = 1 << 17;
 const HSE_BYPASS: u32 = 1 << 18;
 
-/// Maximum reads of RCC_CR while a crystal starts: some 100 ms at 16 MHz; it usually takes 2 ms.
+/// Maximum number of reads of RCC_CR while a crystal starts. They take some 100 ms at 16 MHz; a crystal usually takes
+/// 2 ms.
 const START_POLLS: u32 = 200_000;
 
-/// RCC_CFGR, RTCPRE: HSE / 31.
+/// Divisor of the crystal's frequency (HSE) before it is measured: field RTCPRE of RCC_CFGR.
 const DIVISOR: u32 = 31;
 const DIVIDED: u32 = DIVISOR << 16;
 
 const EDGES: u32 = 8;
 
-/// RCC_APB2ENR, TIM11EN.
+/// Bit TIM11EN of RCC_APB2ENR: clock of timer 11.
 const TIMER_ON: u32 = 1 << 18;
 
-/// Maximum reads of the timer's status while waiting for an edge.
+/// Maximum number of reads of the timer's status while waiting for edges of the crystal's clock.
 const EDGE_POLLS: u32 = 1_000;
 
 /// Starts the crystal; returns true if its frequency is right within 10 %, else turns it off again. The core must run from the
@@ -58,7 +59,7 @@ pub fn stop(chip: &mut impl Registers) {
     chip.modify(Register::ClockControl, HSE_ON, 0);
 }
 
-/// Returns the HSI periods between two captures.
+/// Returns the time between two captures of timer 11, in periods of the HSI; `None` without edges.
 fn period(chip: &mut impl Registers) -> Option<u32> {
     chip.modify(Register::ClockConfig, 0x1F << 16, DIVIDED);
     chip.modify(Register::Apb2Enable, 0, TIMER_ON);

@@ -7,11 +7,11 @@ use std::vec::Vec;
 
 use crate::registers::{Register, Registers};
 
-/// Injected faults, and the frequency of the crystal.
+/// Faults that the mock chip simulates, and the frequency of its crystal.
 #[expect(clippy::struct_excessive_bools, reason = "each fails by itself")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Faults {
-    /// Makes all registers read 0, as in the emulator.
+    /// True if all registers read 0, as in the emulator.
     pub(crate) hsi_hidden: bool,
     pub(crate) crystal_dead: bool,
     pub(crate) timer_dead: bool,
@@ -63,7 +63,7 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// Creates the block in its state after a reset.
+    /// Creates the mock registers in their state after a reset. `over_drive` is true for an STM32F446.
     pub(crate) fn with(faults: Faults, over_drive: bool) -> Self {
         let mut block = Self {
             faults,
@@ -235,7 +235,7 @@ impl Registers for Block {
         }
     }
 
-    /// Reads once where the chip's state can not change; only the timer changes between reads.
+    /// Simulates all reads of a wait by one, because only the timer's status changes between reads.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

@@ -4,41 +4,41 @@
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[repr(u32)]
 pub enum Register {
-    /// IWDG_KR: key.
+    /// IWDG_KR: key of the watchdog.
     WatchdogKey = 0x4000_3000,
-    /// IWDG_PR: prescaler.
+    /// IWDG_PR: prescaler of the watchdog.
     WatchdogPrescaler = 0x4000_3004,
-    /// IWDG_RLR: reload value.
+    /// IWDG_RLR: reload value of the watchdog.
     WatchdogReload = 0x4000_3008,
-    /// IWDG_SR: pending updates of prescaler and reload value.
+    /// IWDG_SR: pending updates of the watchdog's prescaler and reload value.
     WatchdogStatus = 0x4000_300C,
     /// PWR_CR: voltage scale and over-drive.
     PowerControl = 0x4000_7000,
     /// PWR_CSR: states of voltage scale and over-drive.
     PowerStatus = 0x4000_7004,
-    /// TIM11_CR1.
+    /// TIM11_CR1: control of timer 11.
     Timer11Control = 0x4001_4800,
-    /// TIM11_SR.
+    /// TIM11_SR: status of timer 11.
     Timer11Status = 0x4001_4810,
-    /// TIM11_CCMR1: selection of the captured input.
+    /// TIM11_CCMR1: selection of the input that timer 11 captures.
     Timer11Mode = 0x4001_4818,
-    /// TIM11_CCER: capture enable.
+    /// TIM11_CCER: capture enable of timer 11.
     Timer11Enable = 0x4001_4820,
-    /// TIM11_ARR: the largest count.
+    /// TIM11_ARR: the largest count of timer 11.
     Timer11Reload = 0x4001_482C,
-    /// TIM11_CCR1: the count at the last edge of the input.
+    /// TIM11_CCR1: the count of timer 11 at the last edge of its input.
     Timer11Capture = 0x4001_4834,
-    /// TIM11_OR: source of the input.
+    /// TIM11_OR: source of timer 11's input.
     Timer11Option = 0x4001_4850,
     /// RCC_CR: oscillators and PLL, on and ready.
     ClockControl = 0x4002_3800,
-    /// RCC_PLLCFGR.
+    /// RCC_PLLCFGR: settings of the PLL.
     PllConfig = 0x4002_3804,
     /// RCC_CFGR: system clock and prescalers.
     ClockConfig = 0x4002_3808,
-    /// RCC_APB1ENR.
+    /// RCC_APB1ENR: clock enables of the peripherals on the bus APB1.
     Apb1Enable = 0x4002_3840,
-    /// RCC_APB2ENR.
+    /// RCC_APB2ENR: clock enables of the peripherals on the bus APB2.
     Apb2Enable = 0x4002_3844,
     /// RCC_CSR: the cause of the last reset.
     ResetStatus = 0x4002_3874,
@@ -58,7 +58,7 @@ pub trait Registers {
     /// Writes the value of `register`.
     fn write(&mut self, register: Register, value: u32);
 
-    /// Clears the bits of `clear`, then sets the bits of `set`.
+    /// Clears the bits of `clear` in `register`, then sets the bits of `set`.
     fn modify(&mut self, register: Register, clear: u32, set: u32) {
         let value = self.read(register);
         self.write(register, value & !clear | set);

@@ -2,7 +2,7 @@
 
 use crate::registers::{Register, Registers};
 
-/// Bit that clears all causes: RMVF.
+/// Bit RMVF of RCC_CSR, which clears all recorded causes of a reset.
 const FORGET: u32 = 1 << 24;
 
 /// The cause of the last reset.
@@ -14,7 +14,7 @@ pub enum Reset {
     Brownout,
     /// Reset pin: a button, or a debug probe.
     Pin,
-    /// Request of the program or a debug probe.
+    /// Software reset, by the program or a debug probe.
     Software,
     /// Watchdog not fed: the relay's loop hung, or its clock stopped.
     Watchdog,
@@ -31,7 +31,8 @@ impl Reset {
         Self::of(status)
     }
 
-    /// Selects the most specific cause: every reset sets the pin's bit, and power-up the brownout's.
+    /// Returns the most specific cause in `status`, a value of RCC_CSR. Every reset also sets the bit of the reset
+    /// pin, and a power-up that of the brownout.
     fn of(status: u32) -> Self {
         let is = |bit: u32| status >> bit & 1 != 0;
         match status {
@@ -64,7 +65,7 @@ mod tests {
     use crate::mock::Block;
     use crate::registers::{Register, Registers as _};
 
-    /// Values of RCC_CSR after each kind of reset, by the reference manuals.
+    /// Reads the values that RCC_CSR has after each kind of reset, by the reference manuals.
     #[test]
     fn the_cause_is_read_once_and_forgotten() {
         for (status, cause) in [

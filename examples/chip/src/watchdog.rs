@@ -5,21 +5,22 @@
 
 use crate::registers::{Register, Registers};
 
-/// Prescaler: LSI / 64, 500 counts a second at its typical 32 kHz.
+/// Prescaler of the watchdog: its oscillator LSI / 64, 500 counts a second at the typical 32 kHz.
 const PRESCALER: u32 = 0b100;
 const RELOAD: u32 = 2_999;
 
-/// Time from the last feeding to the reset, ms. Typical, fastest and slowest (LSI of 32, 47 and 17 kHz). An erase of a flash sector
-/// of 128 KiB stops the core for at most 2 s.
+/// Time from the last feeding of the watchdog to the reset, ms: typical, shortest and longest. Its oscillator LSI
+/// then has 32, 47 and 17 kHz. An erase of a flash sector of 128 KiB, which stops the core for at most 2 s, fits in.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
-/// Longest sleep of a relay's loop, ms.
+/// Longest sleep of the relay's main loop, which feeds the watchdog once a turn, ms.
 pub const TURN_MS: u64 = 500;
 
-/// Longest delay of a relay's timer in a loop that may feed, ms.
+/// Lateness of the relay's timer from which the main loop no longer feeds the watchdog, ms.
 pub const LATE_MS: u64 = 1_000;
 
-/// Returns true if a loop may feed at `now_us`. The timer of its relay, due at `due_us`, is then not late by [`LATE_MS`].
+/// Returns true if the main loop may feed the watchdog at `now_us`. The relay's timer, due at `due_us`, must be less
+/// than [`LATE_MS`] late; `None` means that no timer runs.
 pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
     match due_us {
         Some(due_us) => now_us < due_us.saturating_add(1_000 * LATE_MS),
@@ -27,15 +28,16 @@ pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
     }
 }
 
-/// Values of the key register.
+/// Values of the watchdog's key register: start, unlock its settings, feed.
 const START: u32 = 0xCCCC;
 const UNLOCK: u32 = 0x5555;
 const FEED: u32 = 0xAAAA;
 
-/// Maximum reads of the status until the set-up takes effect: five periods of the LSI, at most 0.3 ms.
+/// Maximum number of status reads until the watchdog's settings take effect. That takes five LSI periods, at most 0.3
+/// ms.
 const POLLS: u32 = 10_000;
 
-/// Starts the watchdog for good. It pauses while a debugger halts the core. Bounded work.
+/// Starts the watchdog, which nothing but a reset can stop. It pauses while a debugger halts the core. Bounded work.
 pub fn start(chip: &mut impl Registers) {
     chip.modify(Register::DebugFreeze, 0, 1 << 12);
     chip.write(Register::WatchdogKey, START);

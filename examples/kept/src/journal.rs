@@ -17,21 +17,21 @@ use uav_relay::CRC_32C;
 /// Value of an erased word.
 pub const BLANK: u32 = u32::MAX;
 
-/// Number of words that a record has in addition to its payload.
+/// Number of words of a record besides its payload: its number and its CRC.
 pub const AROUND: usize = 2;
 
-/// Number of places tried for one record, because some may be worn.
+/// Number of positions tried for one record, because flash cells may be worn.
 const TRIES: usize = 4;
 
-/// Two flash sectors, 0 and 1, possibly of different lengths.
+/// Access to two flash sectors, numbered 0 and 1, possibly of different lengths.
 pub trait Flash {
     /// Returns the number of words in a sector; 0 if there is none.
     fn words(&self, sector: usize) -> usize;
 
-    /// Returns the number of words up to the last that is not [`BLANK`].
+    /// Returns the number of used words in a sector: up to the last that is not [`BLANK`].
     fn used(&mut self, sector: usize) -> usize;
 
-    /// Returns a word of a sector; [`BLANK`] behind its end.
+    /// Returns the word number `word` of a sector; [`BLANK`] behind the sector's end.
     fn read(&mut self, sector: usize, word: usize) -> u32;
 
     /// Erases a sector.
@@ -66,13 +66,13 @@ impl<F: Flash> Flash for &mut F {
 /// Action of [`Journal::keep`] when both sectors are full.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WhenFull {
-    /// Store nothing.
+    /// Refuse to store the record.
     Refuse,
-    /// Erase the sector without the newest record, and continue in this sector.
+    /// Erase the sector without the newest record, and store the record there.
     Erase,
 }
 
-/// Journal in two flash sectors.
+/// Journal of records in two flash sectors. Only the newest valid record counts.
 #[derive(Debug)]
 pub struct Journal<F> {
     flash: F,
@@ -83,12 +83,12 @@ pub struct Journal<F> {
 #[derive(Clone, Copy)]
 struct Found {
     newest: Option<Newest>,
-    /// Number of records up to the last that is not blank.
+    /// Number of records in the sector, up to the last that is not blank.
     used: usize,
     room: usize,
 }
 
-/// Newest record of a sector, compared by number.
+/// Newest record of a sector. The record with the higher number is the newer one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Newest {
     number: u32,
@@ -96,7 +96,7 @@ struct Newest {
 }
 
 impl<F: Flash> Journal<F> {
-    /// Creates the journal of records with `kept` words of payload each.
+    /// Creates a journal whose records have `kept` words of payload. Records stored under another `key` are ignored.
     pub const fn new(flash: F, kept: usize, key: u32) -> Self {
         Self {
             flash,
@@ -105,7 +105,7 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Returns the payload of the newest record; `KEPT` must be the journal's payload length.
+    /// Returns the payload of the newest record, if any. `KEPT` must be the journal's payload length, words.
     ///
     /// Work: linear in the words of the sectors, and a CRC for the newest record and each one behind it.
     pub fn newest<const KEPT: usize>(&mut self) -> Option<[u32; KEPT]> {
@@ -125,7 +125,8 @@ impl<F: Flash> Journal<F> {
         Some(())
     }
 
-    /// Erases, at a start, each used sector without the newest record. Then a full sector of records fits before the next erase.
+    /// Erases each used sector without the newest record. Called at a start: a full sector of records then fits
+    /// before the next erase.
     pub fn tidy(&mut self) {
         let found = self.found();
         let any = found.iter().any(|found| found.newest.is_some());
@@ -136,7 +137,7 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Stores a payload; returns true if it was read back correctly.
+    /// Stores the payload `kept` as a new record; returns true if it was read back correctly.
     pub fn keep(&mut self, kept: &[u32], when_full: WhenFull) -> bool {
         let found = self.found();
         let [first, second] = found.map(|found| found.newest);
@@ -181,7 +182,7 @@ impl<F: Flash> Journal<F> {
         })
     }
 
-    /// Returns the number of a record with a valid CRC.
+    /// Returns the number stored in a record; `None` if the record's CRC is wrong.
     fn number(&mut self, sector: usize, record: usize) -> Option<u32> {
         let first = record * self.words;
         let sum = self.sum(sector, first);
@@ -189,7 +190,7 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// Returns the CRC of the record at word `first`, without its last word but with the journal's key.
+    /// Computes the CRC of the record at word `first`. It covers all words but the last, and then the journal's key.
     #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();
@@ -206,14 +207,14 @@ impl<F: Flash> Journal<F> {
     }
 }
 
-/// Returns the sector with the newest record, 0 if there is none.
+/// Returns the number of the sector with the newest record, 0 if there is no record.
 #[inline(never)] // called from several places
 fn current(found: [Found; 2]) -> usize {
     let [first, second] = found.map(|found| found.newest);
     usize::from(second > first)
 }
 
-/// Packs bytes into words, padded with zeros.
+/// Packs bytes into little-endian words, padded with zeros.
 pub fn pack<const WORDS: usize>(bytes: &[u8]) -> [u32; WORDS] {
     let mut words = [0; WORDS];
     for (word, bytes) in words.iter_mut().zip(bytes.chunks(4)) {
@@ -226,7 +227,7 @@ pub fn pack<const WORDS: usize>(bytes: &[u8]) -> [u32; WORDS] {
     words
 }
 
-/// Unpacks the first bytes of words.
+/// Unpacks the first `BYTES` bytes of little-endian words.
 pub fn unpack<const BYTES: usize>(words: &[u32]) -> [u8; BYTES] {
     let mut bytes = [0; BYTES];
     let all = words.iter().flat_map(|word| word.to_le_bytes());

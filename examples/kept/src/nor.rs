@@ -8,15 +8,17 @@ use crate::journal::{BLANK, Flash};
 
 const WORD: usize = 4;
 
-/// Words per read or write. A driver call costs more than a word, and some flashes write a whole page each time.
+/// Number of words per read or write of the flash. A driver call costs more than a word, and some flashes write a
+/// whole page each time.
 const PIECE: usize = 16;
 
-/// Two sectors of a flash, each of one or more erase units, as offsets into it. The flash must read and write whole words.
+/// Two sectors of a NOR flash, given by their offsets; each consists of one or more erase units. The flash must read
+/// and write whole words.
 #[derive(Debug)]
 pub struct Nor<F> {
     flash: F,
     sectors: [Range<u32>; 2],
-    /// Last read piece: sector, number of its first word, and its words.
+    /// Cached part of the flash, read last: sector, number of the first word, and the words.
     last: Option<(usize, usize, [[u8; WORD]; PIECE])>,
 }
 
@@ -33,7 +35,7 @@ impl<F: NorFlash> Nor<F> {
         }
     }
 
-    /// Returns the offset of `words` words from `first` on; `None` if they exceed the sector.
+    /// Returns the flash offset of the word `first` of a sector; `None` if `words` words exceed the sector.
     fn place(&self, sector: usize, first: usize, words: usize) -> Option<u32> {
         let start = self.sectors.get(sector)?.start;
         let end = first.checked_add(words)?;
@@ -42,7 +44,7 @@ impl<F: NorFlash> Nor<F> {
         start.checked_add(bytes).filter(|_| is_in)
     }
 
-    /// Returns a word, through the cached piece.
+    /// Returns a word of a sector, read through the cache; `None` on a fault.
     fn word(&mut self, sector: usize, word: usize) -> Option<u32> {
         let (first, at) = (word - word % PIECE, word % PIECE);
         if self

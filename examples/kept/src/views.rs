@@ -13,38 +13,40 @@ use uav_relay::{Instant, Relay, ViewRecord};
 
 use crate::journal::{Flash, Journal, WhenFull, pack, unpack};
 
-/// Addresses of the two sectors: sectors 1 and 2 of an STM32F405.
+/// Addresses of the two flash sectors that store votes: sectors 1 and 2 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 
-/// Payload of a record, words.
+/// Payload of a journal record that stores the relay's votes, words.
 pub const WORDS: usize = ViewRecord::LENGTH.div_ceil(4);
 
-/// Packs a view record into words.
+/// Packs a view record, which holds the relay's votes, into words.
 pub fn kept(record: &ViewRecord) -> [u32; WORDS] {
     pack(&record.to_bytes())
 }
 
-/// Unpacks a stored view record, if it has this format.
+/// Unpacks a stored view record; `None` if the words do not have its format.
 pub fn record(kept: &[u32]) -> Option<ViewRecord> {
     ViewRecord::from_bytes(&unpack::<{ ViewRecord::LENGTH }>(kept))
 }
 
-/// Creates the journal; `block` is the CRC of the drone's block.
+/// Creates the journal of the relay's votes. `block` is the CRC of the drone's configuration block.
 pub const fn log<F: Flash>(flash: F, block: u32) -> Journal<F> {
     Journal::new(flash, WORDS, block)
 }
 
-/// Storage state of the relay's view records.
+/// Storage state of the relay's votes: stored or not.
 #[derive(Debug)]
 pub struct Views {
-    /// True if the last record is in the flash.
+    /// True if the newest record of votes is in the flash.
     kept: bool,
 }
 
 impl Views {
-    /// Restores the votes from before the reboot into a `relay` that has got at most an upload so far.
+    /// Restores the votes from before the reboot into a new `relay`. Only a stored upload may have been restored
+    /// before.
     ///
-    /// If a record exists, `stands_by` gets true if the relay accepts it; a record of another firmware may be refused.
+    /// If a record exists, `stands_by` gets true if the relay accepts it; a record of another firmware may be
+    /// refused.
     pub fn resume<F: Flash>(
         relay: &mut Relay,
         now: Instant,
@@ -61,7 +63,7 @@ impl Views {
         Self { kept }
     }
 
-    /// Stores a changed `record` of the relay. Returns the storage state if that has changed.
+    /// Stores the relay's changed votes. Returns `Some` when storing begins to work (true) or to fail (false).
     ///
     /// If the write fails the relay flies on, because a drone in the air must not be stopped for it.
     #[inline(never)] // rarely called

@@ -10,7 +10,7 @@ use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::exception;
 use uav_relay::Instant;
 
-/// `SysTick` cycles in a microsecond; its period is a thousand times as long.
+/// Number of `SysTick` cycles in a microsecond. The period of `SysTick` is a thousand times as long.
 static MICRO: AtomicU32 = AtomicU32::new(1);
 
 /// Milliseconds since the start, in 64 bits, which do not overflow.
@@ -23,7 +23,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Starts the millisecond interrupt of a core that runs at `core_hz`, a multiple of 1 MHz.
+    /// Starts the clock: a millisecond interrupt of a core that runs at `core_hz`, a multiple of 1 MHz.
     pub(crate) fn start(mut tick: SYST, core_hz: u32) -> Self {
         let micro = core_hz / 1_000_000;
         MICRO.store(micro, Ordering::Relaxed);
@@ -43,7 +43,7 @@ impl Clock {
         self.last
     }
 
-    /// Sleeps until `wake`, or until an input.
+    /// Sleeps until the time `wake`, or until bytes arrive. Without `wake` there is no time limit.
     pub(crate) fn sleep(&mut self, wake: Option<Instant>) {
         while wake.is_none_or(|wake| self.now() < wake) {
             // An interrupt after this check of INPUT stays pending, and `wfi` returns for it.

@@ -13,7 +13,7 @@ use super::flash;
 use super::{board, config, log, persistent};
 use crate::autopilot::{Autopilot, Uart};
 
-/// Relay with its stored votes and, for a drone with sites, its autopilot. In static RAM, to save stack.
+/// Relay with its stored votes and, if the drone flies with one, its autopilot. In static RAM, to save stack.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut persistent::Views,
@@ -55,7 +55,8 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     }
 }
 
-/// Creates the relay in static RAM, to save stack. `None` if this image lacks a feature that the configuration needs.
+/// Creates the relay in static RAM, to save stack. `None` if the relay rejects the configuration, because this image
+/// lacks a feature or the joint method is for more than 100 relays.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,
@@ -70,7 +71,7 @@ fn switch_on(
         }),
         ..config.settings(wiring)
     };
-    // Other errors were ruled out by the check of the configuration.
+    // Most other errors were ruled out by the check of the configuration.
     let slot = cortex_m::singleton!(RELAY: Option<Relay> = None)?;
     let seed = board::seed();
     Relay::new_in(slot, &config.mission, config.identity, &settings, seed, now)
@@ -78,13 +79,13 @@ fn switch_on(
         .ok()
 }
 
-/// Error: a key is configured, but frames can not be signed.
+/// Error: a signing key is configured, but frames can not be signed.
 struct CannotSign;
 
-/// Returns the signing settings of this start, if the block has a key.
+/// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 ///
-/// If the flash can not be written, as in an emulator, the epoch is still larger than all stored ones, and at least that of the
-/// block, but it may not increase from this start to the next.
+/// If the flash can not be written, as in an emulator, the epoch is still larger than all stored ones, and at least
+/// that of the block, but it may not increase from this start to the next.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {
@@ -111,7 +112,7 @@ fn sign() -> Result<Option<Auth>, CannotSign> {
     }))
 }
 
-/// Refuses to fly with a signing key, because this image was built without the feature `auth`.
+/// Returns an error if the block has a signing key, because this image has no feature `auth`.
 #[cfg(not(feature = "auth"))]
 fn sign() -> Result<Option<Auth>, CannotSign> {
     if config::secret(board::block()) == Ok(None) {

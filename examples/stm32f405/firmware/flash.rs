@@ -11,7 +11,7 @@ use uav_relay_kept::views;
 #[cfg(feature = "upload")]
 use super::uploads;
 
-/// Address of a sector that no image reaches (`memory.x`).
+/// Address of a flash sector that no firmware image reaches (`memory.x`).
 #[derive(Clone, Copy)]
 struct Sector(u32);
 
@@ -119,7 +119,8 @@ impl Sector {
         flash.acr().modify(|_, w| w.dcen().set_bit());
     }
 
-    /// Writes words from `first` on; returns true if they are read back correctly. Stops the CPU for some 16 microseconds a word.
+    /// Writes words from word `first` of the sector on; returns true if they are read back correctly. Stops the CPU
+    /// for some 16 microseconds a word.
     #[inline(never)]
     fn write(self, first: usize, words: &[u32]) -> bool {
         let end = first.checked_add(words.len());
@@ -144,7 +145,7 @@ impl Sector {
     }
 }
 
-/// Parallelism of 32 bits, as the board's 3.3 V permit.
+/// Value of the flash's write width (PSIZE) for 32 bits, which the board's 3.3 V permit.
 const BY_WORD: u8 = 2;
 
 /// Unlocks the flash registers for writing.

@@ -32,13 +32,13 @@ use super::uart_log::lost;
 #[cfg(feature = "rtt")]
 use defmt_rtt as _;
 
-/// Returns true if the counters are requested: never.
+/// Returns false: without a log over the UART nobody can request the counters.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 pub(crate) const fn asked() -> bool {
     false
 }
 
-/// Returns the number of dropped frames.
+/// Returns 0, the number of dropped log frames, which only a log over the UART counts.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 const fn lost() -> u32 {
     0
@@ -47,7 +47,7 @@ const fn lost() -> u32 {
 #[cfg(feature = "defmt")]
 defmt::timestamp!("{=u64:us}", super::clock::micros());
 
-/// Logs a line at a level of defmt; does nothing without `--features defmt`.
+/// Logs a line at a level of defmt. The macro does nothing without `--features defmt`.
 macro_rules! line {
     ($level:ident, $text:literal $(, $value:expr)* $(,)?) => {{
         #[cfg(feature = "defmt")]
@@ -99,7 +99,7 @@ pub(crate) fn unguarded() {
     warn!("no sites: no autopilot is controlled, and drones are not kept apart while they move");
 }
 
-/// Logs the line and the speed limit of the autopilot.
+/// Logs the length of the line between the sites, and the drone's speed limit.
 #[cfg(feature = "flight")]
 pub(crate) fn flies(course: &Course) {
     info!(
@@ -271,7 +271,7 @@ pub(crate) fn stands_by(taken: bool) {
     }
 }
 
-/// Logs that storing the votes works again (`kept`) or fails.
+/// Logs that storing the relay's votes works again (`kept` is true) or fails (`kept` is false).
 pub(crate) fn votes(kept: bool) {
     if kept {
         info!("votes on views can be stored again");
@@ -285,7 +285,7 @@ pub(crate) fn cannot_sign() {
     error!("configuration refused: it has a key, and this image was built without auth");
 }
 
-/// Logs that this image was built without the feature for the method, or for measuring.
+/// Logs that the relay rejects the configuration, mostly because this image lacks a feature for it.
 pub(crate) fn cannot_fly(error: SetupError) {
     error!(
         "configuration refused: not supported by this image, {}",

@@ -11,7 +11,7 @@ use super::flash::Sectors;
 use super::uploads;
 use super::{board, flash, log};
 
-/// Restores the uploaded mission into a newly created `relay`.
+/// Restores the mission uploaded before the reboot, if any, into a newly created `relay`.
 #[cfg(feature = "upload")]
 #[inline(never)]
 pub(crate) fn resume_upload(relay: &mut Relay) {
@@ -41,14 +41,15 @@ fn uploads() -> Journal<Sectors> {
 pub(crate) struct Views(views::Views);
 
 impl Views {
-    /// Restores the votes from before the reboot into a `relay` that has got at most an upload so far.
+    /// Restores the votes from before the reboot into a new `relay`. Only an uploaded mission may have been restored
+    /// before.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());
         Self(views::Views::resume(relay, now, log, log::stands_by))
     }
 
-    /// Stores a changed `record` of the relay. Returns true even if the write fails, so that the relay flies on.
+    /// Stores the relay's changed votes. Returns true even if the write fails, so that the relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
         if let Some(kept) = self.0.store(record, views::log(flash::VIEWS, block())) {
             log::votes(kept);

@@ -23,10 +23,10 @@ use crate::autopilot::{self, Uart};
 
 static FIRST: Slot<USART2> = Mutex::new(RefCell::new(None));
 
-/// Board with its clocks running, and the peripherals that a wiring adds.
+/// Board with its clocks running, and peripherals that only some wirings of the relay need.
 pub(crate) struct Pins {
     pub(crate) clock: Clock,
-    /// Port at USART2.
+    /// Port at USART2, to the neighbour toward the transmitter or to the radio.
     pub(crate) first: Port,
     /// UART of the autopilot.
     pub(crate) uart: Uart,
@@ -36,7 +36,7 @@ pub(crate) struct Pins {
     pub(crate) second: Second,
 }
 
-/// Peripherals of a second port, at USART3.
+/// Peripherals of the second neighbour's port, at USART3.
 #[allow(dead_code, reason = "the second neighbour's port")]
 pub(crate) struct Second {
     pub(crate) usart: USART3,

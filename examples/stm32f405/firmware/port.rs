@@ -43,7 +43,7 @@ pub(crate) struct Served<U: Instance> {
 pub(crate) type Slot<U> = Mutex<RefCell<Option<Served<U>>>>;
 
 impl<U: Instance> Served<U> {
-    /// Moves bytes both ways until the port has none and takes none.
+    /// Moves received bytes to the receive queue, and queued bytes to the UART, as far as possible.
     fn exchange(&mut self) {
         let Self { uart, end } = self;
         loop {
@@ -62,12 +62,13 @@ impl<U: Instance> Served<U> {
     }
 }
 
-/// Returns the settings of a UART with a clock of `apb_hz`. They correct for the HAL, which assumes the clocks of the reset.
+/// Returns the settings of a UART whose clock is `apb_hz`. They correct the error of the HAL, which assumes the clock
+/// after a reset.
 pub(crate) fn config(apb_hz: u32) -> Config {
     Config::default().baudrate(believed(BAUD, apb_hz).bps())
 }
 
-/// Hands the UART to its interrupt, and returns the main loop's end of the queues.
+/// Hands the UART to its interrupt handler. Returns the main loop's port, which accesses the queues.
 pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     mut uart: Serial<U>,
     interrupt: Interrupt,

@@ -13,17 +13,17 @@ use uav_relay::serial::SerialPort;
 
 use super::port::{self, Port, Queues, RECEIVED, Slot};
 
-/// Buffer of a frame; the longest has the relay's counters.
+/// Buffer of a log frame; the longest frame has the relay's counters.
 type Frame = Vec<u8, 160>;
 
-/// Capacity of the send queue, bytes: 89 ms.
+/// Capacity of the log's send queue, bytes: 89 ms.
 const ROOM: usize = 1024;
 
 struct Log {
     port: Option<Port>,
     encoder: defmt::Encoder,
     frame: Frame,
-    /// True if the frame exceeds its buffer.
+    /// True if the present log frame exceeds its buffer, and must be dropped.
     cut: bool,
     lost: u32,
 }
@@ -45,7 +45,7 @@ pub(crate) fn start(uart: Serial<UART4>) {
     with(|log| log.port = Some(port));
 }
 
-/// Returns true if the counters are requested.
+/// Returns true if somebody requests the counters: an `s` was received on the log's UART.
 pub(crate) fn asked() -> bool {
     let mut asked = false;
     with(|log| {
@@ -65,7 +65,7 @@ pub(crate) fn lost() -> u32 {
     lost
 }
 
-/// Begins a frame; interrupts are off until its end.
+/// Begins a log frame; interrupts are off until its end.
 pub(crate) fn begin() {
     with(|log| {
         log.frame.clear();
@@ -94,7 +94,7 @@ pub(crate) fn write(bytes: &[u8]) {
     });
 }
 
-/// Ends the frame, and queues it if there is room.
+/// Ends the log frame, and queues it if the queue has room for all of it.
 pub(crate) fn end() {
     with(|log| {
         let Log {

@@ -10,13 +10,13 @@ use uav_relay::Upload;
 
 use uav_relay_kept::journal::{pack, unpack};
 
-/// Addresses of the two sectors: sectors 7 and 8 of an STM32F405.
+/// Addresses of the two flash sectors that store uploads: sectors 7 and 8 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0806_0000, 0x0808_0000];
 
-/// Payload of a record, words.
+/// Payload of a journal record that stores an upload, words.
 pub const WORDS: usize = Upload::LENGTH.div_ceil(4);
 
-/// Packs an upload into words.
+/// Packs an uploaded mission into words.
 pub fn kept(upload: &Upload) -> [u32; WORDS] {
     let mut bytes = [0; Upload::LENGTH];
     // A checked upload always fits.
@@ -24,7 +24,7 @@ pub fn kept(upload: &Upload) -> [u32; WORDS] {
     pack(&bytes)
 }
 
-/// Unpacks a stored upload, if it has this format.
+/// Unpacks a stored upload; `None` if the words do not have its format.
 pub fn upload(kept: &[u32]) -> Option<Upload> {
     Upload::decode(&unpack::<{ Upload::LENGTH }>(kept))
 }

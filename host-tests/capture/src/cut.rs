@@ -1,18 +1,19 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Bytes stored per piece. The longest frame has 137; a longer piece is noise, and only its start is kept.
+/// Maximum number of bytes stored of a piece. The longest frame has 137 bytes; a longer piece is noise, and only its
+/// start is kept.
 pub const MOST: usize = 1_024;
 
-/// Bytes between two delimiters, including the final one.
+/// Piece of a byte stream between two frame delimiters, including the final one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Piece<'a> {
-    /// The bytes with the delimiter; of a piece longer than [`MOST`] the first ones.
+    /// Bytes of the piece with its delimiter; only the first [`MOST`] bytes of a longer piece.
     pub bytes: &'a [u8],
     /// Length of the piece before truncation.
     pub len: usize,
 }
 
-/// Stream splitter. The result does not depend on how the stream is split into reads.
+/// Splitter of a byte stream into frames. The result does not depend on how the stream is divided into reads.
 #[derive(Clone, Debug, Default)]
 pub struct Cut {
     bytes: Vec<u8>,
@@ -20,7 +21,7 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Appends `bytes` and passes each completed piece to `take`; empty pieces are skipped.
+    /// Appends `bytes` to the stream and passes each completed piece to `take`; empty pieces are skipped.
     ///
     /// Work is linear in the number of bytes, memory at most [`MOST`].
     ///

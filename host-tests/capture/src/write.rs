@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// Link type of a capture: LINKTYPE_USER0, for which the dissector is registered.
+/// Link type of all interfaces in a capture: LINKTYPE_USER0. The Wireshark dissector is registered for it.
 pub const LINK_TYPE: u32 = 147;
 
 // Block types, options and byte-order magic of the pcapng format (draft-ietf-opsawg-pcapng).
@@ -19,18 +19,18 @@ const INTERFACE_DESCRIPTION_TEXT: u16 = 3;
 const INTERFACE_RESOLUTION: u16 = 9;
 const PACKET_FLAGS: u16 = 2;
 
-/// Resolution of timestamps: 10^-9 s.
+/// Resolution of the timestamps in a capture: the exponent n of 10^-n s.
 const NANOSECONDS: u8 = 9;
 
 /// Direction of a frame, relative to the node that writes the capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Direction {
-    /// Observed in passing, or unknown.
+    /// Frame between other nodes, or of unknown direction.
     #[default]
     Unknown,
-    /// Received.
+    /// Frame received by the node that writes the capture.
     In,
-    /// Sent.
+    /// Frame sent by the node that writes the capture.
     Out,
 }
 
@@ -44,26 +44,26 @@ impl Direction {
     }
 }
 
-/// Handle of a port, link or channel in a capture.
+/// Handle of an interface (a port, link or radio channel) in a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Interface(u32);
 
-/// A frame of a capture.
+/// Frame to be written to a capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Frame<'a> {
-    /// Time of its last byte, since 1970; in a simulation, virtual time since the start.
+    /// Time of the frame's last byte, since 1970; in a simulation, virtual time since the start.
     pub at: Duration,
-    /// Bytes on the wire: COBS, with the final delimiter.
+    /// Bytes of the frame on the wire: COBS, with the final delimiter.
     pub bytes: &'a [u8],
-    /// Original length, if `bytes` is truncated.
+    /// Length of the frame, bytes; larger than that of `bytes` if these are truncated.
     pub len: usize,
-    /// Direction.
+    /// Direction of the frame, relative to the node that writes the capture.
     pub direction: Direction,
-    /// Comment; empty for none.
+    /// Comment on the frame; empty for none.
     pub comment: &'a str,
 }
 
-/// A capture that is being written.
+/// Writer of a pcapng capture.
 pub struct Capture<W: Write> {
     out: W,
     interfaces: u32,
@@ -99,7 +99,7 @@ impl<W: Write> Capture<W> {
         Ok(capture)
     }
 
-    /// Adds a port, link or channel.
+    /// Adds an interface (a port, link or radio channel) to the capture.
     ///
     /// # Errors
     /// The capture cannot be written.
@@ -118,7 +118,7 @@ impl<W: Write> Capture<W> {
         Ok(interface)
     }
 
-    /// Adds a frame.
+    /// Adds a frame to the capture.
     ///
     /// # Errors
     /// The capture cannot be written.
@@ -148,7 +148,7 @@ impl<W: Write> Capture<W> {
         self.out.flush()
     }
 
-    /// Flushes and returns `out`.
+    /// Ends the capture: flushes and returns `out`.
     ///
     /// # Errors
     /// The capture cannot be written.
@@ -159,7 +159,8 @@ impl<W: Write> Capture<W> {
     }
 }
 
-/// A pcapng block: type, length, contents, and the length again. Little-endian; contents are padded to four bytes.
+/// Block of a pcapng file: type, length, contents, and the length again. Little-endian; contents are padded to four
+/// bytes.
 struct Block {
     kind: u32,
     contents: Vec<u8>,
@@ -193,7 +194,7 @@ impl Block {
         self.contents.resize(full, 0);
     }
 
-    /// Appends an option; a value too long for the 16-bit length field is cut.
+    /// Appends an option to the block; a value too long for the 16-bit length field is cut.
     fn option(&mut self, code: u16, value: &[u8]) {
         let length = u16::try_from(value.len()).unwrap_or(u16::MAX);
         self.u16(code);
@@ -208,7 +209,7 @@ impl Block {
         }
     }
 
-    /// Ends the options, and writes the block in one call.
+    /// Ends the block's options, and writes the block in one call.
     fn write(mut self, out: &mut impl Write) -> io::Result<()> {
         if self.has_options {
             self.u16(END_OF_OPTIONS);

@@ -10,7 +10,8 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay_capture::{Capture, Cut, Direction, Frame, MOST};
 
-/// Returns the pieces of `reads` with their lengths, and the length of the rest.
+/// Returns the pieces of a stream, which arrives in `reads`, with their lengths. The last number is the length of the
+/// incomplete end.
 fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
     let (mut cut, mut all) = (Cut::default(), Vec::new());
     for read in reads {

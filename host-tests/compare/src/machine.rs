@@ -32,7 +32,7 @@ fn processor() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Clock for the processor time of this thread, which excludes other programs.
+/// Clock that measures the processor time of this thread, which excludes other programs.
 ///
 /// CPU time as Linux accounts it, to some milliseconds; wall-clock time elsewhere.
 pub(crate) struct Clock {

@@ -79,7 +79,7 @@ fn run(options: &Options) -> Result<String, Failure> {
     table::table(&results).map_err(Failure::input)
 }
 
-/// Marks around the table in RESULTS.md.
+/// Comments that mark the begin and the end of the table in RESULTS.md.
 const MARKS: [&str; 2] = [
     "<!-- cargo compare --into examples/RESULTS.md -->\n",
     "<!-- end of that -->\n",
@@ -140,7 +140,8 @@ fn solve(options: &Options) -> Result<Results, Failure> {
     })
 }
 
-/// Solves one problem with every solver, with this crate first. The others' times are compared with its time.
+/// Solves one problem with this crate, and then with every other solver. Those report when they first reach the SIR
+/// of this crate's chain.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
     let mut runs = own::runs(problem)?;
     let level = table::level(problem, &runs)?;

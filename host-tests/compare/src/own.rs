@@ -17,14 +17,15 @@ use crate::machine::Clock;
 use crate::problem::{Choice, Problem};
 use crate::results::{Answer, Found, Mark, Run};
 
-/// Relative tolerance on the achieved SIR: that of `cargo chain`.
+/// Relative tolerance of the SIR that this crate aims for: that of `cargo chain`.
 const TOLERANCE: f64 = 1e-4;
 
-/// Number and duration of timed batches: the processor clock has a resolution of milliseconds.
+/// Number of timed batches; the next constant is their duration. The processor clock has a resolution of
+/// milliseconds.
 const BATCHES: usize = 5;
 const LONG_ENOUGH: Duration = Duration::from_millis(200);
 
-/// Solves `problem` with this crate. Other solvers are compared with the first run.
+/// Solves `problem` with this crate in two ways. Other solvers are compared with the first one.
 pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     let briefed = mission::mission(&problem.scenario()?, problem.relays, TOLERANCE);
     let (mission, _) = briefed.map_err(|error| error.to_string())?;
@@ -58,7 +59,8 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     Ok(runs)
 }
 
-/// Solves the chain from the mission, as the leader does. At most about fifty passes of N hops, and N^2 / 2 hops for positions.
+/// Computes the relays' positions from the mission alone, as the leader predicts them. At most about fifty passes
+/// over N hops, and N^2 / 2 hops for positions.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     let none = || "no target SIR can be met".to_owned();
     let common = |_| mission.config().common;
@@ -68,7 +70,8 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
         .collect()
 }
 
-/// Solves the chain from the mission by the joint method, as every relay does, from all of its starts.
+/// Computes the relays' positions from the mission alone by the joint method, as every relay does. All of its starts
+/// are tried.
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));
@@ -84,7 +87,7 @@ fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
         .ok_or_else(|| format!("the chain ended {:?}", outcome.ending))
 }
 
-/// Returns the median processor time of `work` over several batches, s, and its result.
+/// Returns the median processor time of one run of `work`, s, over several batches, and its result.
 fn timed<T>(work: impl Fn() -> Result<T, String>) -> Result<(f64, T), String> {
     // Not timed: the first run fills the caches.
     let result = work()?;

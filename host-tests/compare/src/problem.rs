@@ -7,11 +7,11 @@ use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_oracle::reference::{Link, Station, path_loss_factor};
 use uav_relay_scenario::{Interference, Scenario};
 
-/// Degrees of freedom of the relays.
+/// Coordinates of the relays that a solver may choose.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Choice {
-    /// Positions along the line, at a fixed altitude.
+    /// Positions along the line from transmitter to receiver, at a fixed altitude.
     Places,
     Altitudes,
     Sides,
@@ -24,7 +24,8 @@ pub(crate) struct Problem {
     pub(crate) relays: u16,
 }
 
-/// True optima (linear SIR) by number of relays, from an independent program, to nine or ten digits.
+/// True optima (linear SIR) for each kind of problem and number of relays, to nine or ten digits. They are of an
+/// independent program.
 const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (
         Choice::Places,
@@ -69,7 +70,7 @@ impl fmt::Display for Problem {
 }
 
 impl Problem {
-    /// Returns the true optimum, linear SIR; `None` for a problem that is not one of [`all`].
+    /// Returns the true optimum of this problem (linear SIR). `None` for a problem that is not one of [`all`].
     pub(crate) fn optimum(self) -> Option<f64> {
         let (_, optima) = OPTIMA.iter().find(|(choice, _)| *choice == self.choice)?;
         let known = optima.iter().find(|(relays, _)| *relays == self.relays)?;
@@ -90,7 +91,7 @@ impl Problem {
         }
     }
 
-    /// Returns the problem for the reference and the other solvers, and the corridor.
+    /// Returns the problem as the reference and the other solvers need it: chain and corridor of relays.
     pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {

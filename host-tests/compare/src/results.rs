@@ -9,7 +9,7 @@ use crate::problem::Problem;
 pub(crate) struct Results {
     pub(crate) machine: Machine,
     pub(crate) versions: Versions,
-    /// Processor time limit of the other solvers per problem, s.
+    /// Processor time limit of the other solvers for each problem, s.
     pub(crate) limit_s: f64,
     pub(crate) problems: Vec<Solved>,
 }
@@ -21,7 +21,7 @@ pub(crate) struct Versions {
     pub(crate) nlopt: String,
 }
 
-/// A problem with the runs of every solver; this crate comes first.
+/// Problem with the runs of every solver; this crate's runs come first.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Solved {
     pub(crate) problem: Problem,
@@ -43,19 +43,19 @@ pub(crate) enum Answer {
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Found {
-    /// Total processor time, s.
+    /// Total processor time of the solver, s.
     pub(crate) time_s: f64,
-    /// Number of evaluated chains; absent for solvers that do not evaluate chains.
+    /// Number of chains that the solver evaluated; `None` for solvers that do not evaluate chains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) evaluations: Option<u64>,
     /// SIR (linear) of the worst hop, as reported by the solver.
     pub(crate) sir: f64,
-    /// x, y and h of every relay, m.
+    /// Position of every relay (x, y and altitude, m), from the transmitter on.
     pub(crate) chain: Chain,
-    /// First intermediate chain within [`crate::score::GOOD`] of the optimum.
+    /// First chain during the run within [`crate::score::GOOD`] of the optimum, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) good: Option<Mark>,
-    /// First intermediate chain as good as this crate's.
+    /// First chain during the run that is as good as this crate's, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) level: Option<Mark>,
     /// True if the time limit ended the solver's run.
@@ -68,5 +68,5 @@ pub(crate) struct Mark {
     pub(crate) chain: Chain,
 }
 
-/// x, y and h of every relay, m, from the transmitter on.
+/// Position of every relay (x, y and altitude, m), from the transmitter on.
 pub(crate) type Chain = Vec<[f64; 3]>;

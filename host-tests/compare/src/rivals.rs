@@ -14,7 +14,8 @@ use crate::score::GOOD;
 
 const PROGRAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/serve.py");
 
-/// Returns the wall-clock limit of an answer. A busy machine grants a share of the processor, and some steps cannot be cut.
+/// Returns the maximum wall-clock time of an answer of Python. A busy machine grants a share of the processor, and
+/// some steps cannot be cut.
 fn patience(limit_s: f64) -> Duration {
     Duration::from_secs_f64(20.0 * limit_s + 60.0)
 }
@@ -57,7 +58,7 @@ pub(crate) struct Rivals {
 }
 
 impl Rivals {
-    /// Starts Python, which solves a small problem with every solver before anything is timed.
+    /// Starts the Python process. It solves a small problem with every solver before anything is timed.
     pub(crate) fn start(python: &Path, limit_s: f64) -> Result<Self, String> {
         let mut child = Command::new(python)
             .args(["-B", "-W", "ignore", PROGRAM])
@@ -103,7 +104,7 @@ impl Rivals {
         &self.versions
     }
 
-    /// Solves `problem` with `solver`, which reports when it first reaches `level`, linear SIR.
+    /// Solves `problem` with `solver`, which reports when it first reaches the SIR `level` (linear).
     pub(crate) fn run(
         &mut self,
         solver: Solver,
@@ -134,7 +135,7 @@ impl Rivals {
         }
     }
 
-    /// Kills the process and returns the last line of its standard error.
+    /// Kills the Python process and returns the last line of its standard error.
     fn last_words(&mut self) -> String {
         _ = self.child.kill();
         let mut text = String::new();

@@ -7,30 +7,31 @@ use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
 use crate::results::{Found, Mark};
 
-/// Relative difference from the optimum at which a chain is good enough. The tolerance of the relays' mission.
+/// Relative difference from the optimum SIR up to which a chain is good enough. It is the tolerance of the relays'
+/// mission.
 pub(crate) const GOOD: f64 = 1e-4;
 
-/// Tolerance of positions, m: sixteen times the rounding of an f32 at a kilometre.
+/// Tolerance of a relay's position in the checks, m: 16 times the rounding of an f32 at a kilometre.
 const SLACK_M: f64 = 1e-3;
 
-/// Relative tolerance of a solver's reported SIR: ten times the rounding of a relay's f32 formulas.
+/// Tolerance of a solver's reported SIR, relative: ten times the rounding of a relay's f32 formulas.
 const SIR_SLACK: f64 = 1e-5;
 
-/// Reason for which a chain does not count.
+/// Reason why a solver's chain does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Refusal {
     Count(usize),
-    /// A relay is not between transmitter and receiver: its index from 1, and x in m.
+    /// Relay that is not between transmitter and receiver: its index from 1, and its x, m.
     Outside(usize, f64),
-    /// A relay exceeds the lateral room: its index from 1, and y in m.
+    /// Relay outside the lateral range: its index from 1, and its y, m.
     Side(usize, f64),
-    /// A relay is not in the band of altitudes: its index from 1, and h in m.
+    /// Relay outside the range of altitudes: its index from 1, and its altitude, m.
     Altitude(usize, f64),
     /// Relay with a smaller x than the relay before it: the relay's index, from 1.
     Order(usize),
-    /// A relay is too close to its predecessor: its index from 1, and their distance in m.
+    /// Relay too close to the relay before it: its index from 1, and their distance, m.
     Separation(usize, f64),
-    /// Wrong report: the SIR reported by the solver, and the SIR computed from its chain.
+    /// Wrong SIR: that reported by the solver, and that computed from its chain.
     Sir(f64, f64),
 }
 
@@ -50,7 +51,8 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// Returns the SIR (linear) of the worst hop of a chain of [x, y, h] in m.
+/// Checks a chain against the constraints, and returns the SIR (linear) of its worst hop. Each relay has [x, y,
+/// altitude] in m.
 pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f64, Refusal> {
     let count = Refusal::Count(chain.len());
     if chain.len() != link.len() {
@@ -97,15 +99,16 @@ fn rounded(chain: &[[f64; 3]]) -> Vec<[f64; 3]> {
 
 pub(crate) struct Score {
     pub(crate) sir: f64,
-    /// SIR of the worst hop with positions rounded to f32 setpoints, linear.
+    /// SIR (linear) of the worst hop if positions are rounded to f32, as a relay's setpoints are.
     pub(crate) flown: f64,
-    /// Time of the first chain that is good enough, s; `None` if there was none.
+    /// Processor time until the first chain that is good enough, s; `None` if there was none.
     pub(crate) good_after_s: Option<f64>,
-    /// Time of the first chain as good as the reference, s.
+    /// Processor time until the first chain as good as this crate's, s; `None` if there was none.
     pub(crate) level_after_s: Option<f64>,
 }
 
-/// Returns the score of a solver's result relative to `level` (linear SIR). The SIR is recomputed; the solver's time is trusted.
+/// Scores a solver's result. `level` is the SIR (linear) of this crate's chain. The solver's SIR is recomputed; its
+/// times are trusted.
 pub(crate) fn score(
     link: &Link,
     room: Corridor,

@@ -113,7 +113,7 @@ fn circumstances(results: &Results) -> String {
     )
 }
 
-/// Returns the SIR (linear) of the problem's first chain, with which the others are compared.
+/// Returns the SIR (linear) of this crate's chain, the first run. Other solvers are compared with it.
 pub(crate) fn level(problem: Problem, runs: &[Run]) -> Result<f64, String> {
     let (link, room) = problem.link()?;
     match runs.first().map(|own| &own.answer) {
@@ -134,7 +134,7 @@ struct Line {
     all: String,
 }
 
-/// A solver, with its line or the reason for having none.
+/// Solver's name, with the cells of its table row or the reason why it has none.
 type Entry<'a> = (&'a str, Result<Line, String>);
 
 fn rows(solved: &Solved) -> Result<String, String> {
@@ -158,7 +158,8 @@ fn rows(solved: &Solved) -> Result<String, String> {
     Ok(text)
 }
 
-/// Returns each solver of one problem with its line, or the reason why it does not count.
+/// Returns the table rows of all solvers of one problem. Each has its cells, or the reason why the solver's chain
+/// does not count.
 fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     let problem = solved.problem;
     let optimum = problem
@@ -199,12 +200,12 @@ fn line(found: &Found, score: &Score, optimum: f64, own_s: f64) -> Line {
     }
 }
 
-/// Replaces characters that a table cell cannot contain.
+/// Replaces characters that a table cell cannot contain by spaces.
 fn plain(why: &str) -> String {
     why.replace(['|', '\n'], " ")
 }
 
-/// Formats the relative difference from the optimum, which is known to nine digits.
+/// Formats a relative difference from the optimum, which is known to nine digits.
 fn short(by: f64) -> String {
     if by.abs() < 1e-8 {
         "less than 1e-8".to_owned()
@@ -213,7 +214,7 @@ fn short(by: f64) -> String {
     }
 }
 
-/// Formats a time in s to two digits, with the ratio to this crate's time.
+/// Formats a time, s, to two digits, and its ratio to this crate's time, `own_s`.
 fn time(time_s: f64, own_s: f64) -> String {
     let (value, unit) = match time_s {
         ..1e-3 => (time_s * 1e6, "µs"),

@@ -12,7 +12,7 @@ use crate::format::{Field, Kind, Layout};
 use crate::range::{Numbers, bounds, has_room, targets};
 use crate::value::{Fields, Value};
 
-/// Numbers of an ordinary mission; half of the draws of these fields are between them.
+/// Fields with their range in an ordinary mission. Half of the draws of such a field are from this range.
 const ORDINARY: [(&str, f64, f64); 13] = [
     ("anchor", 0.25, 4.0),
     ("altitude_m", 15.0, 400.0),
@@ -29,10 +29,10 @@ const ORDINARY: [(&str, f64, f64); 13] = [
     ("interferer_y_m", -2e3, 2e3),
 ];
 
-/// Function that returns a field's value, or `None` for a random value.
+/// Function that chooses a field's value; it returns `None` for a random value.
 pub type Hint<'a> = dyn FnMut(&mut Draw<'_>, &Field) -> Option<Value<'static>> + 'a;
 
-/// Draws from a source of random bytes: a random generator, or the input of a fuzzer.
+/// Generator of random messages, from a source of bytes: a random generator, or the input of a fuzzer.
 pub struct Draw<'s> {
     source: &'s mut dyn FnMut() -> u8,
 }
@@ -63,17 +63,17 @@ impl<'s> Draw<'s> {
         self.byte().is_multiple_of(parts)
     }
 
-    /// Draws a part of one: 0 to 1, both inclusive.
+    /// Draws a number from 0 to 1, both inclusive.
     fn part(&mut self) -> f64 {
         f64::from(u32::from_le_bytes(self.bytes())) / f64::from(u32::MAX)
     }
 
-    /// Draws valid fields of a message.
+    /// Draws fields for a message, all within the permitted ranges.
     pub fn valid<'f>(&mut self, layout: &'f Layout) -> Fields<'f> {
         self.hinted(layout, &mut |_, _| None)
     }
 
-    /// Draws fields of a message, valid where `hint` has no value of its own.
+    /// Draws fields for a message. `hint` may choose a value; all others are within the permitted ranges.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
         together(&layout.name, &mut fields);
@@ -108,7 +108,7 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws a number in the range of its field.
+    /// Draws a number within the permitted range of its field.
     pub fn number<'f>(&mut self, field: &Field, kind: &'f Kind) -> Value<'f> {
         let (zero, least, most) = bounds(&field.range);
         let whole = |draw: &mut Self, top: f64| {
@@ -184,7 +184,7 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws a proposed view: of number 1 or more, by a node of a chain.
+    /// Draws the name of a proposed view (membership of the chain): number 1 or more, by a node of a chain.
     fn view(&mut self) -> u32 {
         let most = 0x003F_FFFF;
         let number = match self.byte() % 8 {
@@ -200,7 +200,7 @@ impl<'s> Draw<'s> {
         number << 10 | node
     }
 
-    /// Draws arbitrary fields: well-formed, each number of any value, in range or not.
+    /// Draws fields with arbitrary numbers, in range or not. Their encoding is well-formed.
     pub fn arbitrary<'f>(&mut self, fields: &'f [Field]) -> Fields<'f> {
         let draw = fields.iter().map(|field| (field, self.any(&field.kind)));
         Fields(draw.collect())
@@ -226,7 +226,7 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws the bytes of a number: any integer, any f32 and f64, NaN and the infinities included.
+    /// Draws any number of this type from random bytes, NaN and the infinities included.
     pub fn any_number<'f>(&mut self, kind: &'f Kind) -> Value<'f> {
         let bytes: [u8; 8] = self.bytes();
         let long = u64::from_le_bytes(bytes);
@@ -249,7 +249,7 @@ impl<'s> Draw<'s> {
     }
 }
 
-/// Makes fields obey the rules between them, which [`range`](crate::range) checks.
+/// Changes fields of a message so that they obey the rules between them. [`range`](crate::range) checks these rules.
 fn together<'f>(message: &str, fields: &mut Fields<'f>) {
     let get = |fields: &Fields<'f>, name: &str| Numbers(fields).get(name);
     let single = |fields: &mut Fields<'f>, name: &str, number: f64| {
@@ -355,7 +355,7 @@ fn list<'f>(fields: &mut Fields<'f>, name: &str, change: impl FnOnce(&mut Vec<Va
     }
 }
 
-/// Puts the views of a proposal in order: agreed on, accepted, its proposal, proposed.
+/// Sorts the views in a Proposal. Their order is: agreed on, accepted, proposal that was accepted, proposed.
 fn proposal(fields: &mut Fields<'_>) {
     let view = |fields: &Fields<'_>, name| Numbers(fields).get(name) as u32;
     let mut order = vec![view(fields, "agreed_view"), view(fields, "proposed_view")];
@@ -384,7 +384,7 @@ fn proposal(fields: &mut Fields<'_>) {
     }
 }
 
-/// Replaces the numbers of an offer by the numbers of one valid mission.
+/// Changes the fields of an Offer so that they form one valid mission.
 fn offer(fields: &mut Fields<'_>) {
     let get = |fields: &Fields<'_>, name| Numbers(fields).get(name);
     let single = |fields: &mut Fields<'_>, name: &str, number: f64| {

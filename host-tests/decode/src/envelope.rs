@@ -3,8 +3,8 @@
 use uav_relay::CRC_32C;
 use uav_relay::wire::frame::Header;
 
-/// Returns a frame before the tag and the CRC. Bits of an address above its 12 go on the wire as they are; `flags` is the top
-/// nibble of the second word.
+/// Returns the header and body of a frame, without tag and CRC. Bits of an address above its 12 go on the wire as
+/// they are; `flags` is the top nibble of the second word.
 pub fn before(header: Header, flags: u16, body: &[u8]) -> Vec<u8> {
     let first = 0x1000 | header.sender;
     let mut plain = first.to_le_bytes().to_vec();
@@ -15,26 +15,26 @@ pub fn before(header: Header, flags: u16, body: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// Appends the CRC.
+/// Returns the frame `plain` with its CRC appended.
 pub fn sealed(mut plain: Vec<u8>) -> Vec<u8> {
     plain.extend(CRC_32C.checksum(&plain).to_le_bytes());
     plain
 }
 
-/// Returns a frame without a tag, before COBS.
+/// Returns a frame with its CRC, but without an authentication tag and COBS.
 pub fn unsigned(header: Header, body: &[u8]) -> Vec<u8> {
     sealed(before(header, 0, body))
 }
 
-/// Encodes `plain` by a published COBS encoder and appends the delimiter.
+/// Returns the frame `plain` as on the wire: encoded by a published COBS encoder, with the delimiter.
 pub fn stuffed(plain: &[u8]) -> Vec<u8> {
     let mut out = cobs::encode_vec(plain);
     out.push(0);
     out
 }
 
-/// Decodes `stuffed`, without its delimiter, by the definition of COBS. Returns the bytes, and true if the last run is
-/// complete.
+/// Decodes `stuffed`, a frame without its delimiter, by the definition of COBS. Returns the bytes, and true if the
+/// last run is complete.
 ///
 /// A published decoder would not do, because a truncated stream is checked up to the cut, too.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {

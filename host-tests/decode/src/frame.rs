@@ -12,26 +12,26 @@ use crate::refusal::Refusal;
 use crate::value::Fields;
 use crate::walk::walk;
 
-/// A frame, decoded as far as possible.
+/// Frame, decoded as far as possible.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame<'f> {
-    /// Length on the wire, bytes.
+    /// Length of the frame on the wire, bytes.
     pub len: usize,
-    /// Header; `None` unless version and CRC are right.
+    /// Header of the frame; `None` unless version and CRC are right.
     pub header: Option<Header>,
-    /// Name of the message, or `Handshake`.
+    /// Name of the frame's message, or `Handshake`; `None` if unknown.
     pub name: Option<&'f str>,
-    /// True for a handshake.
+    /// True if the frame is a handshake.
     pub handshake: bool,
     /// Decoded fields of the body, up to the first field that cannot be decoded.
     pub fields: Fields<'f>,
-    /// Signed part of the frame (header and body) and its tag; `None` for a frame without a tag.
+    /// Signed part of the frame (header and body), and its authentication tag. `None` for a frame without a tag.
     pub tag: Option<(Vec<u8>, [u8; TAG])>,
-    /// Reason for rejection, if any.
+    /// Reason why a receiver rejects the frame, if it does.
     pub refusal: Option<Refusal>,
 }
 
-/// Decodes a frame. `wire` are its bytes with the final delimiter, or the first bytes of a frame of `len`.
+/// Decodes a frame. `wire` are its bytes with the final delimiter, or the first bytes of a frame of `len` bytes.
 ///
 /// The library decides whether it is rejected; the tables provide its fields and the reason.
 pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {

@@ -7,21 +7,21 @@ use uav_relay::Key;
 use crate::frame::Frame;
 use crate::value::Value;
 
-/// Result of verifying a tag.
+/// Result of verifying the authentication tag of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TagCheck {
-    /// The tag is right.
+    /// Tag of the frame is right.
     Right,
-    /// The tag is wrong.
+    /// Tag of the frame is wrong.
     Wrong,
-    /// The key is not known.
+    /// Tag not checked: the network key is not known.
     NoKey,
-    /// The handshake of the two nodes was not captured.
+    /// Tag not checked: the handshake of the two nodes was not captured.
     NoHandshake,
 }
 
 impl TagCheck {
-    /// Returns the result as text.
+    /// Returns the result as a text for people.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Right => "tag right",
@@ -42,13 +42,13 @@ impl TagCheck {
     }
 }
 
-/// Number of latest nonces per direction that are tried. Frames before a new handshake may still be in flight.
+/// Number of a node's latest nonces that are tried. Frames before a new handshake may still be in flight.
 const TRIED: usize = 4;
 
-/// Network, sender and destination.
+/// Network number, sender and destination of frames.
 type Pair = (u16, u16, u16);
 
-/// Nonces of all captured handshakes.
+/// Verifier of authentication tags, with the nonces of all captured handshakes.
 #[derive(Debug, Default)]
 pub struct Members {
     key: Option<Key>,
@@ -56,7 +56,7 @@ pub struct Members {
 }
 
 impl Members {
-    /// Creates an empty table, for a network with this key, if known.
+    /// Creates a verifier without nonces, for a network with this key, if it is known.
     pub fn new(key: Option<[u8; 32]>) -> Self {
         Self {
             key: key.map(Key::new),
@@ -64,12 +64,12 @@ impl Members {
         }
     }
 
-    /// Returns true if the key is known.
+    /// Returns true if the network key is known.
     pub const fn has_key(&self) -> bool {
         self.key.is_some()
     }
 
-    /// Verifies the tag of `frame`; `None` if it has none. Stores the nonces of valid handshakes.
+    /// Verifies the authentication tag of `frame`; `None` if it has none. Stores the nonces of valid handshakes.
     pub fn check(&mut self, frame: &Frame<'_>) -> Option<TagCheck> {
         let (signed, tag) = frame.tag.as_ref()?;
         let Some(key) = &self.key else {

@@ -9,7 +9,7 @@
 use crate::format::{Field, Layout};
 use crate::value::{Fields, Value};
 
-/// Returns the name of the first field of a message that is out of range.
+/// Returns the name of the first field of a message that is out of range; `None` if all are in range.
 pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
     let alone = fields.0.iter();
     let mut alone = alone.filter(|(field, value)| !is_within(field, value));
@@ -17,7 +17,7 @@ pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
     wrong.or_else(|| together(&layout.name, &Numbers(fields)))
 }
 
-/// Returns true if the value is in the first part of the field's range, up to a semicolon.
+/// Returns true if the value is within the field's range. Rules behind a semicolon, between fields, are not checked.
 fn is_within(field: &Field, value: &Value<'_>) -> bool {
     let all = |values: &[Value<'_>]| values.iter().all(|value| is_within(field, value));
     match value {
@@ -83,7 +83,7 @@ fn is_view(range: &str, view: u32) -> bool {
     }
 }
 
-/// Numbers of a body by field name; NaN for a name without a number.
+/// Access to the numbers of a message body by field name; NaN for a name without a number.
 pub(crate) struct Numbers<'a, 'f>(pub(crate) &'a Fields<'f>);
 
 impl<'f> Numbers<'_, 'f> {
@@ -98,7 +98,7 @@ impl<'f> Numbers<'_, 'f> {
         }
     }
 
-    /// Returns true for an integer 0 or an f32 whose bits are all 0.
+    /// Returns true if the named number is an integer 0 or an f32 whose bits are all 0.
     fn is_zero(&self, name: &str) -> bool {
         let number = self.get(name);
         number == 0.0 && number.is_sign_positive()
@@ -119,7 +119,7 @@ impl<'f> Numbers<'_, 'f> {
     }
 }
 
-/// Checks the rules between fields, which the tables give after a semicolon.
+/// Checks the rules between the fields of a message. Returns the name of the first field that breaks one.
 fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
     let get = |name| numbers.get(name);
     let zero = |name| numbers.is_zero(name);
@@ -222,7 +222,7 @@ fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
     rules.find(|(_, holds)| !holds).map(|(name, _)| *name)
 }
 
-/// Returns true if the relays of an offer have room between Tx and Rx.
+/// Returns true if the relays of an Offer, at their minimum separation, fit between Tx and Rx.
 pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     let single = |number: f64| f64::from(number as f32);
     let distance = offer.get("distance_m");
@@ -230,7 +230,8 @@ pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     single((offer.get("relays") - 1.0) * step) <= distance
 }
 
-/// Returns the targets of a ladder. Each f64 result is rounded to f32, as a relay's f32 operation does.
+/// Returns the target SIRs of a sweep's ladder (linear), in ascending order. Each f64 result is rounded to f32, as a
+/// relay's f32 operation does.
 pub fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];

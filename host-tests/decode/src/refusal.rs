@@ -5,23 +5,23 @@ use std::fmt;
 /// Reason for rejecting a frame: the first one that a receiver would find.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Refusal {
-    /// The stream ends before the delimiter.
+    /// Stream that ends before the frame's delimiter.
     Unended,
-    /// The frame exceeds the largest length; with its length on the wire.
+    /// Frame that exceeds the largest length. The number is its length on the wire, bytes.
     Oversized(usize),
-    /// The delimiter is inside a COBS run.
+    /// Delimiter inside a COBS run: the frame was cut short.
     Truncated,
-    /// The frame is too short for header and CRC, or the tag; with its length without COBS.
+    /// Frame too short for header and CRC, or for the tag. The number is its length without COBS, bytes.
     Short(usize),
-    /// The CRC is wrong: the received and the computed one.
+    /// Wrong CRC: the received and the computed one.
     Crc(u32, u32),
-    /// The version of the format or its flags are unknown.
+    /// Unknown version of the frame format, or unknown flags: both values.
     Version(u8, u8),
-    /// The tag of the message is unknown.
+    /// Unknown tag, the byte that tells the kind of message.
     UnknownTag(u8),
-    /// The body is not the canonical encoding of any message.
+    /// Body that is not the canonical encoding of any message; with the fault.
     Malformed(String),
-    /// A number is out of range.
+    /// Number in the message that is out of range.
     Range,
 }
 

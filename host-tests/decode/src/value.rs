@@ -7,36 +7,36 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::format::Field;
 
-/// Value of a field.
+/// Value of a message field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Value<'f> {
-    /// An unsigned integer.
+    /// Unsigned integer of any size.
     Unsigned(u64),
-    /// A signed integer.
+    /// Signed integer.
     Signed(i64),
-    /// A digest.
+    /// Digest of a mission, view or line.
     Digest(u16),
-    /// A view: its number and its proposer.
+    /// Name of a view (membership of the chain): its number and its proposer.
     View(u32),
-    /// An f32.
+    /// Floating-point number, f32.
     Single(f32),
-    /// An f64.
+    /// Floating-point number, f64.
     Double(f64),
-    /// A Boolean.
+    /// Boolean value.
     Bool(bool),
-    /// Flags that are set, and the names of all.
+    /// Flags: the bits, and the names of all flags.
     Flags(u8, &'f [String]),
-    /// Value with a name in the tables: the value, and the name.
+    /// Enumeration: the value, and its name if it has one.
     Word(u8, Option<&'f str>),
-    /// An empty Option.
+    /// Absent optional value.
     None,
-    /// A list or array.
+    /// List or array of values.
     List(Vec<Value<'f>>),
-    /// A group of fields.
+    /// Group of fields with their values.
     Group(Fields<'f>),
 }
 
-/// Fields with their values, in order.
+/// Fields of a message with their values, in order.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Fields<'f>(pub Vec<(&'f Field, Value<'f>)>);
 
@@ -56,7 +56,7 @@ impl<'f> Fields<'f> {
     }
 }
 
-/// Values as they are on the wire: a digest or flags are a number.
+/// Deserializes a value as it is on the wire: a digest or flags are a number.
 impl<'de> Deserializer<'de> for &Value<'_> {
     type Error = de::value::Error;
 
@@ -112,7 +112,7 @@ impl<'a, 'de> IntoDeserializer<'de> for &'a Fields<'_> {
     }
 }
 
-/// Returns the names of the bits that are set; `bit 7` for one without a name.
+/// Returns the names of the flags that are set in `bits`; `bit 7` for a flag without a name.
 pub(crate) fn set(bits: u8, names: &[String]) -> Vec<String> {
     let set = (0..8).filter(|bit| bits >> bit & 1 == 1);
     let name = |bit: usize| match names.get(bit) {

@@ -8,37 +8,37 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 
 const FILE: &str = include_str!("../../tests/data/vectors.json");
 
-/// Content of the file.
+/// Test vectors: the content of their file.
 #[derive(Deserialize, Debug)]
 pub struct Vectors {
-    /// Valid frames.
+    /// Valid frames without a tag.
     pub frames: Vec<Frame>,
-    /// Handshakes and a message with tags, in order.
+    /// Handshakes and a message with authentication tags, in the order of sending.
     pub signed: Vec<Signed>,
-    /// Ladders.
+    /// Ladders of target SIRs.
     pub ladders: Vec<Ladder>,
-    /// Streams that a receiver does not accept, or whose message has no effect.
+    /// Byte streams that a receiver rejects, or whose message has no effect.
     pub rejected: Vec<Rejected>,
 }
 
-/// A valid frame.
+/// Test vector: a valid frame.
 #[derive(Deserialize, Debug)]
 pub struct Frame {
-    /// Name of the vector.
+    /// Name of the test vector.
     pub name: String,
-    /// Addresses and counter.
+    /// Header of the frame: addresses and counter.
     pub header: Header,
     /// Name of the message.
     pub message: String,
-    /// Fields of the message, as of `cargo decode --json`.
+    /// Fields of the message, as `cargo decode --json` prints them.
     pub fields: serde_json::Value,
-    /// Body.
+    /// Bytes of the message body.
     #[serde(deserialize_with = "hex")]
     pub body: Vec<u8>,
-    /// Frame before COBS.
+    /// Bytes of the frame before COBS.
     #[serde(deserialize_with = "hex")]
     pub plain: Vec<u8>,
-    /// Frame on the wire.
+    /// Bytes of the frame on the wire.
     #[serde(deserialize_with = "hex")]
     pub wire: Vec<u8>,
 }
@@ -46,58 +46,58 @@ pub struct Frame {
 /// Header of a valid frame.
 #[derive(Clone, Copy, Deserialize, Debug)]
 pub struct Header {
-    /// Network.
+    /// Network number.
     pub network: u16,
     /// Node number of the sender.
     pub sender: u16,
     /// Node number of the destination.
     pub destination: u16,
-    /// Counter.
+    /// Counter of the sender's frames.
     pub counter: u32,
 }
 
-/// A frame with a tag.
+/// Test vector: a frame with an authentication tag.
 #[derive(Deserialize, Debug)]
 pub struct Signed {
-    /// Name of the vector.
+    /// Name of the test vector.
     pub name: String,
-    /// Nonces of the sender and of the receiver under which it is signed, in hexadecimal.
+    /// Nonces of sender and receiver that the tag covers, in hexadecimal.
     pub nonces: [String; 2],
-    /// Frame before COBS.
+    /// Bytes of the frame before COBS.
     #[serde(deserialize_with = "hex")]
     pub plain: Vec<u8>,
-    /// Frame on the wire.
+    /// Bytes of the frame on the wire.
     #[serde(deserialize_with = "hex")]
     pub wire: Vec<u8>,
 }
 
-/// A ladder.
+/// Test vector: a ladder, the target SIRs of a sweep in a compact form.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Bits of the anchor in hexadecimal.
+    /// Anchor of the ladder, the bits of its f32 in hexadecimal.
     pub anchor: String,
-    /// Gap code.
+    /// Gap code of the ladder.
     pub gap: u8,
-    /// Growth code.
+    /// Growth code of the ladder.
     pub growth: u8,
-    /// Bits of the targets in hexadecimal.
+    /// Target SIRs of the ladder, the bits of their f32 in hexadecimal.
     pub targets: Vec<String>,
 }
 
-/// A stream that is not accepted.
+/// Test vector: a byte stream that is rejected or has no effect.
 #[derive(Deserialize, Debug)]
 pub struct Rejected {
-    /// Reason.
+    /// Reason why the stream is rejected.
     pub what: String,
-    /// Counters that it increments.
+    /// Names of the counters that the stream increments at a receiver.
     pub counted: Vec<String>,
-    /// Stream with its delimiter.
+    /// Bytes of the stream, with the delimiter.
     #[serde(deserialize_with = "hex")]
     pub wire: Vec<u8>,
 }
 
 impl Vectors {
-    /// Reads the file.
+    /// Reads the test vectors from their built-in file.
     ///
     /// # Errors
     /// The file is not as described; a test ensures that it is.
@@ -106,7 +106,7 @@ impl Vectors {
     }
 }
 
-/// Decodes hexadecimal digits; `None` for anything else.
+/// Decodes hexadecimal digits to bytes; `None` for other characters.
 pub fn bytes(digits: &str) -> Option<Vec<u8>> {
     let pairs = (0..digits.len()).step_by(2);
     pairs

@@ -18,7 +18,7 @@ impl Rest<'_> {
         self.take::<1>().map(|[byte]| byte)
     }
 
-    /// Reads a postcard varint in its canonical form.
+    /// Reads a variable-length integer of the postcard format; an error unless it has its shortest form.
     fn varint(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
@@ -43,7 +43,7 @@ impl Rest<'_> {
     }
 }
 
-/// Decodes a message from its tag on.
+/// Decodes the body of a message, by the tables alone. Returns the message's layout and the values of its fields.
 ///
 /// # Errors
 /// The reason for which a receiver rejects it, by the tables alone.
@@ -60,7 +60,7 @@ pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Field
     }
 }
 
-/// Decodes the fields of `body`; also returns an error if bytes are missing or left over.
+/// Decodes these fields from `body`. Also returns an error text if bytes are missing or left over.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();

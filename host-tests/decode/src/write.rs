@@ -5,7 +5,8 @@ use serde_json::Value as Json;
 use crate::format::{Field, Format, Kind};
 use crate::value::{Fields, Value};
 
-/// Encodes the message `name`. `fields` are as `cargo decode --json` prints them; digests and flags may also be numbers.
+/// Encodes the body of the message `name`. `fields` are as `cargo decode --json` prints them; digests and flags may
+/// also be numbers.
 ///
 /// # Errors
 /// Names the field whose value is missing or does not fit its type.
@@ -19,7 +20,7 @@ pub fn write(format: &Format, name: &str, fields: &Json) -> Result<Vec<u8>, Stri
     Ok(body)
 }
 
-/// Appends the bytes of all fields, valid or not.
+/// Appends the bytes of all fields to `body`, whether their values are valid or not.
 pub fn write_fields(fields: &Fields<'_>, body: &mut Vec<u8>) {
     for (field, value) in &fields.0 {
         one(&field.kind, value, body);
@@ -81,7 +82,7 @@ fn read<'f>(fields: &'f [Field], values: &Json) -> Result<Fields<'f>, String> {
     }
 }
 
-/// Returns a value of this kind; `None` if it does not fit.
+/// Converts a JSON value to a field value of type `kind`; `None` if it does not fit.
 fn from_json<'f>(kind: &'f Kind, value: &Json) -> Option<Value<'f>> {
     let byte = || u8::try_from(value.as_u64()?).ok();
     Some(match kind {

@@ -12,30 +12,31 @@ use super::input::Input;
 use super::setting;
 use super::watch::{Sent, Watched};
 
-/// Maximum number of operations in one run: some milliseconds of computing.
+/// Maximum number of fuzzed operations in one run, which take some milliseconds of computing.
 const MOST_OPERATIONS: usize = 256;
 
 const MOST_RELAYS: u8 = 4;
 
-/// Maximum number of frames in transit to one relay; one more displaces the oldest.
+/// Maximum number of frames in transit to one relay. One more displaces the oldest.
 const MOST_UNDER_WAY: usize = 24;
 
-/// Maximum number of rounds of deliveries and wake-ups in one operation.
+/// Maximum number of rounds in one operation. A round delivers a frame to each relay.
 const MOST_ROUNDS: u8 = 128;
 
-/// Rounding error of a position, relative to the distance: one step of its f32.
+/// Rounding error of a position, as a part of the distance from Tx to Rx: one step of its f32.
 const ROUNDING: f64 = 1.3e-7;
 
-/// Reads `data` as a mission, settings of each relay, and operations on the frames between them.
+/// Fuzz target. Reads `data` as a mission, settings of each relay, and operations on the frames between them.
 ///
 /// # Panics
-/// A relay breaks a promise that `watch` checks, two neighbours hold positions of one pass that are too close, or the chain does
-/// not agree after faults have ended.
+/// A relay breaks a promise that `watch` checks, two neighbours hold positions of one pass that are too close, or the
+/// chain does not agree after faults have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }
 
-/// Runs [`chain()`] and returns its relays at the end. `None` if the mission or the settings are refused.
+/// Runs the fuzz target [`chain()`] and returns its relays at the end. `None` if the mission or the settings are
+/// refused.
 ///
 /// # Panics
 /// Those of [`chain()`].
@@ -66,7 +67,7 @@ struct Chain {
     mission: Mission,
     members: Vec<Member>,
     now: Instant,
-    /// Seed of the next start of a relay, never reused.
+    /// Random seed of the relay that starts next; it increases at every start.
     seed: u32,
     version: u16,
 }
@@ -160,7 +161,7 @@ impl Chain {
         }
     }
 
-    /// Reorders: the oldest frame is moved behind all others.
+    /// Moves the oldest frame in transit to relay `at` behind all others.
     fn put_back(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()
@@ -180,7 +181,7 @@ impl Chain {
         }
     }
 
-    /// Delivers the oldest frame in two pieces, the second unless it is lost.
+    /// Delivers the oldest frame to relay `at` in two pieces. The second piece may be lost, as `input` chooses.
     fn cut(&mut self, at: usize, input: &mut Input<'_>) {
         let (place, lost) = (usize::from(input.byte()), input.flag());
         if let Some(frame) = self.take(at) {
@@ -207,7 +208,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Advances the time to the next timeout of a relay.
+    /// Advances the time to the earliest timeout of all relays.
     fn wake(&mut self) {
         let next = self
             .members
@@ -218,7 +219,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Delivers the oldest frame to each relay without faults. If no frame is in transit, first advances the time.
+    /// Delivers to each relay its oldest frame, without faults. If no frame is in transit, advances the time first.
     fn round(&mut self) {
         if self.members.iter().all(|member| member.arriving.is_empty()) {
             self.wake();
@@ -240,7 +241,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Restarts a relay. The frames in transit to it stay.
+    /// Restarts relay `at`. The frames in transit to it stay.
     fn reboot(&mut self, at: usize) {
         let Some(settings) = self.members.get(at).map(|member| member.settings) else {
             return;
@@ -291,7 +292,7 @@ impl Chain {
         }
     }
 
-    /// Collects the frames of relay `at`, and checks the relay's distance from its neighbours.
+    /// Puts the frames that relay `at` sends in transit, and checks its distance from its neighbours.
     fn settle(&mut self, at: usize) {
         let now = self.now;
         let Some(member) = self.members.get_mut(at) else {
@@ -306,7 +307,7 @@ impl Chain {
         self.look_at_separation(at + 1);
     }
 
-    /// Puts a frame in transit: to one neighbour, or on a shared channel to all relays.
+    /// Puts a frame of relay `from` in transit: to one neighbour, or on a shared channel to all relays.
     fn send(&mut self, from: usize, frame: &Sent) {
         for (at, member) in self.members.iter_mut().enumerate() {
             let port = match frame.port {
@@ -337,7 +338,8 @@ impl Chain {
         }
     }
 
-    /// Checks the separation between relay `at` (from 0) and the relay before it, if one pass placed both.
+    /// Checks the separation of relay `at` (from 0) from the relay before it, if one pass placed both. A pass is a
+    /// round of messages along the chain.
     fn look_at_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

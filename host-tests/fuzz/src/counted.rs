@@ -2,7 +2,7 @@
 
 use uav_relay::Stats;
 
-/// Returns the number of frames with a valid CRC; each is in exactly one of these counters.
+/// Returns the number of received frames with a valid CRC. Each such frame is in exactly one of the summed counters.
 ///
 /// Unsigned frames count only with a `key`: without one they are messages, counted as received.
 pub const fn intact(stats: &Stats, key: bool) -> u32 {
@@ -19,7 +19,7 @@ pub const fn intact(stats: &Stats, key: bool) -> u32 {
         + stats.replayed
 }
 
-/// Returns every counter with its name, in the order of [`Stats`].
+/// Returns every counter of a relay with its name, in the order of [`Stats`].
 pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
     // Without a rest, so that the compiler asks for a new counter here.
     let Stats {
@@ -74,7 +74,7 @@ pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
     ]
 }
 
-/// Returns every counter, in the order of [`Stats`].
+/// Returns every counter of a relay, in the order of [`Stats`].
 pub fn all(stats: &Stats) -> [u32; 23] {
     named(stats).map(|(_, count)| count)
 }

@@ -8,13 +8,13 @@ use uav_relay_decode::envelope::unstuffed;
 use super::input::Input;
 use super::setting;
 
-/// Reads `data` as two lengths and a stream.
+/// Fuzz target. Reads `data` as two lengths and a byte stream.
 ///
 /// A deframer gets the stream byte by byte, one relay gets it whole, and another relay in pieces of those lengths.
 ///
 /// # Panics
-/// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it got (each
-/// push stores at most one, so that its work is bounded); or the relays differ.
+/// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it
+/// got (each push stores at most one, so that its work is bounded); or the relays differ.
 pub fn deframe(data: &[u8]) {
     let mut input = Input::new(data);
     let lengths = input.word();
@@ -51,7 +51,8 @@ fn frames_by_definition(stream: &[u8]) {
     }
 }
 
-/// Compares the stream in one piece with pieces of two alternating lengths, 1 to 256 bytes each.
+/// Checks that a relay handles a stream in one piece and in many pieces alike. The pieces have two alternating
+/// lengths, 1 to 256 bytes each.
 fn cut(stream: &[u8], lengths: u16) {
     let Some(mut whole) = relay() else { return };
     let mut pieces = whole.clone();

@@ -21,14 +21,14 @@ use super::watch::NETWORK;
 
 const CHECK: usize = 4;
 
-/// Method byte of a chain with signed frames.
+/// Byte of fuzzer input that selects signed frames in `setting::of_chain`.
 const SIGNS: u8 = 8;
 
-/// Reads `data` as the header and body of a frame, adds the CRC and COBS, and decodes it.
+/// Fuzz target. Reads `data` as the header and body of a frame, adds the CRC and COBS, and decodes it.
 ///
 /// # Panics
-/// The frame changes on its way, a flipped bit is not detected, a message has two encodings, or a body is not accepted or rejected
-/// as the tables of `FORMAT.md` say.
+/// The frame changes on its way, a flipped bit is not detected, a message has two encodings, or a body is not
+/// accepted or rejected as the tables of `FORMAT.md` say.
 pub fn frame(data: &[u8]) {
     let plain = sealed(data.to_vec());
     let wire = stuffed(&plain);
@@ -62,7 +62,7 @@ pub fn frame(data: &[u8]) {
     assert_eq!(written.iter().position(|&byte| byte == 0), Some(len - 1));
 }
 
-/// Checks that the crate splits an intact frame into the parts that the format defines.
+/// Checks that `frame::open` splits an intact frame into the parts that the format defines.
 fn taken_apart(plain: &[u8]) {
     let opened = frame::open(plain);
     let (Some(checked), Some(&[_, first, _, second])) = (
@@ -91,8 +91,8 @@ fn taken_apart(plain: &[u8]) {
     assert_eq!(opened.handshake, flags == 3);
 }
 
-/// Checks a relay that requires tags. The body with valid addresses and tag is accepted once, and rejected as forged with a
-/// flipped bit.
+/// Checks a relay that requires authentication tags. The body with valid addresses and tag is accepted once, and
+/// rejected as forged with a flipped bit.
 fn signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
     let Some(Met {
@@ -148,7 +148,7 @@ fn signed(plain: &[u8]) {
     assert_eq!(after, expected);
 }
 
-/// Relay 2 of 3 that requires tags, and its upstream neighbour, after their handshake.
+/// Relay 2 of 3, which requires authentication tags, and its upstream neighbour, after their handshake.
 #[derive(Clone)]
 struct Met {
     relay: Relay,
@@ -200,7 +200,7 @@ fn comes_through(plain: &[u8], wire: &[u8]) {
     }
 }
 
-/// Checks that a flipped bit, chosen by the CRC, is detected.
+/// Checks that a flipped bit in a frame is detected. The CRC chooses the bit.
 fn flipped(plain: &[u8]) {
     let mut plain = plain.to_vec();
     let bits = plain.len() * 8;
@@ -218,7 +218,7 @@ fn flipped(plain: &[u8]) {
     assert_eq!(frame::decode(&plain), Err(refusal));
 }
 
-/// Checks that a body is accepted or rejected as the tables of `FORMAT.md` say.
+/// Checks that a message body is accepted or rejected as the tables of `FORMAT.md` say.
 fn judged(body: &[u8]) {
     static FORMAT: LazyLock<Option<Format>> = LazyLock::new(|| Format::load().ok());
     let Some(format) = &*FORMAT else {

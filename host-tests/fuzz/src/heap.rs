@@ -10,7 +10,7 @@ thread_local! {
     static ASKED: Cell<u64> = const { Cell::new(0) };
 }
 
-/// System allocator that counts allocations.
+/// System allocator that counts the allocations of each thread.
 #[derive(Clone, Copy, Debug)]
 pub struct Counting;
 
@@ -45,7 +45,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Returns the number of allocations of this thread.
+/// Returns the number of allocations by this thread so far.
 pub fn asked() -> u64 {
     ASKED.get()
 }

@@ -4,14 +4,14 @@
 
 use uav_relay_scenario::number::narrow;
 
-/// Bytes not read yet.
+/// Fuzzer's bytes that have not been read yet.
 #[derive(Clone, Debug)]
 pub struct Input<'a> {
     rest: &'a [u8],
 }
 
 impl<'a> Input<'a> {
-    /// Creates the input of `bytes`.
+    /// Creates the input from the fuzzer's `bytes`.
     pub const fn new(bytes: &'a [u8]) -> Self {
         Self { rest: bytes }
     }
@@ -26,7 +26,7 @@ impl<'a> Input<'a> {
         self.rest
     }
 
-    /// Reads one byte.
+    /// Reads one byte; returns 0 at the end of the input.
     pub const fn byte(&mut self) -> u8 {
         match self.rest {
             [first, rest @ ..] => {
@@ -37,12 +37,12 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Reads two bytes.
+    /// Reads two bytes as a little-endian number.
     pub const fn word(&mut self) -> u16 {
         u16::from_le_bytes([self.byte(), self.byte()])
     }
 
-    /// Reads four bytes.
+    /// Reads four bytes as a little-endian number.
     pub const fn long(&mut self) -> u32 {
         u32::from_le_bytes([self.byte(), self.byte(), self.byte(), self.byte()])
     }
@@ -57,7 +57,7 @@ impl<'a> Input<'a> {
         self.byte() % count.max(1)
     }
 
-    /// Reads a piece of up to 255 bytes; its first byte is the length.
+    /// Reads a byte as a length, and returns that many of the following bytes.
     pub fn piece(&mut self) -> &'a [u8] {
         let len = usize::from(self.byte()).min(self.rest.len());
         let (piece, rest) = self.rest.split_at_checked(len).unwrap_or((self.rest, &[]));

@@ -38,7 +38,7 @@ pub use mavlink::mavlink;
 pub use relay::relay;
 pub use scenario::scenario;
 
-/// Target: its name, also that of its corpus, and its function.
+/// Fuzz target: its name, which is also that of its corpus, and its function.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Targets of all fuzz harnesses.

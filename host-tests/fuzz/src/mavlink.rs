@@ -13,12 +13,12 @@ use super::input::Input;
 use reference::Reference;
 use wire::{Placed, stream};
 
-/// Reads `data` as a stream of frames, intact or damaged, or as operations on an autopilot link.
+/// Fuzz target. Reads `data` as a stream of MAVLink frames, intact or damaged, or as operations on an autopilot link.
 ///
 /// # Panics
 /// - The parser deviates from the definition of frames, misses an intact one, or exceeds its bound on work.
 /// - The link sends numbers that are not finite, targets far from the line or not of its state, depends on how its bytes are
-///   split, allocates, or requests needless calls.
+/// split, allocates, or requests needless calls.
 /// - A link with a key accepts unsigned or repeated frames, rejects others, or does not sign its frames with increasing stamps.
 pub fn mavlink(data: &[u8]) {
     let mut input = Input::new(data);

@@ -12,29 +12,29 @@ use uav_relay_decode::envelope::{before, sealed};
 
 use super::setting::KEY;
 
-/// Flag of a frame with a tag.
+/// Header flag of a frame with an authentication tag.
 const SIGNED: u16 = 1;
 
-/// Flag of a handshake.
+/// Header flag of a handshake.
 const HANDSHAKE: u16 = 2;
 
 const NONCE: usize = 8;
 
-/// Length of a handshake's body, bytes.
+/// Length of a handshake's body, bytes: two nonces and a flag.
 const TOLD: usize = 2 * NONCE + 1;
 
-/// Neighbour of a relay.
+/// Simulated neighbour that signs frames to the tested relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Member {
     key: [u8; 32],
-    /// Own nonce, larger after every start.
+    /// Nonce of this neighbour, larger after every start.
     own: Vec<u8>,
     relay: Vec<u8>,
     counter: u32,
 }
 
 impl Member {
-    /// Creates a neighbour that has received the relay's handshake, if `frame` is one.
+    /// Creates a neighbour that has received the tested relay's handshake, if `frame` is one.
     pub fn greeted(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;
@@ -62,7 +62,7 @@ impl Member {
         }
     }
 
-    /// Returns this neighbour after a restart.
+    /// Returns this neighbour as after a restart: with a larger nonce.
     pub fn restarted(&self) -> Self {
         Self {
             own: raised(&self.own),
@@ -71,7 +71,7 @@ impl Member {
         }
     }
 
-    /// Returns this neighbour with another key.
+    /// Returns this neighbour with another signing key.
     pub fn stranger(&self) -> Self {
         let mut other = self.clone();
         for byte in &mut other.key {
@@ -80,13 +80,13 @@ impl Member {
         other
     }
 
-    /// Returns the member's next signed frame before COBS: header, body, tag and CRC.
+    /// Returns this neighbour's next signed frame before COBS: header, body, tag and CRC.
     pub fn signed(&mut self, header: Header, body: &[u8]) -> Vec<u8> {
         let relay = self.relay.clone();
         self.frame(header, SIGNED, &relay, body)
     }
 
-    /// Returns the member's handshake before COBS. The handshake requests an answer if the relay's nonce is unknown.
+    /// Returns this neighbour's handshake before COBS. It requests an answer if the tested relay's nonce is unknown.
     pub fn handshake(&mut self, header: Header) -> Vec<u8> {
         let asks = u8::from(self.relay.iter().all(|&byte| byte == 0));
         let body = [&*self.own, &*self.relay, &[asks]].concat();
@@ -103,7 +103,8 @@ impl Member {
         sealed(plain)
     }
 
-    /// Returns the tag: keyed BLAKE2s over both nonces and the signed bytes, cut to eight bytes.
+    /// Returns the authentication tag of a frame: keyed BLAKE2s over both nonces and the signed bytes. It is cut to
+    /// eight bytes.
     fn tag(&self, to: &[u8], signed: &[u8]) -> [u8; 8] {
         let Ok(mut mac) = Blake2sMac::<U8>::new_from_slice(&self.key) else {
             unreachable!("a key of 32 bytes");
@@ -122,7 +123,7 @@ fn handshake_in(plain: &[u8]) -> Option<Vec<u8>> {
     handshake.then(|| body.to_vec())
 }
 
-/// Returns a little-endian number plus one.
+/// Returns a little-endian number of any length, plus one.
 fn raised(number: &[u8]) -> Vec<u8> {
     let mut carry = true;
     let up = number.iter().map(|&byte| {

@@ -13,7 +13,7 @@ use parts::Body;
 
 pub use parts::Known;
 
-/// Builds a body of any of the twenty kinds, or of none.
+/// Builds a message body of one of the kinds 0 to 19 with fuzzed fields, or arbitrary bytes.
 pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
     let tag = match input.below(16) {
         15 => 15 + input.below(6),
@@ -52,7 +52,7 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
     body.bytes
 }
 
-/// Optional part of a sweep between the sender's profile and its reaches.
+/// Optional field of a sweep message, between the sender's power and the list of reaches.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,
@@ -103,7 +103,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends profiles of relays that have their own, mostly with rising indices.
+    /// Appends the profiles of up to eight relays, as a Gather has them, mostly with rising relay indices.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));
@@ -152,7 +152,7 @@ impl Body<'_, '_> {
         self.small(0, 31);
     }
 
-    /// Appends a mission, a proposal and a position in the view.
+    /// Appends the first fields of a Proposal or Decision: a mission, a view and a relay's index in it.
     fn call(&mut self) {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);

@@ -15,16 +15,16 @@ use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
 
-/// Maximum number of operations in one run: some milliseconds of computing.
+/// Maximum number of fuzzed operations in one run, which take some milliseconds of computing.
 const MOST_OPERATIONS: usize = 256;
 
-/// Maximum number of relays of a chain; one mission in sixteen has a thousand.
+/// Maximum number of relays in the fuzzed mission; but one mission in sixteen has a thousand.
 const MOST_RELAYS: u8 = 5;
 
-/// Maximum number of wake-ups in one operation.
+/// Maximum number of timeouts that one operation handles.
 const MOST_WAKES: u8 = 64;
 
-/// Reads `data` as a mission, a relay, its settings, and operations on it.
+/// Fuzz target. Reads `data` as a mission, a relay, its settings, and operations on it.
 ///
 /// # Panics
 /// The relay breaks a promise that `watch` checks, or an intact frame is not counted exactly once.
@@ -32,7 +32,8 @@ pub fn relay(data: &[u8]) {
     _ = flown(data);
 }
 
-/// Runs [`relay()`] and returns the relay at the end. `None` if the mission or the settings are refused.
+/// Runs the fuzz target [`relay()`] and returns the relay at the end. `None` if the mission or the settings are
+/// refused.
 ///
 /// # Panics
 /// Those of [`relay()`].
@@ -56,17 +57,17 @@ struct Bench {
     mission: Mission,
     wiring: Wiring,
     now: Instant,
-    /// Neighbours upstream and downstream, if the relay requires tags.
+    /// Simulated neighbours upstream and downstream, if the relay requires authentication tags.
     members: [Option<Member>; 2],
 }
 
-/// Frame on the wire, and its expected counter.
+/// Bytes of a frame for the relay, and the counter that must count the frame.
 struct Said {
     wire: Vec<u8>,
     fate: Fate,
 }
 
-/// Expected counter of a frame.
+/// Counter of the relay that must count a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Fate {
     Counted,
@@ -103,7 +104,7 @@ impl Bench {
         })
     }
 
-    /// Exchanges handshakes between the neighbours and a relay that requires tags.
+    /// Exchanges handshakes between the relay and its neighbours, if it requires authentication tags.
     fn greet(&mut self) {
         let (sent, _) = self.watched.settle(self.now);
         for side in [0, 1] {
@@ -117,7 +118,8 @@ impl Bench {
         }
     }
 
-    /// Returns Tx or Rx as the neighbour at `side` after a handshake. The relay does not greet the ground first.
+    /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake. The relay does not
+    /// send its handshake to Tx or Rx before it has received theirs.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();
@@ -132,7 +134,7 @@ impl Bench {
         heard.map(|member| member.restarted())
     }
 
-    /// Makes `member` the neighbour at `side`, and delivers its handshake.
+    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream), and delivers its handshake.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -175,7 +177,8 @@ impl Bench {
         }
     }
 
-    /// Delivers arbitrary bytes. A recorded handshake among them replaces nonces, so the fuzzer then forgets its neighbours.
+    /// Delivers arbitrary bytes. A recorded handshake among them changes the relay's nonces, so the fuzzer then
+    /// forgets its simulated neighbours.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
@@ -188,7 +191,7 @@ impl Bench {
         self.now = self.now + span;
     }
 
-    /// Advances the time to the relay's next timeout, `times` times.
+    /// Advances the time to the relay's next timeout and handles it, `times` times.
     fn wake(&mut self, times: u8) {
         for _ in 0..times {
             let Some(next) = self.watched.relay().poll_timeout() else {
@@ -224,7 +227,8 @@ impl Bench {
         self.watched.sample(self.now, sample, count);
     }
 
-    /// Reports a present or past position, now and then that a lost neighbour has landed.
+    /// Reports a present or past position of the drone to the relay. Now and then reports that lost neighbours have
+    /// landed.
     fn position(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         if how >= 0xF0 {
@@ -242,7 +246,7 @@ impl Bench {
         self.watched.position(self.now, at, place);
     }
 
-    /// Delivers a frame with a valid CRC, mostly from a valid sender and port, else from any.
+    /// Delivers a message with a valid CRC, mostly from a valid sender at the right port, else from any.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);
@@ -304,7 +308,8 @@ impl Bench {
         self.watched.relay().upload().map_or(loaded, Upload::id)
     }
 
-    /// Delivers a frame and checks its counter; `fate` is `None` at a port that is not connected.
+    /// Delivers a frame and checks that the relay counts it as `fate` says. `fate` is `None` at a port that is not
+    /// connected.
     fn hear(&mut self, port: Port, wire: &[u8], fate: Option<Fate>) {
         let before = self.watched.relay().clone();
         self.watched.bytes(self.now, port, wire);
@@ -329,7 +334,8 @@ impl Bench {
         assert_eq!(before.poll_timeout(), after.poll_timeout());
     }
 
-    /// Builds the frame of a body, signed if the relay requires tags, or as an attacker would.
+    /// Builds a frame with this body. It is signed if the relay requires authentication tags; now and then it is made
+    /// as an attacker would.
     fn said(&mut self, side: usize, header: Header, body: &[u8], input: &mut Input<'_>) -> Said {
         let Some(Some(member)) = self.members.get_mut(side) else {
             let (wire, fate) = (stuffed(&unsigned(header, body)), Fate::Counted);
@@ -367,14 +373,14 @@ impl Bench {
     }
 }
 
-/// Returns the number of accepted and rejected frames, with or without a key.
+/// Returns the number of frames counted as accepted or rejected. `key` is true if the relay has a signing key.
 fn frames(stats: &Stats, key: bool) -> u64 {
     let broken = [stats.oversized, stats.truncated, stats.crc];
     let broken: u64 = broken.into_iter().map(u64::from).sum();
     broken + u64::from(intact(stats, key))
 }
 
-/// Returns the counters of frames rejected by authentication.
+/// Returns the counters of frames that authentication rejects: unsigned, forged, replayed.
 const fn refusals(stats: &Stats) -> [u32; 3] {
     [stats.unsigned, stats.forged, stats.replayed]
 }

@@ -7,10 +7,11 @@ use uav_relay_scenario::{AirGround, Field, Interference, Scenario};
 
 const RELAYS: [u16; 4] = [1, 3, 8, 1000];
 
-/// Reads `data` as the text of a scenario file; ignores it if it is not UTF-8.
+/// Fuzz target. Reads `data` as the text of a scenario file; ignores it if it is not UTF-8.
 ///
 /// # Panics
-/// An error has more than one line, a number is out of its field's range, or a mission has a number that is not finite.
+/// An error has more than one line, a number is out of its field's range, or a mission has a number that is not
+/// finite.
 pub fn scenario(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else {
         return;

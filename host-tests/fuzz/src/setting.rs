@@ -10,30 +10,32 @@ use uav_relay::{Auth, Key};
 
 use super::input::Input;
 
-/// Fields, made once, because a field is borrowed until the program ends.
+/// Interference fields of the fuzzed missions. They are constants, because a field is borrowed until the program
+/// ends.
 const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
 const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
 const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
-/// Interferer of the mission with lateral positions.
+/// Interferer of the fuzzed mission that has lateral positions.
 const BESIDE: Interference = Interference::Source(Interferer {
     power_w: 80.0,
     x_m: 500.0,
     y_m: 150.0,
 });
 
-/// Key of every fuzzed network.
+/// Signing key of every fuzzed network.
 pub const KEY: [u8; 32] = *b"known to whoever reads this line";
 
 const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Reads a mission of at most `most` relays. `None` if the relays do not fit or the mission is refused.
+/// Reads a mission of at most `most` relays from the fuzzer's bytes. `None` if the mission is refused, as when its
+/// relays do not fit.
 ///
-/// Half of the missions are the paper's with small changes, with which few bytes reach many states. The other half draws every
-/// number from its whole range.
+/// Half of the missions are the paper's with small changes, with which few bytes reach many states. The other half
+/// draws every number from its whole range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     let drawn = input.byte();
     let (kind, variant) = (drawn % 14, drawn / 14 % 8);
@@ -57,7 +59,7 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// Returns the paper's scenario, changed in one respect.
+/// Returns the paper's scenario with `relays` relays, changed in one respect, which `kind` selects.
 fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     let paper = MissionConfig {
         relays,
@@ -167,7 +169,7 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
     })
 }
 
-/// Reads a position: mostly on the line's length, at any altitude, mostly in the lateral range.
+/// Reads a position, mostly between Tx and Rx, at any altitude, and mostly in the lateral range.
 pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, config.distance_m)),
@@ -185,7 +187,7 @@ pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     }
 }
 
-/// Reads an interferer on the line's length or far away, on the line or beside it.
+/// Reads an interferer between Tx and Rx or far away, on the line between them or beside it.
 fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {
     let power_w = input.scaled(1e-6, 1e9);
     let x_m = match input.below(4) {
@@ -215,7 +217,7 @@ fn channel(input: &mut Input<'_>) -> Option<Channel> {
     Channel::from_db(carrier_hz, los.into(), nlos.into(), air_ground).ok()
 }
 
-/// Reads the settings of one relay of `mission`; `chain` has those common to all relays.
+/// Reads the settings of one relay of `mission`. `chain` has the settings that all its relays share.
 pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Settings {
     let own = input.byte();
     let profile = (own % 4 == 1).then(|| Profile {
@@ -240,7 +242,7 @@ pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Se
     }
 }
 
-/// Reads the settings common to all relays of a chain.
+/// Reads the settings that all relays of a chain share.
 pub fn of_chain(input: &mut Input<'_>, mission: &Mission) -> Settings {
     let how = input.byte();
     let method = match how % 4 {

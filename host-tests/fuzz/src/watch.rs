@@ -17,35 +17,35 @@ use frames::Frames;
 
 pub use frames::NETWORK;
 
-/// Maximum number of frames pending at once.
+/// Maximum number of frames that a relay may have to send at once.
 ///
-/// They are: a pass or its result and a busy sign; a decision on a proposal; a pulse and its answer; for each side a heartbeat,
-/// four hellos, a fence, an offer and a hello to the ground; a claim and its echo; a handshake to each of the eight remembered
-/// nodes.
+/// They are: a sweep or other pass, or its result, and a busy sign; a decision on a proposal; a lease renewal and its
+/// answer; for each side a heartbeat, four hellos, a fence, an offer and a hello to the ground; a claim and its echo;
+/// a handshake to each of the eight remembered nodes.
 const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
 const MOST_EVENTS: usize = 14;
 
-/// Length of the shortest frame whose CRC is computed, on the wire: header, no body, CRC.
+/// Length on the wire, bytes, of the shortest frame whose CRC is computed: header, no body, CRC.
 const LEAST_CHECKED: usize = 16;
 
-/// Length of the shortest frame of a message, on the wire: Busy.
+/// Length on the wire, bytes, of the shortest frame with a message, a Busy.
 const LEAST_MESSAGE: usize = 19;
 
 /// Frame sent by a relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Sent {
-    /// Port of the frame.
+    /// Port through which the frame was sent.
     pub port: Port,
     /// Bytes of the frame, with its delimiter.
     pub bytes: Vec<u8>,
 }
 
-/// Relay, and its state at the last check.
+/// Relay under test, and its state at the last check.
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,
-    /// Number of its node, and number of relays.
+    /// Node number of the relay. The next field is the number of relays in the mission.
     node: u16,
     all: u16,
     settings: Settings,
@@ -53,19 +53,19 @@ pub struct Watched {
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Sites of the flown line, and the distance of the loaded mission, m.
+    /// Sites of the mission that the relay flies. The next field is the distance of the loaded mission, m.
     sites: Option<Sites>,
     loaded_m: f32,
     frames: Frames,
-    /// Number of bytes received since the last delimiter, by port.
+    /// Number of bytes received since the last frame delimiter, for each port.
     begun: [usize; 3],
-    /// View and number of the pass that gave its position, if known.
+    /// View and number of the pass (round of messages) that gave the relay its position, if known.
     held: Option<(ViewId, u16)>,
     flown: MissionConfig,
 }
 
 impl Watched {
-    /// Creates relay `index` of `mission`, started at `now`; `None` if a setting is refused.
+    /// Creates the relay `index` of `mission`, started at `now`, and watches it. `None` if a setting is refused.
     pub fn new(
         mission: Mission,
         index: u16,
@@ -96,46 +96,47 @@ impl Watched {
         })
     }
 
-    /// Returns the relay.
+    /// Returns the relay under test.
     pub const fn relay(&self) -> &Relay {
         &self.relay
     }
 
-    /// Returns the settings of the watched relay.
+    /// Returns the settings of the relay under test.
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Returns the number of the last pass in its frames.
+    /// Returns the number of the last pass (round of messages along the chain) in the relay's frames.
     pub const fn number(&self) -> u16 {
         self.frames.number
     }
 
-    /// Returns the association number in its last fence message, 0 for none.
+    /// Returns the association number in the relay's last fence message, 0 for none.
     pub const fn association(&self) -> u16 {
         self.frames.association
     }
 
-    /// Returns the nonce of its last hello, 0 for none.
+    /// Returns the offer number in the relay's last hello, 0 for none.
     pub const fn asked(&self) -> u16 {
         self.frames.asked
     }
 
-    /// Returns view and number of the pass that gave its agreed position; `None` with a guard, too.
+    /// Returns view and number of the pass (round of messages) that gave the relay its agreed position. `None` if
+    /// unknown, as always with a guard.
     pub const fn held(&self) -> Option<(ViewId, u16)> {
         self.held
     }
 
-    /// Forgets the pass of its position, because passes are renumbered.
+    /// Forgets which pass gave the relay its position, because a restarted leader numbers its passes anew.
     pub const fn forget_pass(&mut self) {
         self.held = None;
     }
 
-    /// Delivers bytes at `port`.
+    /// Delivers bytes to the relay at `port`.
     ///
     /// # Panics
-    /// The relay computes more than one CRC for 16 bytes, or decodes more than one message for 19 bytes, which are its bounds on
-    /// work.
+    /// The relay computes more than one CRC for 16 bytes, or decodes more than one message for 19 bytes, which are
+    /// its bounds on work.
     pub fn bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let before = *self.relay.stats();
         heap::without(|| self.relay.handle_bytes(now, port, bytes));
@@ -155,7 +156,7 @@ impl Watched {
         *begun = ended.map_or(there, |at| bytes.len() - 1 - at);
     }
 
-    /// Delivers a measurement, `count` times.
+    /// Delivers a measurement to the relay, `count` times.
     pub fn sample(&mut self, now: Instant, sample: Sample, count: u8) {
         heap::without(|| {
             for _ in 0..count {
@@ -164,28 +165,28 @@ impl Watched {
         });
     }
 
-    /// Reports the position at time `at`.
+    /// Reports to the relay that its drone was at `place` at the time `at`.
     pub fn position(&mut self, now: Instant, at: Instant, place: Placement) {
         heap::without(|| self.relay.handle_position(now, place, at));
     }
 
-    /// Reports that the lost relays at `side` have landed.
+    /// Reports to the relay that the lost relays at `side` have landed.
     pub fn forget(&mut self, now: Instant, side: Side) {
         heap::without(|| self.relay.clear_lost(now, side));
     }
 
-    /// Uploads a mission.
+    /// Uploads a mission to the relay, which may refuse it.
     pub fn upload(&mut self, now: Instant, upload: &Upload) {
         // An older mission, or one for a relay without a key, is refused.
         _ = heap::without(|| self.relay.handle_upload(now, upload));
     }
 
-    /// Requests a new agreement.
+    /// Makes the relay start a new agreement, if it leads the chain.
     pub fn restart(&mut self, now: Instant) {
         heap::without(|| self.relay.restart(now));
     }
 
-    /// Handles timeouts, collects frames and events, and checks the relay.
+    /// Handles the relay's timeouts, returns its frames and events, and checks its promises.
     ///
     /// # Panics
     /// A promise is broken.
@@ -224,7 +225,8 @@ impl Watched {
         (sent, events)
     }
 
-    /// Checks views: they increase, are reported and counted. The relay has an index in its view, between its neighbours.
+    /// Checks the relay's view: views increase, and each is reported and counted. The relay has an index in its view,
+    /// between its neighbours.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -252,7 +254,8 @@ impl Watched {
         self.stats = stats;
     }
 
-    /// Checks the setpoint. Each change is reported, and it is the agreed position, or inside the guard's geofence.
+    /// Checks the relay's setpoint. Each change is reported. The setpoint is the agreed position, or inside the
+    /// guard's geofence.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
@@ -295,7 +298,8 @@ impl Watched {
         }
     }
 
-    /// Checks an agreed position. It is on the line's length and in its lateral range, at an altitude that this relay may have.
+    /// Checks the relay's agreed position. It is between Tx and Rx and in the lateral range, at an altitude that this
+    /// relay may have.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.agreed_place();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {

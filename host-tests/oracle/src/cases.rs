@@ -5,7 +5,8 @@ use serde_json::Value;
 
 use crate::reference::{Link, Station};
 
-/// Optimum (linear SIR) of the default scenario by number of relays. The values are of an independent program, to nine digits.
+/// Optimum (linear SIR) of the default scenario for each number of relays. An independent program has computed the
+/// values, to nine digits.
 pub const OPTIMA: [(u16, f64); 12] = [
     (1, 1.490_121_51),
     (2, 1.616_583_02),
@@ -21,7 +22,7 @@ pub const OPTIMA: [(u16, f64); 12] = [
     (100, 40.441_345_0),
 ];
 
-/// Scenario of a case, SI units, with the field names of the file.
+/// Scenario of a reference case, in SI units. The fields have the names of the file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Params {
     /// Transmit power of Tx, watts.
@@ -33,41 +34,41 @@ pub struct Params {
     /// Interferer's coordinate along Tx-Rx, metres.
     #[serde(rename = "X")]
     pub x: f64,
-    /// Interferer's offset, metres.
+    /// Interferer's lateral offset from the line Tx-Rx, metres.
     #[serde(rename = "Y")]
     pub y: f64,
     /// Tx-Rx distance, metres.
     #[serde(rename = "D")]
     pub d: f64,
-    /// Common altitude, metres.
+    /// Altitude of all relays, metres.
     pub h: f64,
-    /// Bottom of the altitude band, metres.
+    /// Lowest altitude that a relay may choose, metres.
     pub h_min: f64,
-    /// Top of the altitude band, metres.
+    /// Highest altitude that a relay may choose, metres.
     pub h_max: f64,
-    /// Least distance between neighbours, metres.
+    /// Minimum distance between neighbouring relays, metres.
     pub d_min: f64,
-    /// Path-loss factor between relays, 1/m^2.
+    /// Path-loss factor between two relays, 1/m^2.
     pub mu_los: f64,
-    /// Path-loss factor on the ground, 1/m^2.
+    /// Path-loss factor between two points on the ground, 1/m^2.
     pub mu_nlos: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2.
     pub eta: f64,
 }
 
-/// A reference evaluation: function, arguments and result.
+/// Reference case, computed by an independent program: a function, its arguments and its result.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Case {
     /// Name of the evaluated function.
     #[serde(rename = "fn")]
     pub function: String,
-    /// Scenario.
+    /// Scenario in which the function was evaluated.
     pub params: Params,
-    /// Arguments by name.
+    /// Arguments of the function, by name.
     pub args: Value,
-    /// Result of the case: one value, or an object of named values.
+    /// Result of the function: one value, or an object of named values.
     pub out: Value,
-    /// Relative accuracy of the value.
+    /// Relative accuracy of the result.
     pub rtol: f64,
     /// Name of the case, unique in the file.
     pub id: String,
@@ -78,7 +79,7 @@ struct File {
     cases: Vec<Case>,
 }
 
-/// Returns the cases of the file, in its order.
+/// Returns all reference cases, in the order of the file.
 ///
 /// # Errors
 /// If the built-in file does not parse.
@@ -86,7 +87,7 @@ pub fn load() -> Result<Vec<Case>, serde_json::Error> {
     serde_json::from_str::<File>(include_str!("../data/reference.json")).map(|file| file.cases)
 }
 
-/// Returns the cases of `function`, in file order.
+/// Returns the reference cases of `function`, in the order of the file.
 ///
 /// # Errors
 /// Those of [`load`].
@@ -98,7 +99,7 @@ pub fn of(function: &str) -> Result<Vec<Case>, serde_json::Error> {
 }
 
 impl Case {
-    /// Returns the scenario with `n` relays at the common altitude.
+    /// Returns the case's scenario as a link with `n` relays, all at the same altitude.
     pub fn link(&self, n: usize) -> Link {
         let p = &self.params;
         Link {
@@ -122,7 +123,7 @@ impl Case {
         }
     }
 
-    /// Returns the number of relays, the argument `N`.
+    /// Returns the number of relays, the argument `N` of this case, if it has one.
     pub fn relays(&self) -> Option<usize> {
         self.args.get("N")?.as_u64()?.try_into().ok()
     }
@@ -147,12 +148,12 @@ impl Case {
         list(&self.out)
     }
 
-    /// Returns the part `name` of the result as a number.
+    /// Returns the named value `name` of the result as a number.
     pub fn part(&self, name: &str) -> Option<f64> {
         number(self.out.get(name)?)
     }
 
-    /// Returns the part `name` of the result as a list of numbers.
+    /// Returns the named value `name` of the result as a list of numbers.
     pub fn part_list(&self, name: &str) -> Option<Vec<f64>> {
         list(self.out.get(name)?)
     }

@@ -9,7 +9,8 @@ use uav_relay_scenario::scene::{Corridor, Relay, Scene};
 use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Station};
 
-/// Returns the mission of a reference link, and the relays' own profiles. `None` if a relay would reject its numbers.
+/// Converts a reference link to a mission, and to the profiles of relays that differ. `None` if a relay would reject
+/// a number.
 ///
 /// The first relay's profile is the mission's common one.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
@@ -51,7 +52,8 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
     Some((Mission::try_new(config).ok()?, own.collect()))
 }
 
-/// Returns the scene of a reference link, with the first relay's altitude as its band. `None` without relays.
+/// Converts a reference link to a planner's scene, with a fixed altitude, that of the first relay. `None` without
+/// relays.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
     let relay = |station: &Station| Relay {
@@ -78,7 +80,8 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
     })
 }
 
-/// Returns the mission of a link in an interference field, with identical relays. `None` if a relay would reject its numbers.
+/// Converts a link in an interference field, with identical relays, to a mission. `None` if a relay would reject a
+/// number.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link
@@ -120,7 +123,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
     Mission::try_new(config).ok()
 }
 
-/// Carrier at which the wave number is 1, so that excess factors equal path-loss factors.
+/// Carrier frequency, Hz, at which (4 pi f / c)^2 is 1, so that excess losses equal path-loss factors.
 const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 
 /// Rounds every number of `link` to the f32 of relays, so that only a relay's arithmetic is tested.

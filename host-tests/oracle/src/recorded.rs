@@ -26,28 +26,28 @@ static ALL: LazyLock<std::result::Result<Vec<Record>, String>> = LazyLock::new(|
     rows.collect()
 });
 
-/// Best chain known.
+/// Best known chain of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Optimum {
-    /// SIR (linear) of the worst hop.
+    /// SIR (linear) of the chain's worst hop.
     pub sir: f64,
-    /// Positions from Tx to Rx; empty where the file has only the SIR.
+    /// Positions of the relays from Tx to Rx; empty if the file has only the SIR.
     pub places: Vec<Place>,
 }
 
-/// A scene with its best chain.
+/// Recorded scene with its best known chain.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Name of the test, and of its random stream, that draws the scene.
+    /// Name of the test, and of its random stream, that draws this scene.
     pub set: String,
-    /// Scene; its relays are at the corridor's lowest altitude.
+    /// Link and corridor. The link's relays are at the corridor's lowest altitude.
     pub scene: Scenario,
-    /// Best chain; `None` if no chain has a positive SIR and keeps the least separation.
+    /// Best known chain; `None` if no chain has a positive SIR and keeps the minimum separation.
     pub best: Option<Optimum>,
     key: Vec<f32>,
 }
 
-/// Line of the file, in metres and watts.
+/// Line of the file of recorded optima, in metres and watts.
 #[derive(Deserialize)]
 struct Row {
     set: String,
@@ -56,16 +56,16 @@ struct Row {
     #[serde(default)]
     apart_m: f64,
     tx_w: f64,
-    /// Power of every relay; a single one if they are alike.
+    /// Transmit power of every relay, W; a single number if they are alike.
     relay_w: Vec<f64>,
-    /// Power, x and y.
+    /// Interferer's power, W, and its position x and y, m.
     interferer: [f64; 3],
     mu_los: f64,
     mu_nlos: f64,
     eta: f64,
     #[serde(default)]
     noise_w: f64,
-    /// Lowest and highest altitude, least and largest y.
+    /// Lowest and highest altitude, smallest and largest y that a relay may choose, m.
     corridor: [f64; 4],
     /// Index (from 0), y and altitude of each relay with a fixed y and altitude.
     #[serde(default)]
@@ -138,7 +138,8 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a scene in f32. The altitudes of `link` are left out, because the joint problem ignores them.
+/// Returns all parameters of a scene in f32, to find it among the recorded ones. The altitudes of `link` are left
+/// out, because the joint problem ignores them.
 fn key(link: &Link, corridor: Corridor, held: &[Hold]) -> Vec<f32> {
     let common = [
         link.distance_m,
@@ -169,7 +170,7 @@ fn key(link: &Link, corridor: Corridor, held: &[Hold]) -> Vec<f32> {
         .collect()
 }
 
-/// Returns every scene of the file.
+/// Returns every recorded scene.
 ///
 /// # Errors
 /// If a line of the file is not a scene.
@@ -178,9 +179,9 @@ pub fn all() -> Result<&'static [Record]> {
     all.map_err(|error| Error::other(error.clone()))
 }
 
-/// Returns the best chain known of a link in a corridor; the altitudes in `link` are ignored.
+/// Returns the best known chain of a link in a corridor. The altitudes in `link` are ignored.
 ///
-/// `None` if no chain has a positive SIR and keeps the least separation.
+/// `None` if no chain has a positive SIR and keeps the minimum separation.
 ///
 /// # Errors
 /// If the scene is not recorded: `SEED` and `COUNT` of a test can select recorded scenes only.

@@ -11,24 +11,26 @@ use uav_relay_chip::reset::Reset;
 pub struct Board<F> {
     /// Configuration block.
     pub block: Block,
-    /// Seed that differs between boards, and if possible between starts.
+    /// Random seed for the relay that differs between boards, and if possible between starts.
     pub seed: u32,
     /// Cause of the last reset.
     pub reset: Reset,
-    /// Flash for persistent state. Without it a block with a key is refused, and votes are lost at a reboot.
+    /// Flash for state that survives a reboot, if any. Without it a block with a signing key is refused, and the
+    /// relay's votes are lost at a reboot.
     pub storage: Option<Storage<F>>,
 }
 
-/// Flash and its layout: offsets of whole erase units that no image reaches.
+/// Flash of a board and its layout: offsets of whole erase units that no firmware image occupies.
 #[derive(Debug)]
 pub struct Storage<F> {
     /// Driver of the flash.
     pub flash: F,
-    /// Offset of the configuration block.
+    /// Offset of the configuration block in the flash, bytes.
     pub block: u32,
-    /// Two sectors of the epoch.
+    /// Two flash sectors that store the epoch, a number that rises at every start.
     pub epochs: [Range<u32>; 2],
-    /// Two sectors of the votes. One is erased in flight when both are full; a smaller one takes less time.
+    /// Two flash sectors that store the relay's votes on the chain's membership. One is erased in flight when both
+    /// are full; an erase of a smaller sector takes less time.
     pub views: [Range<u32>; 2],
 }
 

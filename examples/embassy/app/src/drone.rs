@@ -22,7 +22,7 @@ use crate::votes::Votes;
 /// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// Static storage of the relay and its field, to save stack.
+/// Static storage of the relay and its field points, to save stack.
 #[derive(Debug)]
 pub struct Room {
     field: config::Room,
@@ -30,7 +30,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// Creates empty storage.
+    /// Creates empty storage for a relay and its field points.
     pub const fn new() -> Self {
         Self {
             field: config::EMPTY,
@@ -48,29 +48,30 @@ impl Default for Room {
 /// Reason why a drone does not join the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Refused {
-    /// Invalid block.
+    /// Invalid configuration block.
     Block(ConfigError),
-    /// Key without a flash for the epoch.
+    /// Signing key in the configuration block, but no flash that stores the epoch.
     NoFlash,
-    /// Last epoch already used.
+    /// Signing impossible, because the last possible epoch has been used.
     NoEpoch,
-    /// Sites without a port to an autopilot.
+    /// Sites in the configuration block, but no port to an autopilot.
     NoAutopilot,
-    /// Sites that form no line, or not the mission's.
+    /// Sites that form no valid line, or whose distance differs from the mission's.
     Course(CourseError),
-    /// Feature that the block needs and this build lacks.
+    /// Settings that the relay rejects, because they need a feature that this build lacks. The joint method for more
+    /// than 100 relays is rejected, too.
     Setup(SetupError),
 }
 
 #[derive(Debug)]
 pub(crate) struct Drone<F> {
     pub(crate) relay: &'static mut Relay,
-    /// Votes, if the board has a flash.
+    /// Store of the relay's votes; `None` if the board has no flash.
     pub(crate) votes: Option<Votes<F>>,
     pub(crate) autopilot: Option<AsyncAutopilot>,
 }
 
-/// Creates the drone of a board, with its relay in `room`. `flies` is true if there is a port to an autopilot.
+/// Creates the drone of a board, and stores its relay in `room`. `flies` is true if there is a port to an autopilot.
 pub(crate) fn begin<F: NorFlash>(
     room: &'static mut Room,
     mut board: Board<F>,
@@ -126,7 +127,7 @@ pub(crate) fn begin<F: NorFlash>(
     })
 }
 
-/// Returns the signing settings of this start, if the block has a key.
+/// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 fn sign<F: NorFlash>(board: &mut Board<F>) -> Result<Option<Auth>, Refused> {
     let Some(secret) = config::secret(&board.block).map_err(Refused::Block)? else {
         log::unsigned();

@@ -39,10 +39,10 @@ use drone::{Drone, Refused, Room};
 /// Bit rate of every port, bit/s, 8N1.
 pub use uav_relay_block::BAUD;
 
-/// Size of a UART driver's buffers, bytes: 22 ms, where a call of the relay takes 3 ms.
+/// Size of a UART driver's buffers, bytes. They hold 22 ms of traffic; a call of the relay takes 3 ms.
 pub const BUFFER: usize = 256;
 
-/// Clock of Embassy.
+/// Clock of the relay, based on Embassy's time driver.
 #[derive(Clone, Copy, Debug)]
 pub struct EmbassyClock;
 
@@ -56,17 +56,17 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Size of the receive buffer of an autopilot's UART, bytes: it sends bursts.
+/// Size of the receive buffer of an autopilot's UART, bytes. It is larger, because an autopilot sends bursts.
 pub const BURST: usize = 512;
 
-/// Static buffers of a UART driver, which receives into `IN` bytes.
+/// Static buffers of a UART driver: [`BUFFER`] bytes to send, `IN` bytes to receive.
 pub struct Buffers<const IN: usize = BUFFER> {
     sent: StaticCell<[u8; BUFFER]>,
     received: StaticCell<[u8; IN]>,
 }
 
 impl<const IN: usize> Buffers<IN> {
-    /// Creates unused buffers.
+    /// Creates buffers that no UART driver uses yet.
     #[expect(clippy::new_without_default, reason = "they are statics")]
     pub const fn new() -> Self {
         Self {
@@ -75,7 +75,7 @@ impl<const IN: usize> Buffers<IN> {
         }
     }
 
-    /// Returns the send and the receive buffer, once.
+    /// Returns the send and the receive buffer. A second call panics.
     pub fn take(&'static self) -> (&'static mut [u8], &'static mut [u8]) {
         (self.sent.init([0; BUFFER]), self.received.init([0; IN]))
     }
@@ -84,7 +84,8 @@ impl<const IN: usize> Buffers<IN> {
 /// Longest time between two feedings of the watchdog while the relay makes progress.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Calls `feed` every [`TURN`], so that the watchdog does not restart a board that takes no part.
+/// Calls `feed` every [`TURN`] for ever, for a drone that does not join the chain. The watchdog then does not restart
+/// its board.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -92,7 +93,7 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     }
 }
 
-/// Calls `feed` every [`TURN`] while the relay's timers are served, by [`watchdog::may_feed`].
+/// Feeds the watchdog every [`TURN`] while the relay's timers are not late, by [`watchdog::may_feed`].
 ///
 /// It runs in the task of ports and timers, so a hanging turn of that task, a panic or a fault ends the feeding.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
@@ -109,12 +110,13 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     }
 }
 
-/// Flies the relay of `board` with a UART to each neighbour and, if `autopilot` is given, one to that.
+/// Runs the relay of `board` on a UART to each neighbour, and on one to the autopilot if there is one.
 ///
-/// It never completes if the drone takes part, and calls the watchdog's `feed` every [`TURN`] while the relay makes progress.
+/// It never completes if the drone joins the chain, and calls the watchdog's `feed` every [`TURN`] while the relay
+/// makes progress.
 ///
 /// # Errors
-/// The reason why the drone takes no part, which is logged, too.
+/// The reason why the drone does not join the chain, which is logged, too.
 pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read, AW: Write>(
     room: &'static mut Room,
     board: Board<F>,
@@ -138,7 +140,7 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     .await
 }
 
-/// Flies the relay with one UART to a radio shared by all relays; `pin` is high while this one sends.
+/// Runs the relay of `board` on one UART to a radio that all relays share. `pin` is high while this relay sends.
 ///
 /// # Errors
 /// Those of [`fly`].
@@ -162,7 +164,7 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     .await
 }
 
-/// Flies the relay of `board` over the ports that `run` serves. It stores a changed record before it sends.
+/// Runs the relay of `board` over the ports that `run` serves. It stores changed votes before it sends.
 async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     room: &'static mut Room,
     board: Board<F>,
@@ -189,7 +191,7 @@ async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
-/// Runs the autopilot's port, for a drone with sites, and the log.
+/// Logs the relay's events, and serves the autopilot's port for a drone that has one.
 async fn beside<R: Read, W: Write>(
     relay: &AsyncRelay<'_>,
     link: Option<&AsyncAutopilot>,

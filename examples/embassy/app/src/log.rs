@@ -49,7 +49,7 @@ pub(crate) fn unguarded() {
     warn!("no sites: no autopilot is controlled, and drones are not kept apart while they move");
 }
 
-/// Logs the line and the speed limit of the autopilot.
+/// Logs the length of the line between the sites, m, and the drone's speed limit, m/s.
 pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
     info!(
         "autopilot: line of {} m, at most {} m/s",
@@ -72,7 +72,7 @@ pub(crate) fn stands_by(taken: bool) {
     }
 }
 
-/// Logs that storing the votes works again (`kept`) or fails.
+/// Logs that storing the relay's votes works again (`kept` is true) or fails (`kept` is false).
 pub(crate) fn votes(kept: bool) {
     if kept {
         info!("votes on views can be stored again");
@@ -105,7 +105,7 @@ pub(crate) fn refused(why: Refused) {
     }
 }
 
-/// Logs events and setpoints, and shows events on the operator's ground station, if any.
+/// Logs the relay's events and setpoints. An autopilot, if any, also shows the events to its operator.
 pub(crate) async fn events(
     relay: &AsyncRelay<'_>,
     autopilot: Option<&AsyncAutopilot>,
@@ -128,7 +128,7 @@ pub(crate) async fn events(
     }
 }
 
-/// Logs the events of the autopilot link.
+/// Logs the events of the link to the autopilot.
 pub(crate) async fn autopilot(link: &AsyncAutopilot) -> Infallible {
     loop {
         let event = link.next_event().await;

@@ -9,17 +9,17 @@ use uav_relay_kept::views::{Views, log as journal};
 use crate::board::Storage;
 use crate::log;
 
-/// Votes of the relay, and their flash.
+/// Store of the relay's votes in flash.
 #[derive(Debug)]
 pub(crate) struct Votes<F> {
     flash: Nor<F>,
-    /// CRC of the block: with another block the votes are ignored.
+    /// CRC of the configuration block. Votes stored under another block are ignored.
     block: u32,
     said: Views,
 }
 
 impl<F: NorFlash> Votes<F> {
-    /// Restores the votes from before the reboot into a newly created `relay`.
+    /// Restores the votes stored before the reboot into a newly created `relay`.
     pub(crate) fn resume(
         storage: Storage<F>,
         block: &Block,
@@ -33,7 +33,7 @@ impl<F: NorFlash> Votes<F> {
         Self { flash, block, said }
     }
 
-    /// Stores a changed `record` of the relay; if the write fails the relay flies on.
+    /// Stores the relay's changed votes, `record`. If the write fails, the relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) {
         let Self { flash, block, said } = self;
         if let Some(kept) = said.store(record, journal(flash, *block)) {

@@ -43,11 +43,11 @@ const FLASH_SIZE: usize = 4 * 1024 * 1024;
 /// Flash driver of the board.
 pub type BoardFlash = Flash<'static, FLASH, Blocking, FLASH_SIZE>;
 
-/// Started watchdog, with the timeout of the other boards. It pauses while a debugger halts the core.
+/// Running watchdog of the board, with a timeout of 6 s. It pauses while a debugger halts the core.
 pub struct Guard(Watchdog);
 
 impl Guard {
-    /// Starts the watchdog; returns the cause of the last reset, too.
+    /// Starts the watchdog; returns it and the cause of the last reset.
     pub fn start(watchdog: Peri<'static, WATCHDOG>) -> (Self, Reset) {
         let mut watchdog = Watchdog::new(watchdog);
         let reset = match watchdog.reset_reason() {
@@ -60,7 +60,7 @@ impl Guard {
         (Self(watchdog), reset)
     }
 
-    /// Feeds it.
+    /// Feeds the watchdog.
     pub fn feed(&mut self) {
         self.0.feed(TIMEOUT);
     }
@@ -68,7 +68,7 @@ impl Guard {
 
 const TIMEOUT: Duration = Duration::from_millis(6_000);
 
-/// Creates the board, with a seed from its random number generator.
+/// Creates the description of the board, with a seed from its random number generator.
 pub fn board(flash: Peri<'static, FLASH>, trng: Peri<'static, TRNG>) -> Board<BoardFlash> {
     Board::new(
         seed(trng),
@@ -89,10 +89,10 @@ fn seed(trng: Peri<'_, TRNG>) -> u32 {
 /// Reader and writer of a UART.
 pub type Port = (BufferedUartRx, BufferedUartTx);
 
-/// Absent autopilot port: both UARTs lead to neighbours.
+/// Absent autopilot port, for an image whose two UARTs both lead to neighbours.
 pub const NO_AUTOPILOT: Option<Port> = None;
 
-/// Opens a UART with the `buffers` of its own.
+/// Opens a UART at the firmware's bit rate, with `buffers` that no other UART uses.
 pub fn port<T: Instance, const IN: usize>(
     uart: Peri<'static, T>,
     tx: Peri<'static, impl TxPin<T>>,

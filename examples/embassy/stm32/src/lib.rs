@@ -39,7 +39,7 @@ pub fn feed() {
     watchdog::feed(&mut Chip);
 }
 
-/// Returns Embassy's settings for the probed clocks.
+/// Returns Embassy's clock settings for the frequencies that the probe has reached.
 fn tree(plan: &Plan, clocks: Clocks) -> rcc::Config {
     let mut config = rcc::Config::new();
     let (Some(source), Some(crystal)) = (clocks.pll, plan.crystal) else {
@@ -81,7 +81,7 @@ fn tree(plan: &Plan, clocks: Clocks) -> rcc::Config {
 /// Reader and writer of a UART.
 pub type Port = (BufferedUartRx<'static>, BufferedUartTx<'static>);
 
-/// Opens a UART with the `buffers` of its own.
+/// Opens a UART at the firmware's bit rate, with `buffers` that no other UART uses.
 ///
 /// # Errors
 /// The UART's clock does not permit the baud rate.
@@ -99,8 +99,8 @@ pub fn port<T: Instance, const IN: usize>(
     Ok((rx, tx))
 }
 
-/// Returns a seed from the chip's unique number. The STM32F446 has no random number generator, and the clock of the STM32F405's,
-/// PLLQ, is not set up here.
+/// Returns a seed computed from the chip's unique number. The STM32F446 has no random number generator, and that of
+/// the STM32F405 has no clock here, because PLLQ is not set up.
 pub fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);

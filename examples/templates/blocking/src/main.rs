@@ -26,10 +26,10 @@ use stm32f4xx_hal::{nb, rcc, signature::Uid};
 use uav_relay::serial::{ByteQueues, Fault, InterruptEnd, Pair, SerialLink, queue_depth};
 use uav_relay::{Duration, Event, Instant, Relay, Settings};
 
-/// Queue sizes: 10 ms of received bytes, and more than the longest frame to send.
+/// Queues of a UART: 10 ms of received bytes, and 256 bytes to send, more than the longest frame.
 type Queues = ByteQueues<{ queue_depth(BAUD, Duration::from_millis(10)) }, 256>;
 
-/// A UART and the interrupt's end of its queues. The type differs from UART to UART.
+/// UART served by its interrupt, and the interrupt's end of the UART's queues.
 struct Served<U: Instance> {
     uart: Serial<U>,
     end: InterruptEnd<'static>,
@@ -125,7 +125,7 @@ fn USART3() {
     serve(&DOWNSTREAM);
 }
 
-/// Moves bytes between a UART and its queues until neither has any.
+/// Moves received bytes to the receive queue and queued bytes to the UART. Called by the UART's interrupt.
 fn serve<U: Instance>(slot: &Mutex<RefCell<Option<Served<U>>>>) {
     critical_section::with(|cs| {
         let mut slot = slot.borrow_ref_mut(cs);

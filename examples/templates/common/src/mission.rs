@@ -5,10 +5,10 @@ use uav_relay::{
     Band, Channel, Identity, Interference, Interferer, Mission, MissionConfig, Profile,
 };
 
-/// Bits per second on both links, 8N1.
+/// Bit rate of both links, bit/s, 8N1.
 pub const BAUD: u32 = 115_200;
 
-/// Five relays over 1 km at 2 GHz. The excess path losses are 0.1 and 21 dB, written as power ratios.
+/// Mission of five relays over 1 km at 2 GHz. The excess path losses are 0.1 and 21 dB, written as power ratios.
 pub const MISSION: Mission = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
     Ok(channel) => Mission::new(MissionConfig {
         relays: 5,
@@ -35,7 +35,7 @@ pub const MISSION: Mission = match Channel::new(2e9, 1.023_293, 125.892_54, AirG
     Err(_) => panic!("a channel parameter is out of range"),
 };
 
-/// The network's number, and the index of this relay: 1 is next to the transmitter.
+/// Network number of the chain, and index of this relay: 1 is next to the transmitter.
 pub const IDENTITY: Identity = Identity {
     network: 7,
     index: 3,

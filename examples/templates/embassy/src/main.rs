@@ -32,7 +32,7 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
 });
 
-/// Embassy's clock.
+/// Clock of the relay, based on Embassy's time driver.
 struct EmbassyClock;
 
 impl Clock for EmbassyClock {
@@ -45,7 +45,7 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// The relay takes some 10 KB, which the stack of `main` need not hold.
+/// Static storage of the relay, some 10 KB, which the stack of `main` need not hold.
 static RELAY: StaticCell<Option<Relay>> = StaticCell::new();
 static SENT: StaticCell<[u8; 256]> = StaticCell::new();
 static RECEIVED: StaticCell<[u8; 256]> = StaticCell::new();
@@ -106,7 +106,7 @@ async fn main(_spawner: Spawner) {
     join(ports.run(&relay, &EmbassyClock, |_| true), firmware).await;
 }
 
-/// Hashes the chip's unique number (FNV-1a).
+/// Returns a seed: a hash (FNV-1a) of the chip's unique number.
 fn seed(id: [u8; 12]) -> u32 {
     id.into_iter().fold(0x811C_9DC5, |hash, byte| {
         (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)

@@ -30,16 +30,16 @@ mod app {
     };
     use uav_relay::{Duration, Event, Instant, Relay, Settings};
 
-    /// Queue sizes: 10 ms of received bytes, and more than the longest frame to send.
+    /// Queues of a UART: 10 ms of received bytes, and 256 bytes to send, more than the longest frame.
     type Queues = ByteQueues<{ queue_depth(BAUD, Duration::from_millis(10)) }, 256>;
 
-    /// A UART and the interrupt's end of its queues. The type differs from UART to UART.
+    /// UART served by its interrupt, and the interrupt's end of the UART's queues.
     pub struct Served<U: Instance> {
         uart: Serial<U>,
         end: InterruptEnd<'static>,
     }
 
-    /// Requests the hardware task of a UART.
+    /// Trigger of a UART's hardware task, by its interrupt.
     pub struct Request(Interrupt);
 
     impl Pend for Request {
@@ -134,7 +134,7 @@ mod app {
     }
 
     impl<U: Instance> Served<U> {
-        /// Moves bytes between the UART and its queues until neither has any.
+        /// Moves received bytes to the receive queue and queued bytes to the UART. Called by the UART's interrupt.
         fn serve(&mut self) {
             let Self { uart, end } = self;
             loop {

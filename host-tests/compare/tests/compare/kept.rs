@@ -32,10 +32,10 @@ fn the_results_have_the_run_that_is_kept() {
     );
 }
 
-/// Compares SLSQP from its best start with this crate: it takes at least twenty times as long. The scenarios have eight and fifty
-/// relays and free altitudes.
+/// Checks the recorded run: SLSQP from its best start alone takes at least 20 times this crate's time. The problems
+/// have eight and fifty relays and free altitudes.
 ///
-/// With lateral room this crate has more than twice as many starts to try.
+/// With a lateral range this crate has more than twice as many starts to try.
 #[test]
 fn the_kept_run_is_twenty_times_as_fast_as_one_good_start() {
     let kept = include_str!("../../rivals/measured.json");
@@ -74,7 +74,7 @@ fn json_is_given_back_as_it_was() {
     );
 }
 
-/// Runs the command with only `folder` on PATH, which also contains the virtual environment.
+/// Runs `compare` with only `folder` on PATH, which also contains the virtual environment.
 fn with_path(folder: &Path) -> Output {
     let venv = folder.join("venv");
     Command::new(env!("CARGO_BIN_EXE_compare"))

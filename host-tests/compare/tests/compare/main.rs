@@ -26,7 +26,7 @@ fn compare(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Returns the single line on standard error, after checking the exit status.
+/// Checks that a run failed with this exit status, and returns its only line on standard error.
 fn refusal(output: &Output, status: i32) -> String {
     let text = String::from_utf8(output.stderr.clone()).unwrap();
     assert_eq!(text.lines().count(), 1, "{text}");
@@ -58,7 +58,8 @@ fn table(results: &Value) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Returns SIR and [x, y, h] of the best chain of eight relays at 20 m, by the independent program.
+/// Returns the SIR and the positions [x, y, altitude] of the best chain of eight relays at 20 m. They are of an
+/// independent program.
 fn best_of_eight() -> (f64, Vec<[f64; 3]>) {
     let cases = cases::of("gamma_star").unwrap();
     let found = cases.iter().find(|case| {
@@ -76,7 +77,7 @@ fn run(solver: &str, time_s: f64, sir: f64, chain: &[[f64; 3]]) -> Value {
     json!({ "solver": solver, "answer": { "found": found } })
 }
 
-/// Returns the line of solver "rival" in the table of eight relays, after its name.
+/// Returns the table cells of solver "rival", whose result for eight relays is `rival`.
 fn line_of_rival(rival: Value) -> String {
     let (sir, chain) = best_of_eight();
     let own = run("own", 1e-5, sir, &chain);

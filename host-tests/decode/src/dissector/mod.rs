@@ -13,7 +13,7 @@ const HEAD: &str = "\
 -- or copy it to the folder that Help > About Wireshark > Folders calls `Personal Lua Plugins`.
 ";
 
-/// Returns the dissector.
+/// Returns the Wireshark dissector as a Lua program.
 pub fn lua(format: &Format) -> String {
     let mut out = HEAD.to_owned();
     out.push_str("\nlocal messages = {\n");

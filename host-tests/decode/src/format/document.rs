@@ -3,7 +3,7 @@
 use super::rows::{Row, Table, last_number, rows, tables};
 use super::{Field, Format, Kind, Layout};
 
-/// Returns the text below the heading that begins with `from`. It ends at the next heading of that level or above.
+/// Returns the text below a heading, which begins with `from`. It ends at the next heading of level 2 or 3.
 fn section<'a>(document: &'a str, from: &str) -> Option<&'a str> {
     let (_, rest) = document.split_once(from)?;
     let end = ["\n## ", "\n### "].iter().filter_map(|to| rest.find(to));
@@ -50,7 +50,7 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
     })
 }
 
-/// Inserts the rows of another message for `as bytes 1 to 18 of a Sweep`.
+/// Replaces a row such as `as bytes 1 to 18 of a Sweep` by these rows of the other message.
 fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in rows {
@@ -146,7 +146,7 @@ fn kind(row: &Row, tables: &[Table<'_>]) -> Result<Kind, String> {
     plain(&row.kind)
 }
 
-/// Returns the words for the values of a field, as in `turn: 0 look, 1 stop, 2 move`.
+/// Returns the names of a field's values, as in `turn: 0 look, 1 stop, 2 move`. `None` if it has no names.
 fn words(field: &str) -> Option<Vec<String>> {
     let (_, list) = field.split_once(": ")?;
     let between = if list.contains("; ") { "; " } else { ", " };

@@ -8,42 +8,42 @@ const DOCUMENT: &str = include_str!("../../../../src/wire/FORMAT.md");
 /// Type of a field on the wire.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// Unsigned, one byte.
+    /// Unsigned integer of one byte.
     U8,
-    /// Unsigned, two bytes.
+    /// Unsigned integer of two bytes.
     U16,
-    /// Unsigned, eight bytes.
+    /// Unsigned integer of eight bytes.
     U64,
-    /// Unsigned, four bytes.
+    /// Unsigned integer of four bytes.
     U32,
-    /// Four bytes, two's complement.
+    /// Signed integer of four bytes, two's complement.
     I32,
-    /// IEEE 754 binary32.
+    /// Floating-point number of four bytes, IEEE 754 binary32.
     F32,
-    /// IEEE 754 binary64.
+    /// Floating-point number of eight bytes, IEEE 754 binary64.
     F64,
     /// Boolean in one byte, 00 or 01.
     Bool,
-    /// A u16 digest of a mission, view or line.
+    /// Digest of a mission, view or line, a u16.
     Digest,
-    /// A u32: number of a view and its proposer.
+    /// Name of a view (membership of the chain), a u32: its number and its proposer.
     View,
     /// Flags in one byte, with the names of its bits, lowest first.
     Flags(Vec<String>),
     /// Enumeration in one byte, with the words for its values, from 0 on.
     Words(Vec<String>),
-    /// A fixed number of items.
+    /// Fixed number of items of one type.
     Array(usize, Box<Kind>),
-    /// 00 for none; 01 and an item.
+    /// Optional item: byte 00 for none, or byte 01 and the item.
     Option(Box<Kind>),
-    /// List: a varint count, at most the given number, and the items.
+    /// List of items of one type: their count, a varint up to the given number, and the items.
     List(u64, Box<Kind>),
-    /// Consecutive fields.
+    /// Group of consecutive fields.
     Group(Vec<Field>),
 }
 
 impl Kind {
-    /// Returns the bytes of a number; 0 for kinds of variable size.
+    /// Returns the number of bytes of this type; 0 for a type of variable size.
     pub const fn size(&self) -> usize {
         match self {
             Self::U8 | Self::Bool | Self::Flags(_) | Self::Words(_) => 1,
@@ -55,41 +55,41 @@ impl Kind {
     }
 }
 
-/// A field: a row of a table.
+/// Field of a message: a row of a table in `FORMAT.md`.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Field {
-    /// Name.
+    /// Name of the field.
     pub name: String,
-    /// Type on the wire.
+    /// Type of the field on the wire.
     pub kind: Kind,
-    /// Meaning.
+    /// Meaning of the field, in words.
     pub meaning: String,
-    /// Unit; empty if none.
+    /// Unit of the field; empty if it has none.
     pub unit: String,
-    /// Valid range, in words.
+    /// Permitted range of the field, in words.
     pub range: String,
 }
 
-/// Layout of a message body after its tag.
+/// Layout of a message's body, after the byte that tells the kind of message.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Layout {
     /// Name of the message.
     pub name: String,
-    /// Fields in order.
+    /// Fields of the message, in their order on the wire.
     pub fields: Vec<Field>,
 }
 
-/// The messages and the handshake.
+/// Layouts of all messages and of the handshake.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Format {
-    /// Messages, indexed by tag.
+    /// Layouts of the messages; the index is the message's tag.
     pub messages: Vec<Layout>,
-    /// Handshake.
+    /// Layout of the handshake.
     pub handshake: Layout,
 }
 
 impl Format {
-    /// Parses `FORMAT.md`.
+    /// Reads the layouts from the tables of `FORMAT.md`.
     ///
     /// # Errors
     /// Names the row that cannot be parsed; a test ensures that there is none.
@@ -97,14 +97,15 @@ impl Format {
         document::read(DOCUMENT)
     }
 
-    /// Returns the message of this tag.
+    /// Returns the layout of the message with this tag; `None` for an unknown tag.
     pub fn message(&self, tag: u8) -> Option<&Layout> {
         self.messages.get(usize::from(tag))
     }
 }
 
 impl Field {
-    /// Returns the factor and the base unit of a scaled unit: (10, "s") for 0.1 s.
+    /// Returns how many units make a base unit, and the base unit, for a scaled unit: (10, "s") for 0.1 s. `None` for
+    /// other units.
     pub fn scale(&self) -> Option<(f64, &str)> {
         let (number, base) = self.unit.split_once(' ')?;
         let multiple: f64 = number.parse().ok()?;

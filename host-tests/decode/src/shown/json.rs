@@ -6,7 +6,7 @@ use uav_relay_capture::Direction;
 use super::{Shown, hex};
 use crate::value::Fields;
 
-/// The JSON object. Numbers are as on the wire; a field's name ends in its unit.
+/// JSON object that describes a frame. Numbers are as on the wire; a field's name ends in its unit.
 #[derive(Serialize)]
 struct Line<'a> {
     frame: u64,

@@ -12,16 +12,16 @@ use crate::source::Packet;
 pub use json::json;
 pub use text::text;
 
-/// A frame with its context.
+/// Decoded frame with its context, to be printed.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a> {
     /// Number of the frame in its source, from 1.
     pub number: u64,
-    /// Frame as captured.
+    /// Frame as captured, with time and interface.
     pub packet: &'a Packet<'a>,
     /// Decoded frame.
     pub frame: &'a Frame<'a>,
-    /// Result of verifying its tag, if it has one.
+    /// Result of verifying the frame's authentication tag, if it has one.
     pub tag: Option<TagCheck>,
 }
 

@@ -12,7 +12,7 @@ use crate::value::{Fields, Value, set};
 const NAME: usize = 18;
 const VALUE: usize = 14;
 
-/// Returns the frame as text.
+/// Returns the frame as text: a header line, and one line per field.
 pub fn text(shown: &Shown<'_>) -> String {
     let Shown {
         number,
@@ -122,7 +122,7 @@ fn said(field: &Field, value: &Value<'_>) -> String {
     }
 }
 
-/// Adds the value in base units if the unit is scaled: `50 (5 s)`.
+/// Returns the number's text, with its value in base units if the field's unit is scaled: `50 (5 s)`.
 fn scaled(field: &Field, text: String, number: f64) -> String {
     match field.scale() {
         Some((per, base)) => format!("{text} ({} {base})", number / per),

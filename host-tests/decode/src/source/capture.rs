@@ -17,7 +17,7 @@ use super::{Item, Packet, Trouble};
 struct Interface {
     name: String,
     is_ours: bool,
-    /// Time resolution as in the file: 10^-n s, or 2^-n s with the top bit set.
+    /// Time resolution of the interface as in the capture file: 10^-n s, or 2^-n s with the top bit set.
     resolution: u8,
 }
 
@@ -86,7 +86,7 @@ fn interface(block: &InterfaceDescriptionBlock<'_>) -> Interface {
     interface
 }
 
-/// Passes on the frames of a packet: exactly one in this project's captures.
+/// Passes the frames in a captured packet to `take`. This project's captures have exactly one in each packet.
 fn pieces<E>(
     packet: &EnhancedPacketBlock<'_>,
     interface: &Interface,
@@ -131,7 +131,7 @@ fn pieces<E>(
     }
 }
 
-/// Converts the time of a packet from its resolution: the reader takes every unit for a nanosecond.
+/// Converts the time of a packet from the interface's resolution. `read` counts every unit as a nanosecond.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

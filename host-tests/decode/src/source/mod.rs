@@ -7,43 +7,43 @@ use std::time::Duration;
 
 use uav_relay_capture::{Cut, Direction, Piece};
 
-/// First bytes of a capture. No frame starts with them: the second header byte, here 0d, would be 1x.
+/// First bytes of every pcapng capture. No frame starts with them: the second header byte, here 0d, would be 1x.
 const CAPTURE: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
 
-/// An item of a source.
+/// Item read from a capture or byte stream.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Item<'a> {
-    /// Comment of a capture.
+    /// Comment on the whole capture.
     Comment(&'a str),
-    /// A frame.
+    /// Frame in the capture or byte stream.
     Packet(Packet<'a>),
 }
 
-/// A frame as captured.
+/// Frame as captured, before decoding.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Packet<'a> {
-    /// Time of its last byte, since 1970; only in captures.
+    /// Time of the frame's last byte, since 1970; `None` for a byte stream.
     pub at: Option<Duration>,
-    /// Interface name in the capture; empty if unknown.
+    /// Name of the interface in the capture; empty if unknown.
     pub interface: &'a str,
-    /// Direction.
+    /// Direction of the frame, relative to the node that wrote the capture.
     pub direction: Direction,
     /// Comment of the captured packet; empty if the packet has no comment.
     pub comment: &'a str,
-    /// Bytes on the wire, possibly truncated.
+    /// Bytes of the frame on the wire, possibly truncated.
     pub wire: &'a [u8],
-    /// Original length.
+    /// Length of the whole frame, bytes, even if `wire` is truncated.
     pub len: usize,
 }
 
-/// Error of reading a source.
+/// Error while reading a capture or byte stream.
 #[derive(Debug)]
 pub enum Trouble<E> {
-    /// The source cannot be read.
+    /// Read error of the capture or byte stream.
     Read(io::Error),
-    /// The capture is malformed.
+    /// Malformed capture, with the fault.
     Capture(String),
-    /// The consumer stopped with this error.
+    /// Error of the consumer, which stopped the reading.
     Taken(E),
 }
 

@@ -5,7 +5,7 @@ use std::process::Stdio;
 
 use super::{HEARTBEAT, decode, lines};
 
-/// Blocks until the test times out if a frame is buffered.
+/// Checks that each frame is printed at once. If the program buffered one, this would block until the test times out.
 #[test]
 fn each_frame_is_printed_before_the_next_one_comes() {
     let mut child = decode().arg("--json").spawn().unwrap();

@@ -8,7 +8,7 @@ use uav_relay_decode::envelope::{before, sealed, stuffed};
 use uav_relay_decode::format::Format;
 use uav_relay_decode::write::write_fields;
 
-/// Returns a random frame of the message with tag `kind`; one above the last is a handshake.
+/// Returns a random frame with the message whose tag is `kind`. A `kind` one above the last tag gives a handshake.
 pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let (layout, flags, mut body) = match format.messages.get(kind) {
         Some(message) => (
@@ -24,7 +24,7 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
     around(&body, flags, rng)
 }
 
-/// Returns a frame around a body. Header and tag are random; `flags` that are 0 leave out the tag.
+/// Returns a frame with this body, and a random header and authentication tag. Without `flags` it has no tag.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let header = Header {
         network: rng.random(),

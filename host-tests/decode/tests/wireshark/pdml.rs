@@ -77,7 +77,7 @@ pub(crate) struct Wanted<'f> {
     value: Value<'f>,
 }
 
-/// Returns the expected fields in order, with the lengths of lists and every flag.
+/// Returns the fields that Wireshark should show, in order, with the lengths of lists and every flag.
 pub(crate) fn flat<'f>(prefix: &str, fields: &Fields<'f>) -> Vec<Wanted<'f>> {
     let mut all = Vec::new();
     for (field, value) in &fields.0 {
@@ -120,7 +120,7 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 impl Wanted<'_> {
-    /// Asserts that `shown` matches; compares bytes where Wireshark rounds numbers to six digits.
+    /// Asserts that Wireshark has shown this field. Compares bytes where Wireshark rounds numbers to six digits.
     pub(crate) fn is(&self, shown: &Shown) {
         assert_eq!(shown.name, self.name);
         let show = shown.show.as_str();

@@ -4,12 +4,13 @@ use uav_relay::{Phase, Schedule, ViewId};
 
 use super::{Chain, Member};
 
-/// Maximum number of wake-ups and deliveries until agreement. It covers 24 passes of 4 relays, each in 65 portions, after a few
-/// minutes of probation with a few dozen hellos a second.
+/// Maximum number of rounds until agreement. It covers 24 rounds of messages along 4 relays, each computed in 65
+/// steps, after a few minutes of probation with a few dozen hellos a second.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
-    /// Ends all faults: the whole chain must agree in one view, or its leader find that it can not.
+    /// Runs the chain without faults until all relays agree in one view. Panics if they never do, unless the leader
+    /// finds that no target SIR can be met. A chain with a fixed-step schedule is not run, because it takes too long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {
@@ -57,7 +58,7 @@ fn phase(member: &Member) -> Phase {
     member.watched.relay().phase()
 }
 
-/// Returns phase, view, index, size of the view and neighbours, for the message of a failure.
+/// Returns a relay's phase, view, index, number of relays and neighbours, for the message of a failure.
 fn state(member: &Member) -> (Phase, ViewId, u16, u16, [Option<u16>; 2]) {
     let relay = member.watched.relay();
     let left = relay.mission().relays();

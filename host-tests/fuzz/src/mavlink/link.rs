@@ -19,13 +19,14 @@ use crate::input::Input;
 
 const MOST_OPERATIONS: usize = 256;
 
-/// Maximum number of frames due at once. Twice a heartbeat, three requests, an answer, a target, three lines, four numbers.
+/// Maximum number of frames that the link may have to send at once. They are twice a heartbeat, three requests, an
+/// answer, a target, three lines, four numbers.
 const MOST_FRAMES: usize = 26;
 
-/// Maximum distance of a target from the line, m: 5 km, and the error of a flat earth there.
+/// Maximum distance of a flight target from the line, m: 5 km, and the error of a flat earth there.
 const AROUND_M: f64 = 5_040.0;
 
-/// Sites of transmitter and receiver: degrees, and m above the sea.
+/// Sites of transmitter and receiver: latitude and longitude in degrees, and m above the sea.
 const TX: [f64; 3] = [47.40, 8.54, 420.0];
 const RX: [f64; 3] = [47.41, 8.55, 431.0];
 
@@ -176,7 +177,7 @@ impl Link {
         }
     }
 
-    /// Delivers a frame, signed as chosen by the input if the link signs.
+    /// Delivers a frame of the autopilot to the link. If the link signs, the frame is signed as `input` chooses.
     fn says(&mut self, input: &mut Input<'_>, frame: &[u8]) {
         match &mut self.peer {
             Some(peer) => {
@@ -187,7 +188,8 @@ impl Link {
         }
     }
 
-    /// Delivers bytes in one piece, and to a clone in pieces of two alternating lengths. The results must be equal.
+    /// Delivers bytes to the link in one piece, and to a clone in pieces of two alternating lengths. The results must
+    /// be equal.
     fn hear(&mut self, bytes: &[u8], lengths: u16) {
         let mut other = self.autopilot.clone();
         without(|| self.autopilot.handle_bytes(self.now, bytes));
@@ -240,7 +242,7 @@ impl Link {
         self.says(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
-    /// Reports a lost relay to the link, and delivers an operator's command to clear it or others.
+    /// Reports a lost relay to the link, and delivers an operator's command to clear that relay or others.
     fn clears(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {
@@ -267,7 +269,7 @@ impl Link {
         self.says(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
-    /// Delivers a position, perhaps delayed or of a wrong clock.
+    /// Delivers the drone's position, perhaps with a delayed or wrong time stamp.
     fn position(&mut self, input: &mut Input<'_>, place: Placement) {
         let clock = input.byte();
         let Some(point) = self.axis.point(place) else {
@@ -289,7 +291,7 @@ impl Link {
         );
     }
 
-    /// Runs a firmware's loop once and checks its output.
+    /// Calls the link as a turn of a firmware's loop does, and checks its frames, positions and events.
     fn settle(&mut self) {
         without(|| self.autopilot.handle_timeout(self.now));
         let mut frames = 0;
@@ -339,7 +341,7 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// Checks a frame from which the signature was removed.
+    /// Checks a frame sent by the link, from which the signature was removed.
     ///
     /// `covered_flags` are the flags that its checksum covers.
     fn look_at(&mut self, frame: &[u8], covered_flags: u8) {
@@ -372,7 +374,8 @@ impl Link {
         }
     }
 
-    /// Checks a target: finite, near the line, within the speed limit, and sent in a state that permits it.
+    /// Checks a flight target that the link has sent. It must be finite, near the line, within the speed limit, and
+    /// permitted in the link's state.
     fn look_at_target(&mut self, payload: &[u8]) {
         let state = self.autopilot.state();
         let may = matches!(state, State::Engaged | State::Blind)
@@ -416,7 +419,7 @@ fn near(input: &mut Input<'_>) -> Placement {
     }
 }
 
-/// Reads a position near the line, now and then with an arbitrary number.
+/// Reads a position near the line; a coordinate is now and then an arbitrary number.
 fn any(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, 1_400.0)),

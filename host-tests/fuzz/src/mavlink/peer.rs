@@ -11,41 +11,43 @@ use crate::input::Input;
 const KEY: [u8; 32] = *b"the key is the autopilot's alone";
 const OTHER: [u8; 32] = *b"somebody without it has this one";
 
-/// Length of a signature, bytes: link, stamp, tag.
+/// Length of a MAVLink signature, bytes: link number, time stamp and tag.
 const SIGNATURE: usize = 13;
 
-/// Largest stamp, a minute in stamps, and the number of senders remembered.
+/// Largest time stamp of a signature. The next two constants are a minute in units of time stamps, and the number of
+/// senders that a link remembers.
 const LAST: u64 = (1 << 48) - 1;
 const MINUTE: u64 = 6_000_000;
 const SENDERS: usize = 8;
 
-/// 2015-01-01, µs since 1970; and 2026-11-22 in stamps since then.
+/// Origin of time stamps: 2015-01-01, µs since 1970. The next constant is 2026-11-22 as a stamp.
 const BEGIN_US: u64 = 1_420_070_400_000_000;
 const TODAY: u64 = 37_527_840_000_000;
 
 const HISTORY: usize = 32;
 
-/// Sender (system, component, link) and the stamp of its last accepted frame.
+/// Sender of signed frames (system, component, link), and the time stamp of its last accepted frame.
 type Sender = ((u8, u8, u8), u64);
 
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// Current stamp of the autopilot, and its signed frames.
+    /// Current time stamp of the simulated autopilot. The next field has its newest signed frames.
     stamp: u64,
     history: Vec<Vec<u8>>,
-    /// Stamp of the link's clock at the instant `at`.
+    /// Clock of the tested link as a time stamp, at the instant `at`.
     time: u64,
     at: Instant,
-    /// Senders known to the link.
+    /// Senders that the tested link should remember.
     senders: Vec<Sender>,
-    /// Last stamp that the link sent.
+    /// Time stamp of the last frame that the tested link sent.
     sent: u64,
     parser: Parser,
     pub(super) refused: u32,
 }
 
 impl Peer {
-    /// Creates both ends, and the signing settings of the link, which may know the time or not.
+    /// Creates the autopilot's end of a signed link, and the signing settings of the tested link. `input` chooses
+    /// whether that knows the time.
     pub(super) fn new(input: &mut Input<'_>, now: Instant) -> (Self, Signing) {
         let time = match input.below(4) {
             0 => 0,
@@ -69,8 +71,8 @@ impl Peer {
         (peer, Signing::new(KEY, 3, stamp, now))
     }
 
-    /// Signs a frame, mostly correctly. Otherwise leaves it unsigned, uses another key or an old stamp, damages it, or replays
-    /// one.
+    /// Signs a frame of the autopilot, mostly correctly. Otherwise leaves it unsigned, uses another key or an old
+    /// stamp, damages it, or replays one.
     pub(super) fn signs(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();
         let (key, link) = match how {
@@ -113,7 +115,7 @@ impl Peer {
         self.history.get(at).cloned()
     }
 
-    /// Sets the autopilot's clock: by a day, to the link's time, or to the largest stamp.
+    /// Sets the autopilot's clock: by a day, near the tested link's time, or to the largest stamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
         const DAY: u64 = 8_640_000_000;
         self.stamp = match input.below(6) {
@@ -126,7 +128,7 @@ impl Peer {
         };
     }
 
-    /// Processes bytes received by the link, and counts the frames that it must reject.
+    /// Processes bytes that the tested link has received, and counts the frames that the link must reject.
     pub(super) fn heard(&mut self, now: Instant, bytes: &[u8]) {
         let mut parser = self.parser.clone();
         for &byte in bytes {
@@ -182,14 +184,14 @@ impl Peer {
         true
     }
 
-    /// Advances the time, by at most 71 minutes between two calls.
+    /// Advances the expected clock of the tested link to `now`, by at most 71 minutes between two calls.
     fn advance(&mut self, now: Instant) {
         let passed = now.since(self.at).as_micros().min(u64::from(u32::MAX)) / 10;
         self.time = self.time.saturating_add(passed).min(LAST);
         self.at = self.at + uav_relay::Duration::from_micros(10 * passed);
     }
 
-    /// Checks a frame sent by the link at `now`; returns it without its signature.
+    /// Checks the signature of a frame sent by the tested link at `now`; returns the frame without it.
     ///
     /// # Panics
     /// The signature is wrong.
@@ -227,7 +229,7 @@ fn read(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(stamp)
 }
 
-/// Signs an unsigned frame; its checksum covers the signed flag.
+/// Returns an unsigned frame with a signature. Its checksum is computed again, because it covers the signed flag.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.truncate(frame.len() - 2);
@@ -241,7 +243,7 @@ fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     sealed(key, &frame, link, stamp)
 }
 
-/// Appends link, stamp and tag to a frame with its checksum.
+/// Appends the signature (link number, time stamp, tag) to a frame with its checksum.
 fn sealed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.push(link);

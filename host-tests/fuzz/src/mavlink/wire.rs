@@ -11,7 +11,7 @@ pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
     })
 }
 
-/// Message type: number, extra byte of its checksum, and length.
+/// Type of a MAVLink message: number, extra byte of its checksum, and payload length.
 pub(super) type Kind = (u32, u8, usize);
 
 pub(super) const HEARTBEAT: Kind = (0, 50, 9);
@@ -32,7 +32,7 @@ pub(super) fn id(frame: &[u8]) -> u32 {
     u32::from_le_bytes([a, b, c, 0])
 }
 
-/// Returns the extra checksum byte of a message; 0 for an unknown one.
+/// Returns the extra byte that a message adds to its checksum; 0 for an unknown message.
 pub(super) fn extra(id: u32) -> u8 {
     let known = [
         HEARTBEAT,
@@ -55,7 +55,7 @@ pub(super) fn extra(id: u32) -> u8 {
 
 pub(super) const SENT: [Kind; 7] = [HEARTBEAT, COMMAND, ACK, SET_POSITION, TIMESYNC, TEXT, VALUE];
 
-/// Builds a frame; trailing zeros of its payload are omitted, except in its first byte.
+/// Builds a MAVLink frame. Trailing zeros of its payload are omitted, but its first byte stays.
 pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {
     let (id, extra, _) = kind;
     let zeros = payload.iter().rev().take_while(|byte| **byte == 0).count();
@@ -79,10 +79,11 @@ pub(super) struct Placed {
     pub(super) at: usize,
 }
 
-/// Maximum number of parts of a stream, which is read twice, byte by byte.
+/// Maximum number of frames and noise pieces in a stream. The limit bounds the work, because a stream is read twice.
 const MOST_PARTS: usize = 64;
 
-/// Builds a stream of noise, intact, damaged and truncated frames. Zeros at its end complete any false start.
+/// Builds a stream of noise and of intact, damaged and truncated frames. Also returns where the intact ones begin.
+/// Zeros at the end complete any false start of a frame.
 pub(super) fn stream(input: &mut Input<'_>) -> (Vec<u8>, Vec<Placed>) {
     let (mut bytes, mut placed) = (Vec::new(), Vec::new());
     for _ in 0..MOST_PARTS {

@@ -3,7 +3,7 @@
 use super::parts::Body;
 use crate::input::Input;
 
-/// Number of sums that a sensing pass collects.
+/// Number of sums of measurements in a sensing message.
 const SUMS: usize = 18;
 
 impl Body<'_, '_> {
@@ -39,7 +39,7 @@ impl Body<'_, '_> {
         self.float(|input| input.scaled(1e-30, 1e6));
     }
 
-    /// Appends the power received by an end of the chain, W, or 0 for none reported.
+    /// Appends the interference power that an end of the chain has reported, W; 0 for none.
     fn level_or_none(&mut self) {
         if self.input.flag() {
             self.float(|input| input.scaled(1e-30, 1e6));
@@ -49,7 +49,8 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the sums over up to eight positions, where v is that of a single source, or arbitrary.
+/// Returns the sums of a sensing message over up to eight positions. The inverse power v is that of a single
+/// interferer, or arbitrary.
 fn of_places(input: &mut Input<'_>) -> [f32; SUMS] {
     let of_one = input.flag();
     let unit = input.scaled(1e-6, 1e12);

@@ -2,14 +2,14 @@
 
 use super::parts::Body;
 
-/// Numbers of the paper's scenario between the number of relays and the interferer. They are distance and minimum separation, m,
-/// power of Tx, W, common altitude, m, common power, W.
+/// Values of the paper's scenario in the order of an offer. They are distance and minimum separation, m, power of Tx,
+/// W, common altitude, m, common power, W.
 const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 
 /// Path-loss factors of the paper, with and without line of sight.
 const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
 
-/// Sites of Tx and Rx, 1000 m apart to the millimetre.
+/// Sites of Tx and Rx: latitude, longitude (1e-7 degrees), height (mm). They are 1000 m apart to the millimetre.
 const SITES: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -35,7 +35,7 @@ impl Body<'_, '_> {
         self.answer(choice);
     }
 
-    /// Appends the nonce that the offer answers: mostly that of the relay's last hello.
+    /// Appends the number of the hello that the offer answers: mostly the relay's last hello.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
             0..240 => self.known.asked,
@@ -44,7 +44,8 @@ impl Body<'_, '_> {
         self.word(answer);
     }
 
-    /// Appends sites: mostly none, else two a kilometre apart as in the paper, or arbitrary numbers.
+    /// Appends sites of Tx and Rx to an offer, mostly none. Else they are a kilometre apart, as in the paper, or
+    /// arbitrary numbers.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -56,7 +57,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the version held by the relay, one of the next three, or any.
+    /// Appends a mission version: that which the tested relay holds, one of the next three, or any.
     fn version(&mut self) {
         let held = self.known.held.version;
         let version = match self.input.byte() {
@@ -66,7 +67,7 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends the mission's number of relays, or any number.
+    /// Appends a number of relays: that of the loaded mission, or any.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.known.relays,
@@ -75,7 +76,8 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission with another interferer. It may have altitudes and lateral positions to choose from.
+    /// Appends the paper's mission with another interferer. Relays may have altitudes and lateral positions to choose
+    /// from.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));
@@ -115,7 +117,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, 1e5));
     }
 
-    /// Appends path-loss factors, rarely with one arbitrary number.
+    /// Appends the three path-loss factors of an offer, rarely with one arbitrary number.
     fn losses(&mut self, mut losses: [f64; 3]) {
         let which = usize::from(self.input.byte());
         if let Some(loss) = losses.get_mut(which) {

@@ -5,24 +5,24 @@ use uav_relay::wire::digest::MissionId;
 
 use crate::input::Input;
 
-/// State of a relay that its neighbour may know.
+/// State of the tested relay that its neighbour may know.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Known {
-    /// Digest of the loaded mission.
+    /// Digest of the mission that the tested relay was loaded with.
     pub digest: u16,
-    /// Number of relays in the loaded mission.
+    /// Number of relays in the mission that the tested relay was loaded with.
     pub relays: u16,
-    /// Digest of the flown mission.
+    /// Digest of the mission that the tested relay flies.
     pub flown: u16,
-    /// Newest mission held.
+    /// Newest mission that the tested relay holds, flown or not.
     pub held: MissionId,
-    /// View that the relay under test has agreed on.
+    /// View (agreed membership of the chain) that the tested relay has accepted last.
     pub view: ViewId,
-    /// Number of the current pass.
+    /// Number of the current pass, a round of messages along the chain.
     pub number: u16,
-    /// Association number in its last fence message, 0 for none.
+    /// Association number in the tested relay's last fence message, 0 for none.
     pub association: u16,
-    /// Nonce of its last hello, 0 for none.
+    /// Offer number in the tested relay's last hello, 0 for none.
     pub asked: u16,
     /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
@@ -35,7 +35,8 @@ pub(super) struct Body<'a, 'b> {
 }
 
 impl Body<'_, '_> {
-    /// Appends a pass number: that of the current, the next or an earlier pass, or any number.
+    /// Appends the number of a pass, a round of messages along the chain. It is the next, current or an earlier
+    /// number, or any.
     pub(super) fn number(&mut self) {
         let number = match self.input.byte() {
             0..96 => self.known.number.wrapping_add(1),
@@ -55,7 +56,7 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Appends number and mark of a pass in the relay's view, rarely of another view.
+    /// Appends a pass (message round) number, and the digest of mission and view, rarely of another view.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.known.view);
@@ -67,7 +68,8 @@ impl Body<'_, '_> {
         self.word(self.known.flown.wrapping_add(mark));
     }
 
-    /// Appends a view: the relay's, one of the next from a possible proposer, an earlier one, or any.
+    /// Appends the name of a view (membership of the chain). It is the tested relay's, one of the next from a
+    /// possible proposer, an earlier one, or any.
     pub(super) fn view(&mut self) {
         let own = self.known.view;
         let view = match self.input.byte() {
@@ -91,7 +93,7 @@ impl Body<'_, '_> {
         self.relay();
     }
 
-    /// Appends a question number, mostly none or one of the first.
+    /// Appends a sequence number, as of a heartbeat's request or reply: mostly 0 (none) to 11.
     pub(super) fn question(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
@@ -100,7 +102,7 @@ impl Body<'_, '_> {
         self.word(number);
     }
 
-    /// Appends a lease in tenths of a second, mostly short.
+    /// Appends the duration of a lease in tenths of a second, mostly short.
     pub(super) fn lease(&mut self) {
         let tenths = match self.input.byte() {
             few @ 0..240 => u16::from(few),
@@ -109,7 +111,7 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// Appends a relay of a short chain, or any.
+    /// Appends a relay's index: mostly that of a relay in a short chain, 0 to 5, else any.
     pub(super) fn relay(&mut self) {
         let relay = match self.input.byte() {
             small @ 0..240 => u16::from(small % 6),
@@ -124,7 +126,7 @@ impl Body<'_, '_> {
         number
     }
 
-    /// Appends a byte from `least` to `most`, rarely any; returns it.
+    /// Appends a byte from `least` to `most`, rarely any byte; returns it.
     pub(super) fn small(&mut self, least: u8, most: u8) -> u8 {
         let byte = self.input.byte();
         let small = if byte < 240 {
@@ -158,13 +160,14 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
-    /// Appends a lateral position, m: up to the allowed range, or small.
+    /// Appends a lateral position y, m, within 1e5 or 100 to either side.
     pub(super) fn beside(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// Appends a list of floats with its count: one number repeated, or separate numbers.
+    /// Appends a list of up to `most` floats with its count. All are the same number, or each is drawn from `low` to
+    /// `high`.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();
@@ -178,7 +181,8 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends a pulse's number, mostly one of the first, and the digest of the view, rarely a wrong one.
+    /// Appends the number of a lease renewal and the digest of mission and view. The number is mostly one of the
+    /// first, the digest rarely wrong.
     pub(super) fn pulse_number(&mut self) {
         self.question();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -186,7 +190,8 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns the mission that the relay holds, the loaded one, a newer or older version, or any.
+    /// Returns version and digest of a mission: that held by the tested relay, the loaded one, or another. The other
+    /// one is newer, older or arbitrary.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.known.held;
         match self.input.byte() {
@@ -210,7 +215,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends an association number: the number known from the relay, a small number, or any.
+    /// Appends an association number of a fence message: that of the tested relay, a small number, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),
@@ -221,7 +226,8 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the view's mark, which is added to the mission's digest. The lower half plus the byte-swapped upper half.
+/// Returns the 16-bit mark of a view, which is added to the mission's digest. It is the lower half of the view's name
+/// plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

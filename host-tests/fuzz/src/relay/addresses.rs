@@ -5,7 +5,8 @@ use uav_relay::{Port, Wiring};
 
 use super::super::watch::NETWORK;
 
-/// Returns the header and the port of a frame from the neighbour at `side` of relay `index`.
+/// Returns header and port of a frame from a neighbour of relay `index`. `side` is 0 for the one upstream, 1 for the
+/// one downstream.
 pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Port) {
     let (sender, port) = if side == 1 {
         (index + 1, Port::Downstream)
@@ -24,7 +25,8 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
     }
 }
 
-/// Returns the node `more` beyond the neighbour at `side` of relay `index`, at least 0.
+/// Returns the node number that is `more` beyond a neighbour of relay `index`; at least 0. `side` is 0 upstream, 1
+/// downstream.
 pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {
     let distance = 1 + more as u16;
     if side == 1 {

@@ -7,21 +7,21 @@ use uav_relay::{Port, Relay, Settings, Wiring};
 
 use super::number::number_of;
 
-/// Range of a shared channel, nodes.
+/// Range of radio messages on a shared channel: a relay sends to nodes at most this many numbers away.
 const NEAR: u16 = 4;
 
 /// Network number of every fuzzed relay.
 pub const NETWORK: u16 = 9;
 
-/// Last contents of a relay's frames.
+/// Checker of a relay's frames, with the last numbers that they contained.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
-    /// Number of its node, and number of relays.
+    /// Node number of the relay. The next field is the number of relays in the mission.
     node: u16,
     all: u16,
     pub(super) sent: u32,
     pub(super) number: u16,
-    /// Association number of the last fence message.
+    /// Association number in the relay's last fence message.
     pub(super) association: u16,
     pub(super) asked: u16,
 }
@@ -38,7 +38,8 @@ impl Frames {
         }
     }
 
-    /// Checks a frame: valid, from this relay, to the neighbour behind its port.
+    /// Checks a frame sent by the relay. It must be valid, from this relay, and to a neighbour reached through
+    /// `port`.
     pub(super) fn look(&mut self, relay: &Relay, settings: &Settings, port: Port, bytes: &[u8]) {
         let mut deframer = Deframer::new();
         let mut frames = 0;

@@ -2,7 +2,7 @@
 
 use uav_relay::wire::message::Message;
 
-/// Returns the pass number of a message; pulses have numbers of their own.
+/// Returns the pass number of a message; `None` for messages without one, as those of leases.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,

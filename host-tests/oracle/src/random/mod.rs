@@ -24,22 +24,22 @@ use rand::{Rng, RngExt};
 
 use crate::reference::{Link, Station, path_loss_factor};
 
-/// Differences between the relays of a chain.
+/// Differences between the relays of a random chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Chain {
-    /// Identical relays.
+    /// Relays with the same power and altitude.
     Alike,
-    /// Own powers.
+    /// Relays that differ in power.
     OwnPower,
-    /// Own altitudes.
+    /// Relays that differ in altitude.
     OwnAltitude,
-    /// Own powers and altitudes.
+    /// Relays that differ in power and altitude.
     Own,
-    /// Identical in half of the links; the other three with equal chance.
+    /// Random choice for each link: identical relays in half of the links, each other kind in a sixth.
     Any,
 }
 
-/// Kind of links to draw.
+/// Kind of random links to draw: number of relays, and differences between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Style {
     /// Smallest and largest number of relays, >= 1.
@@ -49,19 +49,19 @@ pub struct Style {
 }
 
 impl Style {
-    /// 1 to 50 identical relays.
+    /// Links of 1 to 50 identical relays.
     pub const ALIKE: Self = Self {
         relays: 1..=50,
         chain: Chain::Alike,
     };
-    /// 1 to 50 relays of any kind.
+    /// Links of 1 to 50 relays, identical or not.
     pub const ANY: Self = Self {
         relays: 1..=50,
         chain: Chain::Any,
     };
 }
 
-/// Draws one link; the distribution is in the module's table.
+/// Draws a random link; the distribution is in the module's table.
 pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     let distance_m = log_uniform(rng, 10.0, 1e5);
     let altitude_m = bounded(log_uniform(rng, 0.002, 0.5) * distance_m);
@@ -91,7 +91,8 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     }
 }
 
-/// Adds noise of 1e-6 to 1e4 of the interference at a random position. It stays within a mission's limit.
+/// Returns the link with receiver noise of 1e-6 to 1e4 times the interference at a random position. The noise stays
+/// within the limit of a mission.
 pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     let place = rng.random_range(0.0..=link.distance_m);
     let altitude_m = link.relays.first().map_or(1.0, |relay| relay.altitude_m);
@@ -104,7 +105,8 @@ pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     }
 }
 
-/// Returns the seed of a random test. The environment variable `SEED` if it is a number, else `default`; prints it.
+/// Returns and prints the seed of a random test. It is the environment variable `SEED`, or `default` if that is not a
+/// number.
 pub fn seed(default: u64) -> u64 {
     let seed = std::env::var("SEED")
         .ok()
@@ -114,7 +116,8 @@ pub fn seed(default: u64) -> u64 {
     seed
 }
 
-/// Returns the number of scenes of a random test. The environment variable `COUNT` if it is a number, else `usual`.
+/// Returns the number of scenes in a random test. It is the environment variable `COUNT`, or `usual` if that is not a
+/// number.
 pub fn count(usual: usize) -> usize {
     let count = std::env::var("COUNT").ok();
     count.and_then(|text| text.parse().ok()).unwrap_or(usual)
@@ -170,7 +173,7 @@ fn along(rng: &mut impl Rng, d: f64) -> f64 {
     }
 }
 
-/// Draws Y as a share of D.
+/// Draws the interferer's Y, its offset from the line Tx-Rx, as a fraction of D.
 fn aside(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..100) {
         0..25 => 0.0,

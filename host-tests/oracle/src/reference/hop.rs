@@ -2,10 +2,10 @@
 
 use super::link::{Link, meets, received_w};
 
-/// Bisection steps: more than enough to collapse any f64 interval in metres to adjacent numbers.
+/// Number of bisection steps, enough to halve any f64 interval in metres down to adjacent numbers.
 const HALVINGS: usize = 200;
 
-/// A hop that ends at a relay; `x` in its methods is that relay's position in metres.
+/// Hop to a relay from Tx or from the relay before it. `x` in its methods is the receiving relay's position, m.
 pub(super) struct Hop<'a> {
     link: &'a Link,
     sender_w: f64,
@@ -16,7 +16,7 @@ pub(super) struct Hop<'a> {
 }
 
 impl<'a> Hop<'a> {
-    /// Creates hop `k` in 1..=N with relay k-1 at `from_x`; hop 1 is sent from Tx at 0.
+    /// Creates the hop to relay `k`, within 1 to N, from relay k-1 at `from_x`. Hop 1 is sent from Tx at 0.
     pub(super) fn new(link: &'a Link, k: usize, from_x: f64) -> Option<Self> {
         let before = k.checked_sub(1)?;
         let own_h = link.relays.get(before)?.altitude_m;
@@ -42,7 +42,7 @@ impl<'a> Hop<'a> {
         )
     }
 
-    /// Returns the received power over interference and noise (linear).
+    /// Returns the hop's SIR (linear) with the receiving relay at `x`: signal / (interference + noise).
     pub(super) fn sir(&self, x: f64) -> f64 {
         let signal = received_w(
             self.sender_w,
@@ -70,9 +70,11 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// Returns a value with the sign of the SIR's slope at `x`. It is concave in `x` beyond the sender (see [`super`]).
+    /// Returns a value with the sign of the SIR's slope at `x`. The value is a concave function of `x` beyond the
+    /// sender (see [`super`]).
     ///
-    /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of the total disturbance.
+    /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of the total
+    /// disturbance.
     fn rise(&self, x: f64) -> f64 {
         let (dx, dh) = (x - self.sender_x, self.own_h - self.sender_h);
         let (ix, iy, ih) = (x - self.link.x_i, self.link.y_i, self.own_h);
@@ -92,7 +94,8 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// Returns the turning points of the SIR from `low` to `high`, both at or beyond the sender, rising. At most two.
+    /// Returns the positions, m, at which the SIR changes from rising to falling or back. They ascend and lie within
+    /// `low` to `high`, both at or beyond the sender; there are at most two.
     ///
     /// The SIR is monotone between them. About 60 slope evaluations, with noise 300.
     pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
@@ -130,7 +133,8 @@ impl<'a> Hop<'a> {
     }
 }
 
-/// Returns the last x from `inside` towards `outside`, m, at which `holds` is true. `outside` may be smaller.
+/// Returns the last x, m, from `inside` towards `outside` at which `holds` is true. `outside` may be smaller than
+/// `inside`.
 ///
 /// `holds` must be true at `inside`, false at `outside`, and change once. Exact to adjacent f64 values.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {

@@ -8,21 +8,21 @@
 
 use super::link::{Link, received_w};
 
-/// Region open to relays, seen along Tx-Rx.
+/// Cross-section open to relays: ranges of altitude and of lateral position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
     /// Lowest altitude above the ground of Tx, Rx and the interferer, m, > 0.
     pub least_m: f64,
-    /// Highest altitude, m, >= `least_m`.
+    /// Highest altitude of a relay, m, >= `least_m`.
     pub most_m: f64,
-    /// Least y, m; seldom > 0.
+    /// Smallest lateral position y of a relay, m; seldom > 0.
     pub left_m: f64,
-    /// Largest y, m, >= `left_m`.
+    /// Largest lateral position y of a relay, m, >= `left_m`.
     pub right_m: f64,
 }
 
 impl Corridor {
-    /// Creates the plane above Tx-Rx, within a band of altitudes.
+    /// Creates a corridor without width: the vertical plane through Tx and Rx, between two altitudes.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,
@@ -32,7 +32,7 @@ impl Corridor {
         }
     }
 
-    /// Returns true if a position is inside, with a tolerance of `slack_m`.
+    /// Returns true if a position is inside the corridor, with a tolerance of `slack_m`.
     pub fn contains(&self, place: &Place, slack_m: f64) -> bool {
         let within =
             |low: f64, value: f64, high: f64| (low - slack_m..=high + slack_m).contains(&value);
@@ -41,19 +41,19 @@ impl Corridor {
     }
 }
 
-/// A relay with a fixed lateral position and altitude, inside the corridor or not.
+/// Relay with a fixed lateral position and altitude, inside the corridor or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hold {
     /// Index of the relay in the link, from 0.
     pub relay: usize,
-    /// Offset from the Tx-Rx plane, m.
+    /// Fixed lateral position, the offset from the vertical plane through Tx and Rx, m.
     pub y_m: f64,
-    /// Altitude, m, > 0.
+    /// Fixed altitude, m, > 0.
     pub altitude_m: f64,
 }
 
 impl Hold {
-    /// Returns the corridor of one relay: a single point if its cross-section is fixed.
+    /// Returns the corridor of one relay: a single point if `held` fixes its lateral position and altitude.
     pub(crate) fn room(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
         let own = held.iter().find(|hold| hold.relay == relay);
         own.map_or(corridor, |hold| Corridor {
@@ -68,16 +68,16 @@ impl Hold {
 /// Position of a relay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Coordinate along the line from Tx to Rx, m, in [0, D].
+    /// Coordinate along the line from Tx to Rx, m: 0 to the distance D.
     pub x_m: f64,
-    /// Offset from the Tx-Rx plane, m, with the sign of the interferer's `y_i`.
+    /// Offset from the vertical plane through Tx and Rx, m, with the sign of the interferer's `y_i`.
     pub y_m: f64,
     /// Altitude, m.
     pub altitude_m: f64,
 }
 
 impl Place {
-    /// Creates a position in the plane above Tx-Rx.
+    /// Creates a position in the vertical plane through Tx and Rx.
     pub const fn in_plane(x_m: f64, altitude_m: f64) -> Self {
         Self {
             x_m,
@@ -93,7 +93,7 @@ impl Place {
     }
 }
 
-/// Returns the SIR (linear) of the worst hop. `None` without relays, or unless there is one position per relay.
+/// Returns the SIR (linear) of a chain's worst hop. `None` without relays, or unless there is one position per relay.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     let (tail, last) = (places.last()?, link.relays.last()?);
     if places.len() != link.len() {
@@ -126,8 +126,8 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     Some(hops.fold(rx, f64::min))
 }
 
-/// Returns true if a chain keeps order, corridor, fixed positions and least separation. The separation may be short by 1e-9 of
-/// itself, for rounding.
+/// Returns true if a chain keeps the relays' order, corridor, fixed positions and minimum separation. The separation
+/// may be short by 1e-9 of itself, for rounding.
 pub fn keeps_rules(link: &Link, corridor: Corridor, held: &[Hold], places: &[Place]) -> bool {
     let mut each = (0..).zip(places);
     let within = each.all(|(relay, place)| {

@@ -1,6 +1,6 @@
 //! A chain of relays for the reference optimisers, and the received power over a distance.
 
-/// A relay: altitude and transmit power.
+/// Relay in a reference link: altitude and transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Station {
     /// Altitude above the ground of Tx, Rx and the interferer, m, > 0.
@@ -9,12 +9,12 @@ pub struct Station {
     pub power_w: f64,
 }
 
-/// A chain of relays between Tx at (0, 0) and Rx at (D, 0) with one interferer on the ground.
+/// Chain of relays between Tx at (0, 0) and Rx at (D, 0), with one interferer on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Link {
     /// Tx-Rx distance D, m, > 0.
     pub distance_m: f64,
-    /// Least distance between neighbours, m, >= 0; most searches ignore it.
+    /// Minimum distance between neighbouring relays, m, >= 0; most searches ignore it.
     pub min_separation_m: f64,
     /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,
@@ -22,7 +22,7 @@ pub struct Link {
     pub interferer_w: f64,
     /// Interferer's coordinate along Tx-Rx, m; any finite value.
     pub x_i: f64,
-    /// Interferer's offset from the Tx-Rx plane, m; any finite value.
+    /// Interferer's offset from the vertical plane through Tx and Rx, m; any finite value.
     pub y_i: f64,
     /// Path-loss factor between two relays, 1/m^2, > 0.
     pub mu_los: f64,
@@ -32,7 +32,7 @@ pub struct Link {
     pub eta: f64,
     /// Noise power of every receiver, W, >= 0; if above 0, SIR means SINR.
     pub noise_w: f64,
-    /// Relays 1 to N from Tx to Rx.
+    /// Relays 1 to N, in order from Tx to Rx.
     pub relays: Vec<Station>,
 }
 
@@ -46,7 +46,8 @@ pub fn path_loss_factor(carrier_hz: f64, excess: f64) -> f64 {
 }
 
 impl Link {
-    /// Returns the paper's multi-hop scenario. 80 W Tx, `n` 1 W relays at 20 m, 80 W interferer at (500, 400) m, D = 1 km.
+    /// Returns the paper's multi-hop scenario with `n` relays of 1 W at 20 m. Tx and interferer have 80 W, the
+    /// interferer is at (500, 400) m, and D is 1 km.
     pub fn paper(n: usize) -> Self {
         let mu_los = path_loss_factor(2e9, 10_f64.powf(0.01));
         Self {
@@ -81,12 +82,13 @@ impl Link {
     }
 }
 
-/// Returns the received power over a squared-distance path loss, W; offsets in metres.
+/// Returns the received power, W: `power_w` / (`factor` distance^2). `dx`, `dy` and `dz` are the parts of the
+/// distance, m.
 pub(super) fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }
 
-/// Returns true if an SIR meets a target, with a tolerance of a few units in the last place.
+/// Returns true if `sir` is at least `target`, with a tolerance of a few units in the last place.
 ///
 /// Otherwise rounding would decide for a constant SIR (interferer at Tx) that equals the target.
 pub(super) fn meets(sir: f64, target: f64) -> bool {

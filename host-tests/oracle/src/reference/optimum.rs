@@ -3,16 +3,17 @@
 use super::hop::Hop;
 use super::link::Link;
 
-/// Relative bracket width at which the bisection of the target ends.
+/// Relative width of the interval at which the bisection for the best target SIR ends.
 const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
 
 impl Link {
-    /// Returns the largest target (linear) that any chain meets, to 1e-13 relative.
+    /// Returns the best SIR (linear) of all chains, the largest target that a chain meets. Accurate to 1e-13
+    /// relative.
     ///
-    /// `None` without relays, or if every chain has an SIR of zero. Uses greedy chains if all relays share one altitude, the
-    /// exact sets otherwise. About 50 to 60 chains.
+    /// `None` without relays, or if every chain has an SIR of zero. Uses greedy chains if all relays share one
+    /// altitude, the exact sets otherwise. About 50 to 60 chains.
     pub fn optimum(&self) -> Option<f64> {
         let mut heights = self.relays.iter().map(|relay| relay.altitude_m);
         let first = heights.next()?;
@@ -23,10 +24,11 @@ impl Link {
         }
     }
 
-    /// Returns the target (linear) above which [`Link::feasible`] fails, to 1e-13 relative. `None` as for [`Link::optimum`].
+    /// Returns the target SIR (linear) above which the greedy [`Link::feasible`] fails, to 1e-13 relative. `None` as
+    /// for [`Link::optimum`].
     ///
-    /// The optimum itself if all relays share one altitude. Otherwise at most the optimum, and only one of the targets at which
-    /// the greedy chain fails: it may fail at a target and succeed at a larger one.
+    /// The optimum itself if all relays share one altitude. Otherwise at most the optimum, and only one of the
+    /// targets at which the greedy chain fails: it may fail at a target and succeed at a larger one.
     pub fn farthest_optimum(&self) -> Option<f64> {
         self.largest_target(|target| self.feasible(target).is_some())
     }
@@ -53,9 +55,11 @@ impl Link {
         Some(below)
     }
 
-    /// Returns the first target of the fixed step (linear): the lesser of the SIRs above Tx and above Rx.
+    /// Returns the first target (linear) of the paper's fixed-step schedule. It is the lesser of the first hop's SIR
+    /// with relay 1 straight above Tx and the last hop's SIR with relay N straight above Rx.
     ///
-    /// With the interferer behind Tx (X < 0) hop 1 is better farther out, and its best SIR over [0, D] replaces the one above Tx.
+    /// With the interferer behind Tx (X < 0) hop 1 is better farther out, and its best SIR over [0, D] replaces the
+    /// one above Tx.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {
@@ -66,11 +70,12 @@ impl Link {
         Some(near.min(self.sir_rx(self.distance_m)?))
     }
 
-    /// Runs the paper's fixed step. Returns the number of targets tried, the feasible one included, and that target (linear).
+    /// Runs the paper's fixed-step schedule. Returns the number of targets tried, the feasible one included, and that
+    /// target (linear).
     ///
-    /// The targets are `gamma_0` - i `epsilon`, i = 0, 1, ...; `gamma_0` is the lesser of the SIRs above Tx and above Rx (for X <
-    /// 0, of hop 1's best over [0, D] and the SIR above Rx), `epsilon` the step (linear, > 0). `None` if no target is feasible.
-    /// Costs one greedy chain per target, at most `gamma_0` / `epsilon`.
+    /// The targets are `gamma_0` - i `epsilon`, i = 0, 1, ...; `gamma_0` is the lesser of the SIRs above Tx and above
+    /// Rx (for X < 0, of hop 1's best over [0, D] and the SIR above Rx), `epsilon` the step (linear, > 0). `None` if
+    /// no target is feasible. Costs one greedy chain per target, at most `gamma_0` / `epsilon`.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

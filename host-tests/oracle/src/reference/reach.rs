@@ -4,11 +4,11 @@ use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
 
 impl Link {
-    /// Returns the farthest position in [`from_x`, D], m, at which relay `k` meets `target`. `k` is in 1..=N; `target` is linear
-    /// and above 0.
+    /// Returns the farthest position, m, from `from_x` to D at which relay `k` meets `target`. `k` is within 1 to N;
+    /// `target` is linear and above 0.
     ///
-    /// Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None` if no position meets the target. About 60 SIR evaluations, at most
-    /// about 150.
+    /// Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None` if no position meets the target. About 60 SIR
+    /// evaluations, at most about 150.
     pub fn farthest(&self, k: usize, from_x: f64, target: f64) -> Option<f64> {
         let end = self.distance_m;
         if !(0.0..=end).contains(&from_x) {
@@ -46,11 +46,12 @@ impl Link {
         Some(bisect(0.0, outside, meets))
     }
 
-    /// Returns the positions, m, of the chain in which each relay goes as far as `target` (linear) allows.
+    /// Returns the positions, m, of the greedy chain for a target SIR (linear). Each relay goes as far as `target`
+    /// allows.
     ///
-    /// `None` if a relay has no position or Rx is out of the last one's reach. The on-board protocol does the same with a target.
-    /// If all relays share one altitude, `None` proves that no chain meets the target; otherwise see [`Link::placement`]. N
-    /// reaches.
+    /// `None` if a relay has no position or Rx is out of the last one's reach. The on-board protocol does the same
+    /// with a target. If all relays share one altitude, `None` proves that no chain meets the target; otherwise see
+    /// [`Link::placement`]. N reaches.
     pub fn feasible(&self, target: f64) -> Option<Vec<f64>> {
         let mut from = 0.0;
         let mut x = Vec::with_capacity(self.len());

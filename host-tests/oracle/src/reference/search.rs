@@ -2,22 +2,24 @@
 
 use super::link::Link;
 
-/// Golden-section steps per refined cell: the cell shrinks by about 2e-9.
+/// Number of golden-section steps in one grid cell, which shrinks the cell by a factor of about 2e-9.
 const STEPS: usize = 42;
 
 const PEAKS: usize = 4;
 
 impl Link {
-    /// Returns the best chain SIR (linear) over all ordered placements with the least separation. The grids are nested and
-    /// refined.
+    /// Returns the best SIR (linear) of all chains with the minimum separation, by brute force. The grids are nested
+    /// and refined.
     ///
-    /// 0 if there is none. `points` (>= 16) is the number of grid points per relay. Never more than the optimum except for rounding; the grid may
-    /// miss part of it. Costs about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.
+    /// 0 if there is none. `points` (>= 16) is the number of grid points per relay. Never more than the optimum
+    /// except for rounding; the grid may miss part of it. Costs about (4 `points` + 170)^N SIR evaluations: use it
+    /// for N of 1 or 2.
     pub fn optimum_by_search(&self, points: u32) -> f64 {
         self.best_from(1, 0.0, points)
     }
 
-    /// Returns the best worst SIR of hops `k`..=N+1 with relay k-1 at `from_x`.
+    /// Returns the best SIR of hops `k` to N+1 over all positions of the relays from `k` on. The SIR of several hops
+    /// is that of the worst one; relay k-1 is at `from_x`.
     fn best_from(&self, k: usize, from_x: f64, points: u32) -> f64 {
         let worst_hop = |x: f64| {
             let here = self.sir_relay(k, from_x, x).unwrap_or(0.0);
@@ -32,7 +34,7 @@ impl Link {
         maximum(&self.grid(from, points), worst_hop)
     }
 
-    /// Returns points from `from_x` to D: evenly spaced, and denser near both ends and the interferer.
+    /// Returns the grid of positions from `from_x` to D. It is even, and denser near both ends and the interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);

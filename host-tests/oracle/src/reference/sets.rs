@@ -12,10 +12,11 @@ use super::link::{Link, meets};
 type Interval = (f64, f64);
 
 impl Link {
-    /// Returns positions, m, of a chain that meets `target` (linear). Each relay is as far toward Rx as possible.
+    /// Returns the positions, m, of a chain that meets `target` (linear SIR). Each relay is as far toward Rx as
+    /// possible.
     ///
-    /// `None` only if there is no such chain, whatever the altitudes. Per relay and interval about 300 SIR evaluations; there are
-    /// seldom more than three intervals.
+    /// `None` only if there is no such chain, whatever altitudes the relays have. Per relay and interval about 300
+    /// SIR evaluations; there are seldom more than three intervals.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let sets = self.sets(target, 0.0)?;
         let mut limit = self.distance_m;
@@ -28,14 +29,16 @@ impl Link {
         Some(x)
     }
 
-    /// Returns the best SIR (linear) of relays at their altitudes that keep the least separation. Accurate to 1e-13 relative.
+    /// Returns the best SIR (linear) of all chains that keep the minimum separation. Altitudes are fixed. Accurate to
+    /// 1e-13 relative.
     ///
     /// `None` as for [`Link::optimum`], or if the separation leaves no chain.
     pub fn optimum_apart(&self) -> Option<f64> {
         self.largest_target(|target| self.sets(target, self.min_separation_m).is_some())
     }
 
-    /// Returns the least advance along x of relay `k` past relay k-1, m, for neighbours `apart_m` apart. 0 for relay 1.
+    /// Returns the minimum distance along x from relay k-1 to relay `k`, m; 0 for relay 1. Neighbours must be
+    /// `apart_m` apart; their altitudes may differ.
     pub(super) fn least_advance(&self, k: usize, apart_m: f64) -> f64 {
         let altitude = |k: usize| Some(self.relays.get(k.checked_sub(1)?)?.altitude_m);
         let pair = altitude(k).zip(k.checked_sub(1).and_then(altitude));
@@ -44,7 +47,8 @@ impl Link {
         })
     }
 
-    /// Returns the reachable positions of every relay, with neighbours `apart_m` apart. `None` if `target` is missed.
+    /// Returns the positions that every relay can have while all hops before it meet `target`. Neighbours are at
+    /// least `apart_m` apart. `None` if no chain meets the target at Rx.
     fn sets(&self, target: f64, apart_m: f64) -> Option<Vec<Vec<Interval>>> {
         let first = Hop::new(self, 1, 0.0)?;
         let turns = first.turns(0.0, self.distance_m);
@@ -60,7 +64,8 @@ impl Link {
         meets(self.sir_rx(tail)?, target).then_some(sets)
     }
 
-    /// Returns the set of relay `k` in 2..=N from that of relay k-1, at least `advance` m behind.
+    /// Returns the possible positions of relay `k`, within 2 to N, from those of relay k-1, `set`. Relay k-1 is at
+    /// least `advance` m behind.
     fn next_set(&self, k: usize, set: &[Interval], target: f64, advance: f64) -> Vec<Interval> {
         let mut pieces = Vec::new();
         let gap_ends = set
@@ -93,7 +98,8 @@ impl Link {
     }
 }
 
-/// Returns the part of [`low`, `high`] on which `holds`. `holds` changes at most once between two of the rising `turns`.
+/// Returns the parts of `low` to `high` in which `holds` is true. It changes at most once between two neighbours of
+/// `turns`, which ascend.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
     let corners = || turns.iter().copied().chain([high]);
     let froms = std::iter::once(low).chain(turns.iter().copied());

@@ -47,7 +47,7 @@ impl Link {
         sir
     }
 
-    /// Returns the SIR (linear) of the worst hop; 0 if [`Link::sir_hops`] is empty.
+    /// Returns the SIR (linear) of a chain's worst hop; 0 if [`Link::sir_hops`] is empty.
     pub fn chain_sir(&self, x: &[f64]) -> f64 {
         self.sir_hops(x).into_iter().reduce(f64::min).unwrap_or(0.0)
     }

@@ -35,7 +35,7 @@ static CLOCK: Mutex<()> = Mutex::new(());
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipe {
     bytes: Rc<RefCell<VecDeque<u8>>>,
-    /// Time that a poll of a writer takes without taking a byte, ms; 0 for a writer that works.
+    /// Simulated time that each poll of a hanging writer takes, ms; 0 for a writer that works.
     stall_ms: Rc<Cell<u64>>,
 }
 
@@ -44,7 +44,7 @@ impl ErrorType for Pipe {
 }
 
 impl Read for Pipe {
-    /// Needs no waker, because the bench polls every millisecond.
+    /// Reads the available bytes, or waits. It needs no waker, because the bench polls every millisecond.
     async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
         poll_fn(|_| match self.take(into) {
             0 => Poll::Pending,
@@ -55,7 +55,7 @@ impl Read for Pipe {
 }
 
 impl Write for Pipe {
-    /// Needs no waker, as [`Read::read`].
+    /// Writes all bytes, unless the writer hangs. It needs no waker, because the bench polls every millisecond.
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         poll_fn(|_| match self.stall_ms.get() {
             0 => Poll::Ready(()),
@@ -75,7 +75,7 @@ impl Write for Pipe {
 }
 
 impl Pipe {
-    /// Takes as many bytes as are available and fit.
+    /// Moves as many bytes as are available and fit to `into`; returns their number.
     pub(crate) fn take(&self, into: &mut [u8]) -> usize {
         let mut bytes = self.bytes.borrow_mut();
         let count = bytes.len().min(into.len());
@@ -108,7 +108,7 @@ pub(crate) struct Bench {
     wiring: Wiring,
     others: Vec<Relay>,
     pub(crate) events: Vec<Event>,
-    /// Bytes on the wire from the drone, and to the drone.
+    /// Bytes in transit: from the drone to the other relays, and from them to the drone.
     wire: [Pipe; 2],
     drone: Option<Running>,
     vehicle: Option<Vehicle>,
@@ -162,24 +162,24 @@ fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
     }
 }
 
-/// Returns the block of relay 1 of 2, with a key if there is an epoch.
+/// Returns the configuration block of relay 1 of 2, with a signing key if `epoch` is given.
 pub(crate) fn block(epoch: Option<u32>, sites: Option<Sites>) -> Block {
     let secret = epoch.map(|epoch| Secret { key: KEY, epoch });
     write(&config(2, 1, sites), &numbers(), secret, None)
 }
 
-/// Returns the block of relay 1 of 3, with a key.
+/// Returns the configuration block of relay 1 of 3, with a signing key.
 pub(crate) fn block_of_three() -> Block {
     let secret = Secret { key: KEY, epoch: 1 };
     write(&config(3, 1, None), &numbers(), Some(secret), None)
 }
 
-/// Returns the block of a single relay between these sites.
+/// Returns the configuration block of a chain's only relay, between these sites.
 pub(crate) fn block_alone(sites: Sites) -> Block {
     write(&config(1, 1, Some(sites)), &numbers(), None, None)
 }
 
-/// Returns the setpoint of a single relay between these sites.
+/// Returns the position that the only relay of a chain chooses between these sites.
 pub(crate) fn alone(sites: Sites) -> Placement {
     let said = config(1, 1, Some(sites));
     let now = Instant::ZERO;
@@ -190,7 +190,7 @@ pub(crate) fn alone(sites: Sites) -> Placement {
     relay.setpoint().unwrap()
 }
 
-/// Sites at the mission's distance.
+/// Sites of transmitter and receiver, as far apart as the test mission says: 1343.795 m.
 pub(crate) const SITES: Sites = Sites {
     ends: [
         [474_000_000, 85_400_000, 420_000],
@@ -199,7 +199,7 @@ pub(crate) const SITES: Sites = Sites {
     speed_m_s: 0.0,
 };
 
-/// Returns the reason why a board without a port to an autopilot is refused.
+/// Starts a board without a port to an autopilot; returns the reason why it does not join the chain.
 pub(crate) fn refused(board: Board<Ram>) -> Refused {
     why(board, None)
 }
@@ -240,12 +240,12 @@ fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)
 }
 
 impl Bench {
-    /// Creates the bench with the neighbour alone, on its first epoch.
+    /// Creates the bench with relay 2 as the wired neighbour, on its first epoch.
     pub(crate) fn new() -> Self {
         Self::wired(Wiring::Pair, 2)
     }
 
-    /// Creates the bench with two other relays by radio, on their first epochs.
+    /// Creates the bench with relays 2 and 3 on one radio channel, on their first epochs.
     pub(crate) fn radio() -> Self {
         Self::wired(Wiring::Shared, 3)
     }
@@ -276,7 +276,7 @@ impl Bench {
         }
     }
 
-    /// Restarts the drone. Bytes on the wires are lost.
+    /// Restarts the drone with `board`. Bytes on the wires are lost.
     pub(crate) fn boot(&mut self, board: Board<Ram>) {
         for wire in &self.wire {
             wire.bytes.borrow_mut().clear();
@@ -311,12 +311,12 @@ impl Bench {
         self.drone = None;
     }
 
-    /// Lets the drone's UART hang: each poll of its driver takes so long and sends nothing. 0 for a UART that works.
+    /// Lets the drone's UART hang: each poll of its driver takes `millis` ms and sends nothing. 0 lets it work again.
     pub(crate) fn stall_uart(&mut self, millis: u64) {
         self.wire[0].stall_ms.set(millis);
     }
 
-    /// Runs for `millis` milliseconds; returns the neighbour's events meanwhile.
+    /// Simulates `millis` ms; returns the events that relay 2, the drone's neighbour, reported meanwhile.
     pub(crate) fn run(&mut self, millis: u32) -> Vec<Event> {
         self.events.clear();
         let mut cx = Context::from_waker(Waker::noop());
@@ -333,7 +333,7 @@ impl Bench {
         self.events.clone()
     }
 
-    /// Runs for `millis` milliseconds while the drone's task hangs.
+    /// Simulates `millis` ms in which the drone's task hangs; the other relays run.
     pub(crate) fn hang(&mut self, millis: u32) {
         for _ in 0..millis {
             MockDriver::get().advance(embassy_time::Duration::from_millis(1));
@@ -372,7 +372,7 @@ impl Bench {
         }
     }
 
-    /// Returns the number of frames that the neighbour rejected for their signature.
+    /// Returns the number of frames that relay 2 rejected for their signature.
     pub(crate) fn disbelieved(&self) -> u32 {
         let stats = self.others[0].stats();
         stats.unsigned + stats.forged + stats.replayed

@@ -11,7 +11,7 @@ use uav_relay_kept::nor::Nor;
 use crate::bench::{Bench, SITES, block, refused};
 use crate::ram::Ram;
 
-/// Silence after which a neighbour is lost, with a margin, ms.
+/// Time after which a silent neighbour is certainly lost, ms: 15 s and a margin.
 const LOST: u32 = 25_000;
 
 fn epoch(flash: &Ram) -> Option<u32> {
@@ -39,8 +39,8 @@ fn its_epoch_rises_at_every_start_and_its_neighbour_believes_it_each_time() {
     assert_eq!(bench.disbelieved(), 0);
 }
 
-/// Rejects a start that may be a replay: an older epoch, or the same epoch and seed. (The same epoch with another seed is a
-/// duplicate index, which the library's tests cover.)
+/// Restarts a relay with an older epoch, or with the same epoch and seed. Its neighbour rejects it, because it may be
+/// a replay. (The same epoch with another seed is a duplicate index, which the library's tests cover.)
 #[test]
 fn one_that_forgets_its_epoch_is_not_believed() {
     for (epoch, seed) in [(1, 2), (2, 1)] {
@@ -69,7 +69,7 @@ fn a_block_may_raise_the_epoch_and_never_lowers_it() {
     }
 }
 
-/// Runs more starts than a sector has room for, with sectors of two lengths.
+/// Starts a board more often than a flash sector has room for epochs, with sectors of two lengths.
 #[test]
 fn the_epoch_rises_through_full_sectors() {
     let flash = Ram::blank();

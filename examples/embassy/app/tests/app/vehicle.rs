@@ -10,20 +10,20 @@ use crate::bench::{Pipe, SITES};
 const STEP_M: f32 = 0.008;
 
 pub(crate) struct Vehicle {
-    /// Bytes from the autopilot to the relay, and from the relay.
+    /// Serial bytes in transit: from the autopilot to the relay, and from the relay to the autopilot.
     uart: [Pipe; 2],
     axis: Axis,
     millis: u32,
     sequence: u8,
     waiting: Vec<u8>,
     pub(crate) place: Placement,
-    /// True if armed and in the air.
+    /// True if the drone is armed and in the air.
     pub(crate) flies: bool,
-    /// True in OFFBOARD; otherwise the pilot has the sticks.
+    /// True in PX4's OFFBOARD mode, which obeys the relay; otherwise the pilot controls the drone.
     pub(crate) granted: bool,
-    /// Received lines for the operator.
+    /// Text messages for the operator that the autopilot has received from the relay.
     pub(crate) texts: Vec<String>,
-    /// Received targets, until a test clears them.
+    /// Target positions that the autopilot has received since a test last cleared them.
     pub(crate) told: Vec<Placement>,
 }
 

@@ -14,12 +14,12 @@ fn newest(flash: &Ram) -> Option<ViewRecord> {
     log.newest::<WORDS>().and_then(|kept| record(&kept))
 }
 
-/// Returns the promised view in a record: 4 bytes from offset 10 of `ViewRecord::to_bytes`.
+/// Returns the view that a record promises: 4 bytes from offset 10 of `ViewRecord::to_bytes`.
 fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
 
-/// The two others fly on without the drone and readmit it: it votes each time.
+/// Reboots a relay three times; the other two fly on and readmit it. Its stored promise never falls.
 #[test]
 fn no_promise_is_forgotten_over_reboots() {
     let flash = Ram::blank();

@@ -32,7 +32,8 @@ fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
     assert!(FED.with_borrow(Vec::len) >= 60);
 }
 
-/// Checks turns of 12 s: the feeding task is polled in each, but the relay's timers are late.
+/// Slows the relay's task to turns of 12 s. The feeding future is polled in each turn, but must not feed the
+/// watchdog, because the relay's timers are late.
 #[test]
 fn a_task_whose_timers_are_late_feeds_it_no_more() {
     let mut bench = Bench::new();

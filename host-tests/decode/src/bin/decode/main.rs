@@ -58,7 +58,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Returns the key at the end of a simulation's capture comment.
+/// Returns the signing key at the end of a simulation's capture comment, if there is one.
 fn of_comment(comment: &str) -> Option<[u8; 32]> {
     let (_, digits) = comment.rsplit_once(", key ")?;
     key::parse(digits).ok()

@@ -7,22 +7,23 @@ use rand::SeedableRng;
 
 use super::{Scenario, in_space};
 
-/// Number of scenarios.
+/// Number of scenarios whose optimum is stored.
 pub const COUNT: u32 = 2000;
 
-/// File with the optima; its head names their origin.
+/// File with the stored optima; its head names their origin.
 const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
 
 const SEED: u64 = 2021;
 
-/// Returns the scenario of a number below [`COUNT`]: 1 to 100 relays, numbers rounded to f32.
+/// Returns the scenario with this number, which is below [`COUNT`]. It has 1 to 100 relays; its numbers are rounded
+/// to f32.
 pub fn numbered(number: u32) -> Scenario {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     rng.set_stream(number.into());
     in_space(&mut rng, &(1..=100)).as_relays_know_it()
 }
 
-/// Returns the optimum SIR (linear) of each scenario, by number; 0 if no chain is possible.
+/// Returns the stored optimum SIR (linear) of each scenario, by number; 0 if no chain is possible.
 ///
 /// # Errors
 /// If the file cannot be read, or a row is not a number and an SIR.

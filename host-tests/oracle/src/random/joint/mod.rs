@@ -45,19 +45,19 @@ use crate::reference::joint::{Corridor, Hold};
 use crate::reference::{Link, Station};
 use uav_relay_scenario::number::narrow;
 
-/// A link and the corridor of its relays, which are at its lowest altitude in the link.
+/// Random link, and the corridor in which its relays choose positions. In the link they are at its lowest altitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// Link.
+    /// Chain of relays with Tx, Rx and interferer.
     pub link: Link,
-    /// Corridor.
+    /// Altitudes and lateral positions that the relays may choose.
     pub corridor: Corridor,
     /// Relays with a fixed lateral position and altitude.
     pub held: Vec<Hold>,
 }
 
 impl Scenario {
-    /// Rounds every number to the f32 of relays.
+    /// Returns the scenario with every number rounded to f32, as a relay stores it.
     #[must_use]
     pub fn as_relays_know_it(&self) -> Self {
         let round = |value: f64| f64::from(narrow(value));
@@ -79,13 +79,15 @@ impl Scenario {
     }
 }
 
-/// Least separation in half of the scenarios, as a fraction of D / (N + 1): it hardly ever binds.
+/// Range of minimum separations that hardly ever limit a chain, as a fraction of D / (N + 1).
 pub const ROOMY: (f64, f64) = (0.01, 0.1);
 
-/// Least separation that often binds, as a fraction of D / (N + 1). About a tenth of those scenarios lose SIR by it.
+/// Range of minimum separations that often limit a chain, as a fraction of D / (N + 1). About a tenth of those
+/// scenarios lose SIR by it.
 pub const CROWDED: (f64, f64) = (0.03, 0.3);
 
-/// Draws one scenario; the distribution is in the module's table. `relays` within 1 to 1000, `apart` [`ROOMY`] or [`CROWDED`].
+/// Draws a random scenario; the distribution is in the module's table. `relays` is a range within 1 to 1000, `apart`
+/// is [`ROOMY`] or [`CROWDED`].
 pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f64)) -> Scenario {
     let d = log_uniform(rng, 100.0, 1e4);
     let n = count(rng, relays);
@@ -130,7 +132,8 @@ pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f
     }
 }
 
-/// Draws one scenario with lateral room; the distribution is in the module's second table. `relays` within 1 to 1000.
+/// Draws a random scenario with a lateral range. The distribution is in the module's second table; `relays` is within
+/// 1 to 1000.
 pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     let apart = if rng.random() { ROOMY } else { CROWDED };
     let mut drawn = scenario(rng, relays, apart);
@@ -153,7 +156,8 @@ pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     drawn
 }
 
-/// Gives relays their own powers and fixed positions; the distribution is in the module's last table.
+/// Gives relays their own powers, and fixes the cross-sections of some. The distribution is in the module's last
+/// table.
 #[must_use]
 pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
     let (powers, holds): (bool, bool) = (rng.random(), rng.random());
@@ -186,7 +190,7 @@ fn count(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> u32 {
         .unwrap_or(fewest)
 }
 
-/// Draws X as a share of D.
+/// Draws the interferer's X, its position along the line Tx-Rx, as a fraction of D.
 fn along(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..40) {
         0..32 => rng.random_range(0.0..=1.0),
@@ -199,7 +203,7 @@ fn along(rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// Draws Y as a share of D.
+/// Draws the interferer's Y, its offset from the line Tx-Rx, as a fraction of D.
 fn aside(rng: &mut impl Rng) -> f64 {
     if rng.random_bool(0.7) {
         log_uniform(rng, 0.003, 0.1)

@@ -3,19 +3,20 @@
 use super::link::StochasticLink;
 use crate::reference::link::Station;
 
-/// A chain built backward, and its target.
+/// Chain built backward, from Rx toward Tx, and its target SIR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backward {
-    /// Target that all hops except the first were stretched to, linear.
+    /// Target SIR (linear). Every hop except the first is as long as it allows.
     pub gamma: f64,
     /// Positions of the relays from Tx to Rx, m.
     pub places: Vec<f64>,
-    /// Number of targets tried, including the final one.
+    /// Number of targets tried, including the final one. For [`StochasticLink::fewest`] the number of relays.
     pub iterations: usize,
 }
 
 impl StochasticLink {
-    /// Returns the expected SIR at Rx with the last relay straight above it. An upper bound, and the first target.
+    /// Returns the expected SIR (linear) at Rx with the last relay straight above it. No chain has more; Algorithm 4
+    /// starts with this target.
     pub fn ceiling(&self) -> f64 {
         self.relays.last().map_or(0.0, |tail| {
             tail.power_w * self.upsilon_at(self.distance_m)
@@ -23,7 +24,8 @@ impl StochasticLink {
         })
     }
 
-    /// Returns the positions with every hop but the first as long as `gamma` allows, cut off above Tx.
+    /// Returns the positions, m, of the chain built backward from Rx. Every hop but the first is as long as the
+    /// target SIR `gamma` allows; no relay is before Tx.
     ///
     /// `None` if even the shortest hop misses the target.
     pub fn backward(&self, gamma: f64) -> Option<Vec<f64>> {
@@ -48,17 +50,19 @@ impl StochasticLink {
         Some(places)
     }
 
-    /// Returns the lesser of `gamma` and the first hop's expected SIR in the backward chain. 0 without a chain.
+    /// Returns the first hop's expected SIR in the chain built backward for `gamma`, but at most `gamma`. 0 without a
+    /// chain.
     pub fn backward_sir(&self, gamma: f64) -> f64 {
         self.backward(gamma)
             .and_then(|places| self.hop_sirs(&places).first().map(|sir| sir.min(gamma)))
             .unwrap_or(0.0)
     }
 
-    /// Runs the paper's Algorithm 4. Lowers the target from [`StochasticLink::ceiling`] until the first hop meets it.
+    /// Runs the paper's Algorithm 4: lowers the target SIR by `step` until the first hop meets it. The first target
+    /// is [`StochasticLink::ceiling`].
     ///
-    /// The step is `step`. Unlike printed, the last hop follows the target and no relay is before Tx. `None` if no target above 0
-    /// is met, as with a step larger than the optimum.
+    /// Unlike printed, the last hop follows the target and no relay is before Tx. `None` if no target above 0 is met,
+    /// as with a step larger than the optimum.
     pub fn algorithm4(&self, step: f64) -> Option<Backward> {
         let mut gamma = self.ceiling();
         let mut iterations = 1;
@@ -100,7 +104,8 @@ impl StochasticLink {
         best.1
     }
 
-    /// Solves the paper's problem 1. The fewest relays like the first, at most `most`, whose backward chain for `gamma` closes.
+    /// Solves the paper's problem 1: the fewest relays that meet the target SIR `gamma` if built backward. All relays
+    /// are like the first one; there are at most `most`.
     ///
     /// `iterations` is their number.
     pub fn fewest(&self, gamma: f64, most: usize) -> Option<Backward> {

@@ -3,11 +3,11 @@
 use super::link::StochasticLink;
 
 impl StochasticLink {
-    /// Returns the best expected SIR of identical relays with a constant Upsilon.
+    /// Returns the best expected SIR (linear) of a chain with identical relays and a constant Upsilon.
     ///
-    /// Solves the equation that all hops are equal and span the distance; at most about 2000 evaluations. `None` without relays,
-    /// or if relays or Upsilon differ. Never above the SIR of the weaker outer hop with the outer relays straight above Tx and
-    /// Rx.
+    /// Solves the equation that all hops are equal and span the distance; at most about 2000 evaluations. `None`
+    /// without relays, or if relays or Upsilon differ. Never above the SIR of the weaker outer hop with the outer
+    /// relays straight above Tx and Rx.
     pub fn iid_optimum(&self) -> Option<f64> {
         let (first, (_, u)) = (self.relays.first()?, *self.upsilon.first()?);
         let alike = self.relays.iter().all(|relay| relay == first)

@@ -2,7 +2,8 @@
 
 use super::super::link::{Station, received_w};
 
-/// A chain of relays between Tx at (0, 0) and Rx at (D, 0) under interference with a known Upsilon(x).
+/// Chain of relays between Tx at (0, 0) and Rx at (D, 0) in an interference field. Upsilon(x) = E[1 / interference
+/// power] is known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StochasticLink {
     /// Tx-Rx distance D, m, > 0.

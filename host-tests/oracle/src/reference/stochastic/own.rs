@@ -2,10 +2,10 @@
 
 use super::link::StochasticLink;
 
-/// Disjoint intervals of the line, m, rising.
+/// Disjoint intervals of positions along the line, m, in ascending order.
 type Stretches = Vec<(f64, f64)>;
 
-/// Returns the least value of a convex function between `low` and `high`.
+/// Returns the minimum of a convex function `value` between `low` and `high`.
 fn least(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     let (mut a, mut b) = (low, high);
     for _ in 0..80 {
@@ -28,10 +28,11 @@ fn joined(mut all: Stretches) -> Stretches {
 }
 
 impl StochasticLink {
-    /// Returns the SIR (linear) of the worst hop of the best chain with relays at least `apart_m` apart. 0 if there is none.
+    /// Returns the best expected SIR (linear) of all chains with relays at least `apart_m` apart. 0 if there is no
+    /// such chain.
     ///
-    /// Going back from Rx, the feasible positions of each relay are intervals: as a receiver moves along an interval, so does the
-    /// interval of its sender. No position is left out, however far a relay has to stay behind its reach.
+    /// Going back from Rx, the feasible positions of each relay are intervals: as a receiver moves along an interval,
+    /// so does the interval of its sender. No position is left out, however far a relay has to stay behind its reach.
     pub fn best_apart(&self, apart_m: f64) -> f64 {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return 0.0;
@@ -59,7 +60,7 @@ impl StochasticLink {
         low
     }
 
-    /// Splits an interval into parts with linear Upsilon.
+    /// Splits an interval of positions at the points of the field, so that Upsilon is linear in each part.
     fn pieces(&self, (low, high): (f64, f64)) -> Stretches {
         let inside = self.upsilon.iter().map(|point| point.0);
         let inside = inside.filter(|x| *x > low && *x < high);

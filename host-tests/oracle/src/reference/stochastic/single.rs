@@ -2,36 +2,40 @@
 
 use super::link::StochasticLink;
 
-/// Result of Algorithm 3.
+/// Result of Algorithm 3, which places a single relay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Single {
-    /// Position of the relay, m.
+    /// Position of the relay along the line from Tx, m.
     pub x_m: f64,
-    /// The lesser of the target and the first hop's expected SIR, linear.
+    /// Lesser of the target SIR and the first hop's expected SIR, linear.
     pub sir: f64,
-    /// Number of targets tried.
+    /// Number of target SIRs tried.
     pub iterations: usize,
 }
 
 impl StochasticLink {
-    /// Runs Algorithm 3 as printed. Stops at the first target that the first hop meets, else returns the best seen.
+    /// Runs Algorithm 3 as printed. It stops at the first target SIR that the first hop meets, else returns the best
+    /// position seen.
     ///
-    /// The second hop's targets fall from its largest value in steps of `step`; `None` unless there is exactly one relay.
+    /// The second hop's targets fall from its largest value in steps of `step`; `None` unless there is exactly one
+    /// relay.
     pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
         self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
     }
 
-    /// Runs the corrected Algorithm 3. Continues while a lower target could still be better than the best seen.
+    /// Runs the corrected Algorithm 3. It continues while a lower target SIR could still be better than the best
+    /// position seen.
     ///
-    /// Prefers, of the two steps around the optimum, the one where the first hop is weaker, so for a constant Upsilon its
-    /// position may be one step off the printed one's, with an SIR at least as high.
+    /// Prefers, of the two steps around the optimum, the one where the first hop is weaker, so for a constant Upsilon
+    /// its position may be one step off the printed one's, with an SIR at least as high.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
             (best.sir >= gamma - step).then_some(best)
         })
     }
 
-    /// Lowers the target until `end` returns a result. Its arguments are the current position, the best one and the target.
+    /// Lowers the target SIR by `step` until `end` returns a result. The arguments of `end` are the relay's position
+    /// for this target, the best position so far, and the target.
     fn descend(
         &self,
         step: f64,
@@ -65,7 +69,8 @@ impl StochasticLink {
         best.map(|best| Single { iterations, ..best })
     }
 
-    /// Returns the best position and expected SIR of one relay by brute force. `None` unless there is exactly one relay.
+    /// Returns the best position (m) and expected SIR of one relay by brute force. `None` unless there is exactly one
+    /// relay.
     ///
     /// A grid of `points` per piece of the table of Upsilon, refined four times around the best position.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
