@@ -555,7 +555,7 @@ pub enum QueuedEvent {
     Ask,
     /// A ground station begins an upload. The event's relay index is the upload's index in the setup.
     Upload,
-    /// All drones move for one time step.
+    /// A time step of the drones' flight.
     Fly,
     /// The autopilot of the relay's drone restarts.
     Restart,
@@ -569,7 +569,7 @@ pub enum QueuedEvent {
     ///
     /// The event's relay index is unused.
     Air(AirEvent),
-    /// All relays measure the interference at their positions.
+    /// Measurement of the interference by every relay at its position.
     Listen,
     /// The attacker sends a frame to a relay.
     AttackKind(AttackKind),

@@ -15,7 +15,7 @@ use crate::simulator::watch::{Run, Seen, Watch, longest};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Touched {
     Nobody,
-    /// Only the relay with this index, from 0.
+    /// A single relay with this index, from 0.
     One(usize),
     /// Any relay, or the links between relays.
     All,
