@@ -71,7 +71,7 @@ const ATTACKER: u64 = 2;
 /// Largest number of frames that the attacker records; it discards the oldest.
 const MEMORY: usize = 65_536;
 
-/// Number of recorded frames that the attacker picks at random before it gives up finding an arrived one.
+/// Number of recorded frames that the attacker picks at random before it gives up. It needs one that has arrived.
 const TRIES: usize = 64;
 
 impl Attacker {

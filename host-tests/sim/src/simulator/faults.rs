@@ -121,7 +121,7 @@ pub struct Bursts {
 }
 
 impl Bursts {
-    /// Creates the model for a mean fraction `share` of lost frames, 0 to 0.9, in bursts of `length` frames.
+    /// Creates the model for a mean fraction `share` of lost frames, 0 to 0.9. Bursts have `length` frames.
     ///
     /// The mean length is at least [`Bursts::shortest`].
     pub fn new(share: f64, length: f64) -> Self {
