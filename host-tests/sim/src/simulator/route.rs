@@ -223,7 +223,7 @@ impl Window {
         self.elapsed(until) - self.elapsed(from)
     }
 
-    /// Returns the end of a transmission that goes on at `from` and needs the slot time `duration`, above 0.
+    /// Returns the end of a transmission that goes on at `from` and needs `duration` of slot time, above 0.
     pub fn ends(&self, from: Ps, duration: Ps) -> Ps {
         let due = u128::from(self.elapsed(from)) + u128::from(duration) - 1;
         let open_for = u128::from(self.open_for);
@@ -252,9 +252,9 @@ pub struct Hop {
 /// State of the chain with respect to the data traffic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ChainState {
-    /// All relays of the view are at the positions of one agreement.
+    /// The relays of the view are all at the positions of one agreement.
     Agreed,
-    /// All relays can send, but they have not agreed on positions yet, or drones are on their way.
+    /// The relays can all send, but they have not agreed on positions yet, or drones are on their way.
     Pending,
     /// A relay of the view is silent, has no position, or has not accepted the view.
     Broken,

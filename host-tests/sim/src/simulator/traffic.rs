@@ -52,9 +52,9 @@ pub struct TrafficSpec {
 /// Error: the simulation of the requested traffic would take too long.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum TrafficError {
-    /// Too many packet transmissions: this number.
+    /// The number of packet transmissions, this value, is too large.
     TooMany(f64),
-    /// Too late an end of the traffic: this time, s of virtual time.
+    /// The end of the traffic, this value in s of virtual time, is too late.
     TooLong(f64),
 }
 
