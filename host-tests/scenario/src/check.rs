@@ -89,7 +89,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` if the table also has a key that excludes it, such as the same power in dBm.
+    /// Rejects `key` if the table also has a key that excludes it, as `power_w` excludes `power_dbm`.
     fn alone(
         &self,
         path: &str,

@@ -603,7 +603,7 @@ pub(super) struct Said<'a> {
     pub(super) in_w: (&'a str, Option<f64>),
     pub(super) in_dbm: (&'a str, Option<f64>),
     pub(super) eirp: (&'a str, Option<f64>),
-    /// Key and value, dBi, of the antenna gain.
+    /// Name of the key, and value in dBi, of the antenna gain.
     pub(super) gain: (&'a str, Option<f64>),
 }
 

@@ -17,7 +17,7 @@ const COARSE: usize = 400;
 /// Approximate number of quadrature points for the error in the final refinement of the position.
 const FINE: usize = 4_000;
 
-/// Steps along the line of the grid of points that decides on which side of the line the interferer is.
+/// Number of grid steps along the line, for the decision on which side of it the interferer is.
 ///
 /// [`ASIDE`] is the number of lateral steps of that grid.
 const ALONG: u32 = 64;
@@ -34,7 +34,7 @@ const FAR: f64 = 30.0;
 /// Grid step in u = asinh(y_H / lowest altitude). For y_H well above that altitude it is a factor of 1.4 in y_H.
 const RISE: f64 = 0.35;
 
-/// Number of local minima of the grid from which a local search starts, and number of true sources.
+/// Largest number of the grid's local minima, and of true sources, from which local searches start.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
@@ -42,11 +42,11 @@ const FINALISTS: usize = 3;
 /// A hypothetical interferer that replaces all interferers of a scene, and the error that it causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothetical {
-    /// Transmit power p_H, W, > 0.
+    /// Transmit power of the hypothetical interferer (p_H), W, > 0.
     pub power_w: f64,
-    /// Position x_H along the line from Tx to Rx, m.
+    /// Position of the hypothetical interferer along the line from Tx to Rx (x_H), m.
     pub x_m: f64,
-    /// Lateral position y_H, m; positive to the right of the line.
+    /// Lateral position of the hypothetical interferer (y_H), m; positive to the right of the line.
     pub y_m: f64,
     /// Mean absolute error of the interference power over the possible relay positions above the line, W.
     pub mean_abs_error_w: f64,
@@ -330,7 +330,7 @@ pub struct Raster {
 /// Best power of a hypothetical interferer at a given position, and the error that remains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weighed {
-    /// Transmit power, W, > 0.
+    /// Best transmit power of the hypothetical interferer at its position, W, > 0.
     pub power_w: f64,
     /// Integral of |p / d^2 - S| over the points, with this interferer's power p and its distance d.
     ///
@@ -343,8 +343,9 @@ pub struct Weighed {
 type Share = (f64, f64);
 
 impl Raster {
-    /// Creates the centres of `columns` x `rows` equal cells. There is one row if the lowest altitude is the highest
-    /// one.
+    /// Creates quadrature points at the centres of `columns` x `rows` equal cells.
+    ///
+    /// There is one row if the lowest and the highest altitude are equal.
     pub fn even(scene: &Scene, columns: u32, rows: u32) -> Self {
         let midpoints = |low: f64, high: f64, count: u32| -> Vec<Share> {
             let cell = (high - low) / f64::from(count);
@@ -499,7 +500,7 @@ fn gauss(ends: &[f64]) -> Vec<Share> {
         .collect()
 }
 
-/// Power at which an interferer would equal the true interference at a point, and the point's weight.
+/// Power with which an interferer would cause the true interference at a point, and the point's weight.
 struct Ratio {
     value: f64,
     weight: f64,

@@ -5,7 +5,7 @@ use uav_relay::{Channel, Placement};
 
 use crate::{Interference, Scenario, Source};
 
-/// A relay of a [`Scene`].
+/// A relay of a chain in a [`Scene`]: its altitude and its transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
     /// Altitude of the relay, m, > 0. The joint methods may change it unless `holds` is true.
@@ -60,7 +60,7 @@ pub struct Scene {
     pub mu_nlos: f64,
     /// Path-loss factor eta between a relay and the ground, 1/m^2, > 0. The path loss at distance d is eta d^2.
     pub eta: f64,
-    /// Noise power of every receiver, W, >= 0. If it is above 0, the SIRs of this type include it as SINRs.
+    /// Noise power of every receiver, W, >= 0. If it is above 0, the methods that return SIRs return SINRs.
     pub noise_w: f64,
     /// Altitude limits of relays without a fixed altitude, and lateral limits of all relays.
     pub band: Corridor,

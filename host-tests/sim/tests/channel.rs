@@ -98,7 +98,7 @@ fn most_claims(ended: Instant) -> u64 {
     2 * (first.count() as u64 + ms / 15_000)
 }
 
-/// Checks that without faults relays agree with one message to the end and back, for any number.
+/// Checks that without faults any number of relays agree with one message to the end and back.
 #[test]
 fn without_faults_one_sweep_is_enough() {
     for relays in [2, 8, 50, 100, 200, 300, 600, 1_000] {

@@ -97,9 +97,9 @@ fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
     }
 }
 
-/// Checks that relays without a quorum report this only once, although they keep requesting a view.
+/// Checks that relays report a missing quorum only once, although they keep requesting a view.
 ///
-/// Two of five relays have no quorum.
+/// Two of five relays are too few for a quorum.
 #[test]
 fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(600));

@@ -38,9 +38,9 @@ pub struct Prepared<'a> {
 pub enum Refused {
     /// Invalid options or scenario.
     Failed(Failure),
-    /// The relays cannot be placed. The report says so.
+    /// The relays cannot be placed, as the report says.
     ///
-    /// The failure is set if the options are at fault, because the default scenario is used.
+    /// The failure is set only if the options are at fault: with the default scenario, which the user cannot change.
     Reported(Box<ChainReport>, Option<Failure>),
 }
 
@@ -50,7 +50,7 @@ impl From<Failure> for Refused {
     }
 }
 
-/// Measurements of the interference that a relay takes at each position, with `--closed-loop`.
+/// Number of interference samples that a relay takes at its position in each round of `--closed-loop`.
 const SAMPLES: u32 = 10_000;
 
 impl<'a> Prepared<'a> {

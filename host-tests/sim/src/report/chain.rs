@@ -42,9 +42,9 @@ pub struct ChainReport {
     pub method: String,
     /// Requested number of relays.
     pub uavs: u16,
-    /// Version of the mission that the chain flies at the end, 0 if loaded. Absent without uploads.
+    /// Version of the mission that the chain flies at the end; 0 for the one loaded at the start.
     ///
-    /// All SIRs of the report refer to this mission.
+    /// Absent without uploads. All SIRs of the report refer to this mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Error message, if the run failed.
@@ -112,7 +112,7 @@ pub struct ChainReport {
     /// SIR with all interferers of the scenario, if the relays assume a single one in their place.
     #[serde(flatten)]
     pub against_all: Option<AllInterferersReport>,
-    /// Number of relays in the chain at the end; absent if nothing but convergence happened in the run.
+    /// Number of relays in the chain at the end; absent if the only events are accepted positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
     /// Relays that are not in the chain at the end, with their last positions.
@@ -121,7 +121,7 @@ pub struct ChainReport {
     /// Final positions of drones with simulated autopilots; empty without them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drones: Vec<DroneReport>,
-    /// Log of the run; empty if nothing but convergence happened.
+    /// Log of the run; empty if the only events are accepted positions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub timeline: Vec<MomentReport>,
     /// Times from a failure to the recovery of the chain, for each new view (membership of the chain).
@@ -339,7 +339,7 @@ impl ChainReport {
         }
     }
 
-    /// Formats the number of remaining relays, with the total if some are lost.
+    /// Formats the number of relays in the chain: "8", or "6 of 8" if some are lost.
     fn relays_left(&self) -> String {
         match self.left {
             Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),
@@ -348,7 +348,10 @@ impl ChainReport {
     }
 }
 
-/// Formats the number of relays in the chain: "8", or "6 of 8" if some are lost.
+/// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
+///
+/// The chain is the largest complete view, or all living relays if there is none. On separate links a failure is only
+/// reported: all relays stay. Without a quorum there is no chain.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {

@@ -101,7 +101,7 @@ impl MomentReport {
     }
 }
 
-/// Converts the log of a run to report entries; empty if nothing but convergence happened.
+/// Converts the log of a run to report entries; empty if the only events are accepted positions.
 pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
     let plain = |moment: &Moment| {
         matches!(
@@ -364,13 +364,13 @@ pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
 /// New view (membership of the chain) and the times of its formation. Times are s since the start.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecoveryReport {
-    /// Number of the view.
+    /// Number of the view (membership of the chain).
     pub view: u32,
-    /// Number of relays in the view.
+    /// Number of relays in the view (membership of the chain).
     pub relays: u16,
-    /// Relays of the previous view that are not in this one, by number from 1.
+    /// Relays of the previous view (membership of the chain) that are not in this one, by number from 1.
     pub lost: Vec<u16>,
-    /// Relays that are in this view and not in the previous one, by number from 1.
+    /// Relays in this view (membership of the chain) that were not in the previous one, by number from 1.
     pub back: Vec<u16>,
     /// Version of an uploaded mission that is first flown in this view.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -386,12 +386,14 @@ pub struct RecoveryReport {
     /// Time when a neighbour first detected that a relay was lost or had returned, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detected_s: Option<f64>,
-    /// Time when the last relay of the view accepted it, s.
+    /// Time when the last of its relays accepted the view (membership of the chain), s.
     pub formed_s: f64,
     /// Time when all relays of the view had new positions, s; absent if another view came first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged_s: Option<f64>,
-    /// Number of passes along the chain and view proposals from the detection or the upload to convergence.
+    /// Number of passes and view proposals from the detection, or from the upload, to convergence.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweeps: Option<u32>,
 }
@@ -404,7 +406,7 @@ struct View {
     span: (usize, usize),
 }
 
-/// Finds all complete views in the log of a run of `relays` relays, in order of their numbers.
+/// Finds the complete views (memberships of the chain) in the log of a run of `relays` relays, in order.
 pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport> {
     let views = views(moments);
     let mut before: BTreeSet<u16> = (1..=relays).collect();
@@ -533,7 +535,9 @@ fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Mom
     later.iter().rfind(placed).filter(|_| all)
 }
 
-/// Returns the number of passes along the chain and view proposals that `members` began during `span`.
+/// Returns the number of passes and view proposals that `members` began during `span`.
+///
+/// A pass is a message that relays forward along the whole chain.
 fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant)) -> u32 {
     let begun = |relay: u16, by: Instant| {
         let mut story = moments.iter().rev();
@@ -547,7 +551,7 @@ fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant))
         .sum()
 }
 
-/// Formats a line for each view with lost or returned relays or a new mission. Others are counted.
+/// Formats a line for each view with lost or returned relays or a new mission. Other views are only counted.
 pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
     let mut text = String::new();
     let mut same = 0;

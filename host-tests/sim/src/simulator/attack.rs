@@ -136,7 +136,7 @@ impl Attacker {
     }
 }
 
-/// Returns the name of the counter that a frame incremented: the first one that grew to `after`.
+/// Returns the name of the first counter that is larger in `after` than in `before` a frame.
 ///
 /// It tells how the receiver classified the frame.
 pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {

@@ -30,7 +30,7 @@ use fleet::LANDS_AFTER;
 use ground::{Station, stations};
 use judge::Touched;
 
-/// Largest number of events in a run, about some minutes of computing. It ends runs that never settle.
+/// Largest number of events in a run, which takes some minutes to compute. It ends runs that never settle.
 const MOST_HAPPENINGS: u64 = 400_000_000;
 
 impl Chain {
@@ -42,7 +42,9 @@ impl Chain {
         Self::begin(setup, |other| run(other).ok())
     }
 
-    /// Returns the number of passes along the chain and view proposals begun, and the virtual time.
+    /// Returns the number of passes and view proposals that relays began, and the virtual time.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     pub fn progress(&self) -> (u32, Instant) {
         (self.sweeps(), self.now)
     }
@@ -296,7 +298,9 @@ struct Member {
     /// True if the relay controlled its drone at the last time step of the flight.
     lent: bool,
     starts: u32,
-    /// Number of passes along the chain and view proposals that the relay began before its last start.
+    /// Number of passes and view proposals that the relay began before its last start.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     swept: u32,
     stored: Option<Upload>,
     /// Stored record of the relay's votes on views, which survives a reboot; `None` before its first vote.
@@ -338,19 +342,19 @@ pub struct Chain {
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     medium: Option<Medium>,
     bursts: Option<Bursts>,
-    /// Setpoints of the last agreement.
+    /// Setpoints of all relays at the last agreement; `None` before the first one.
     agreed: Option<Vec<Placement>>,
     agreements: u32,
-    /// True after the last measurement.
+    /// True once the relays have made the last measurement of the interference.
     listened: bool,
-    /// Statistics, for soaks and shared channels.
+    /// Statistics of the availability; `None` unless the run has a fixed end or a shared channel.
     watch: Option<Watch>,
     record: Option<Record>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Start {
-    /// Relay number, from 1.
+    /// Number of the relay that starts, from 1.
     index: u16,
     /// Number of this start of the relay, from 1. With signed frames it is also the epoch.
     number: u32,

@@ -121,9 +121,9 @@ pub struct Bursts {
 }
 
 impl Bursts {
-    /// Creates the model for a mean fraction `share` of lost frames, 0 to 0.9. Bursts have `length` frames.
+    /// Creates the model for a mean fraction `share` of lost frames, 0 to 0.9.
     ///
-    /// The mean length is at least [`Bursts::shortest`].
+    /// The mean length of a burst is `length` frames, at least [`Bursts::shortest`].
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {
@@ -180,7 +180,7 @@ impl OneWayFailure {
 /// Data rate and latency of a serial link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LinkSpec {
-    /// Bits per second, at least 300; a byte takes ten bits.
+    /// Data rate of the link, bit/s, at least 300. A byte takes ten bits.
     pub baud: u32,
     /// Time from the sending of a bit to its arrival.
     pub latency: Duration,

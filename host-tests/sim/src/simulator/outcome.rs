@@ -97,7 +97,9 @@ pub struct Moment {
     pub other: Option<u16>,
     /// Linear target SIR of the relay's position at this time; `None` without a target.
     pub target: Option<f32>,
-    /// Number of passes along the chain and view proposals that the relay has begun until this time.
+    /// Number of passes and view proposals that the relay has begun until this time.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     pub sweeps: u32,
 }
 
@@ -136,9 +138,9 @@ pub struct RelayEnd {
     pub killed: Option<Instant>,
     /// Index of the relay in its view (membership of the chain), from 1 next to Tx.
     pub index: u16,
-    /// Number of relays in the relay's view.
+    /// Number of relays in the relay's view (membership of the chain).
     pub relays: u16,
-    /// Number of the relay's view.
+    /// Number of the view (membership of the chain) that the relay has accepted.
     pub view: u32,
     /// Version of the relay's mission; 0 for the loaded one.
     pub version: u16,

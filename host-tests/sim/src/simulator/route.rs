@@ -252,11 +252,13 @@ pub struct Hop {
 /// State of the chain with respect to the data traffic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ChainState {
-    /// The relays of the view are all at the positions of one agreement.
+    /// The relays of the view (membership of the chain) are all at the positions of one agreement.
     Agreed,
     /// The relays can all send, but they have not agreed on positions yet, or drones are on their way.
     Pending,
-    /// A relay of the view is silent, has no position, or has not accepted the view.
+    /// A relay of the view (membership of the chain) cannot send.
+    ///
+    /// It is silent, has no position, or has not accepted the view.
     Broken,
 }
 

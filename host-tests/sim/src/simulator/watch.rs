@@ -101,7 +101,9 @@ impl Watch {
         }
     }
 
-    /// Sets whether the chain counts as available from now on: as long and as good as possible.
+    /// Sets whether the chain counts as available from now on.
+    ///
+    /// It does while the longest possible chain of the living relays holds the positions that it has without faults.
     pub fn judge(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);
@@ -139,9 +141,9 @@ pub struct Seen {
     pub view: ViewId,
     /// True while the relay may rely on the last agreement: its lease is valid by its own clock.
     pub leased: bool,
-    /// Number of relays in the relay's view.
+    /// Number of relays in the relay's view (membership of the chain).
     pub relays: u16,
-    /// Index of the relay in its view, from 1 next to Tx.
+    /// Index of the relay in its view (membership of the chain), from 1 next to Tx.
     pub index: u16,
     /// Version of the relay's mission; 0 for the loaded one.
     pub version: u16,

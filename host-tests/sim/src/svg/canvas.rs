@@ -203,7 +203,7 @@ fn escape(words: &str) -> String {
     out
 }
 
-/// Linear map from a quantity, such as metres, to a coordinate of the picture.
+/// Linear map from a quantity, such as a distance in metres, to a coordinate of the picture.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     from: (f64, f64),

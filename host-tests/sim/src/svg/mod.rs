@@ -134,7 +134,7 @@ const SIZE: f64 = 10.0;
 /// An interferer farther away is an arrow at the edge.
 const FARTHEST: f64 = 2.0;
 
-/// Lateral extent of the view from above toward an interferer beyond its limit, relative to Tx-Rx.
+/// Lateral extent of the view from above toward an interferer too far away, in distances from Tx to Rx.
 ///
 /// It applies if relays must stay on the line.
 const TOWARD_FAR: f64 = 0.4;

@@ -3,7 +3,7 @@
 use super::canvas::{Area, Canvas, Frame, Labels, Point, width};
 use super::picture::{LEFT, OtherInterferers, Picture, RIGHT, TOP, length, near};
 
-/// Font size of the labels of interferers, in picture units. [`LINE`] is the distance of their lines.
+/// Font size of the labels of interferers, in picture units. [`LINE`] is the distance between their lines of text.
 const SIZE: f64 = 10.0;
 const LINE: f64 = 12.0;
 

@@ -472,9 +472,9 @@ impl Chain {
 }
 
 impl Member {
-    /// Returns the number of passes along the chain and view proposals that this relay has begun.
+    /// Returns the number of passes and view proposals that this relay has begun, before reboots, too.
     ///
-    /// Those before a reboot count, too.
+    /// A pass is a message that relays forward along the whole chain.
     fn begun(&self) -> u32 {
         self.swept + self.relay.stats().passes_begun
     }
