@@ -406,7 +406,7 @@ struct View {
     span: (usize, usize),
 }
 
-/// Finds the complete views (memberships of the chain) in the log of a run of `relays` relays, in order.
+/// Finds all complete views (memberships of the chain) in the log of a run of `relays` relays.
 pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport> {
     let views = views(moments);
     let mut before: BTreeSet<u16> = (1..=relays).collect();
