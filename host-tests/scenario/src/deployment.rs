@@ -62,7 +62,7 @@ pub struct Companion {
     pub shared: Option<PathBuf>,
     /// File that stores the epoch, a start counter that prevents replays of frames from earlier starts.
     pub epoch_file: Option<PathBuf>,
-    /// File with the newest uploaded mission.
+    /// File that stores the newest mission that was uploaded to the relay.
     pub upload_file: Option<PathBuf>,
     /// File that stores the relay's votes on the membership of the chain. It prevents a second vote after a reboot.
     pub view_file: Option<PathBuf>,
@@ -80,7 +80,7 @@ pub struct Companion {
     pub position_error_m: Option<f32>,
     /// True to write log lines as JSON.
     pub json: Option<bool>,
-    /// Log file in place of standard output.
+    /// Log file of the companion, in place of its standard output.
     pub log_file: Option<PathBuf>,
     /// Unix socket at which the companion reports its status and counters.
     pub status_socket: Option<PathBuf>,
@@ -92,7 +92,7 @@ pub struct Companion {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ground {
-    /// Serial port toward the chain.
+    /// Serial port of the link from the ground station to the chain.
     pub tty: Option<PathBuf>,
     /// True if the port leads to a channel that all relays share.
     pub shared: Option<bool>,
@@ -108,7 +108,7 @@ pub struct Ground {
     pub measurements: Option<String>,
     /// True to write log lines as JSON.
     pub json: Option<bool>,
-    /// Log file in place of standard output.
+    /// Log file of the ground station, in place of its standard output.
     pub log_file: Option<PathBuf>,
     /// Unix socket at which the ground station reports its status and counters.
     pub status_socket: Option<PathBuf>,

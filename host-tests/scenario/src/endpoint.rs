@@ -23,7 +23,7 @@ pub const FORM: &str = "udp:HOST:PORT or udp:HOST:PORT@LOCAL, PORT and LOCAL wit
 pub struct Endpoint {
     /// Host of the autopilot: a name, an IPv4 address, or an IPv6 address in brackets.
     pub host: String,
-    /// Port of the autopilot.
+    /// UDP port of the autopilot.
     pub port: u16,
     /// Local port from which the companion sends, and at which it receives.
     pub local: u16,
@@ -114,7 +114,7 @@ pub enum EndpointError {
     NoLocal,
     /// The address states no local port, and the default for the autopilot's port would be above 65535.
     NoDefault {
-        /// Port of the autopilot.
+        /// UDP port of the autopilot, for which there is no default local port.
         port: u16,
     },
 }

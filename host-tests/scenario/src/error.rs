@@ -12,13 +12,13 @@ const QUOTED: usize = 60;
 /// A mistake in a scenario file; displayed as exactly one line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScenarioError {
-    /// File name as given by the user.
+    /// Name of the scenario file, as given by the user.
     pub file: String,
     /// Location: a key such as `relay[1].index`, or a line and column. `None` if the whole file is at fault.
     pub key: Option<String>,
     /// Wrong value as TOML, cut if it is long; `None` if the mistake is not in a value.
     pub value: Option<String>,
-    /// Kind of mistake.
+    /// Kind of the mistake.
     pub problem: Problem,
     /// Allowed values, for the message: a range with its unit, or the keys that the table may have.
     pub allowed: String,
@@ -28,43 +28,43 @@ pub struct ScenarioError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The file does not exist.
+    /// The scenario file does not exist.
     NoSuchFile,
     /// The path names a directory instead of a file.
     Directory,
     /// The operating system refused to read the file, with this error.
     Unreadable(std::io::ErrorKind),
-    /// The file exceeds the limit of 1 MiB.
+    /// The scenario file exceeds the limit of 1 MiB.
     TooLong,
-    /// The file is not UTF-8 text.
+    /// The scenario file is not UTF-8 text.
     NotUtf8,
-    /// The file contains only blanks and comments.
+    /// The scenario file contains only blanks and comments.
     Empty,
-    /// The file is not valid TOML.
+    /// The scenario file is not valid TOML.
     Syntax,
-    /// The key is unknown in its table.
+    /// The table of a scenario file has a key that no such table may have.
     UnknownKey,
-    /// A required key is missing.
+    /// The table of a scenario file lacks a required key.
     Missing,
     /// Two keys that exclude each other are both given, such as a power in W and in dBm.
     SaidTwice,
     /// A position in latitude and longitude is given without the table `[site]`, to which it relates.
     NoSite,
-    /// The text is not one of the allowed values.
+    /// The value of a key is a text that is not one of those allowed.
     UnknownChoice,
-    /// The UDP address is malformed.
+    /// The UDP address of an autopilot is malformed.
     NoEndpoint(EndpointError),
     /// The plan has another number of places, or `[network]` another number of relays, than `plan.uavs`.
     OtherNumber,
-    /// A single table is given instead of a list of tables.
+    /// The file has a single table where a list of tables is required.
     NoList,
-    /// A list of tables is given instead of a single table.
+    /// The file has a list of tables where a single table is required.
     NoTable,
-    /// The value has the wrong type.
+    /// The value of a key has the wrong type.
     WrongType,
-    /// The value is outside its range, NaN or infinite.
+    /// The value of a key is outside its range: also a number that is NaN or infinite, or an empty text.
     OutOfRange,
-    /// The list needs at least one entry.
+    /// The value of a key is an empty list, although it needs an entry.
     EmptyList,
     /// `[field]` and `[[interferer]]` are both given, although they exclude each other.
     TwoInterferences,

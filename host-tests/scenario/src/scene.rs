@@ -71,11 +71,11 @@ pub struct Scene {
 /// Position of a relay relative to the line from Tx to Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Distance along the line from Tx, m.
+    /// Distance of the relay from Tx along the line to Rx, m.
     pub x: f64,
-    /// Lateral position, m; positive to the right of the line.
+    /// Lateral position of the relay, m; positive to the right of the line.
     pub y: f64,
-    /// Height above ground, m, > 0.
+    /// Height of the relay above ground, m, > 0.
     pub h: f64,
 }
 

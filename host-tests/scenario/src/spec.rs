@@ -45,7 +45,7 @@ pub struct Scenario {
     ///
     /// [`Self::interference`] is then their initial knowledge, if any.
     pub listen: Option<ListenSpec>,
-    /// Receiver noise.
+    /// Noise of the receivers: of the relays and of Rx.
     pub noise: Noise,
     /// Data link, for data rates; `None` if the file has none.
     pub link: Option<Link>,
@@ -64,7 +64,7 @@ pub struct Scenario {
 pub struct Line {
     /// Coordinate system of the line from Tx to Rx. It converts between geographic and local positions.
     pub axis: Axis,
-    /// Sites of the transmitter and the receiver.
+    /// Geographic positions of the transmitter Tx and the receiver Rx.
     pub sites: [Geodetic; 2],
     /// Height of the mean sea level above the WGS84 ellipsoid, m, -120 to 100; `None` if not given.
     pub geoid_m: Option<f64>,
@@ -73,7 +73,7 @@ pub struct Line {
 /// Radio channel: the carrier frequency, and the losses in addition to that of free space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelSpec {
-    /// Carrier frequency, Hz, 1e6 to 1e12.
+    /// Carrier frequency of the radio channel, Hz, 1e6 to 1e12.
     pub carrier_hz: f64,
     /// Loss of a line-of-sight link in addition to that of free space, dB, 0 to 200.
     pub excess_loss_los_db: f64,
@@ -342,11 +342,11 @@ pub enum PlannedMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedPlace {
-    /// Distance along the line from Tx, m.
+    /// Distance of the relay from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// Lateral position, m; positive to the right as seen from above.
+    /// Lateral position of the relay, m; positive to the right of the line as seen from above.
     pub y_m: f64,
-    /// Altitude above ground, m, 0.1 to 1e4.
+    /// Altitude of the relay above ground, m, 0.1 to 1e4.
     pub altitude_m: f64,
 }
 

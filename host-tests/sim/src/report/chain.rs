@@ -40,7 +40,7 @@ pub struct FaultReport {
 pub struct ChainReport {
     /// Planning method, as on the command line.
     pub method: String,
-    /// Requested number of relays.
+    /// Number of relays for which the run was requested.
     pub uavs: u16,
     /// Version of the mission that the chain flies at the end; 0 for the one loaded at the start.
     ///
@@ -133,7 +133,7 @@ pub struct ChainReport {
     /// Data traffic; absent if it was not requested, or if the relays never agreed on positions.
     #[serde(flatten)]
     pub traffic: Option<TrafficReport>,
-    /// Seed of every random draw.
+    /// Seed of all random draws of the run.
     pub seed: u64,
     /// True if relays may leave the line from Tx to Rx: the table of relays then has a y column.
     #[serde(skip)]
@@ -469,7 +469,7 @@ fn ended(method: &str, outcome: &Outcome) -> Option<String> {
 /// Parameters and counters of a radio channel that all relays share.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub struct AirReport {
-    /// Access method: `csma` or `aloha`.
+    /// Access method of the channel: `csma` or `aloha`.
     pub access: &'static str,
     /// Data rate of the channel, bit/s.
     pub baud: u32,
@@ -573,7 +573,7 @@ impl AvailabilityReport {
 /// State of a simulated drone at the end of a run.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct DroneReport {
-    /// Relay number in the mission, from 1.
+    /// Number of the drone's relay in the mission, from 1.
     pub index: u16,
     /// True distance of the drone from Tx along the line to Rx, m.
     pub x_m: f64,
@@ -690,7 +690,7 @@ impl AllInterferersReport {
         })
     }
 
-    /// Formats the result as a line of text.
+    /// Formats the SIR with all interferers as a line of text.
     pub fn text(&self) -> String {
         let Self {
             all_sir,

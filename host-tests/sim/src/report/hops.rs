@@ -16,7 +16,7 @@ pub struct RelayReport {
     pub x_m: f64,
     /// Distance of the relay from the line, m, positive to the right as seen toward Rx.
     pub y_m: f64,
-    /// Altitude, m.
+    /// Altitude of the relay, m.
     pub h_m: f64,
     /// Linear SIR of the hop from the previous node to this relay.
     pub sir: f64,
@@ -35,7 +35,7 @@ pub struct RelayReport {
 /// Relay that is not in the chain at the end of a run.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LostReport {
-    /// Relay number in the mission, from 1.
+    /// Number of the relay in the mission, from 1.
     pub index: u16,
     /// Last setpoint of the relay: distance from Tx along the line to Rx, m.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -16,19 +16,21 @@ pub fn seconds(at: Instant) -> f64 {
 /// Entry in the log of a run: an event at one node.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MomentReport {
-    /// Time of the entry, s of virtual time.
+    /// Time of the event, s of virtual time.
     pub at_s: f64,
     /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     ///
     /// For a partition it is the last relay before the gap.
     pub relay: u16,
-    /// Kind of the entry.
+    /// Kind of the event, in words.
     ///
-    /// `silent`, `switched on`, `lost`, `found`, `view accepted`, `no quorum`, `converged`, `infeasible`, `partition`, `partition ended`, `does not receive`, `receives again`,
-    /// `offered`, `stored`, `adopted`, `lease expired`, `not received by`, `mission mismatch`, `key mismatch`, `epoch went back`, `duplicate index`; of autopilots
-    /// `engaged`, `released`, `blind`, `restarted`; of relays that measure `new estimate`, `interferer unclear`, `sensor off`.
+    /// `silent`, `switched on`, `lost`, `found`, `view accepted`, `no quorum`, `converged`, `infeasible`,
+    /// `partition`, `partition ended`, `does not receive`, `receives again`, `offered`, `stored`, `adopted`, `lease
+    /// expired`, `not received by`, `mission mismatch`, `key mismatch`, `epoch went back`, `duplicate index`; of
+    /// autopilots `engaged`, `released`, `blind`, `restarted`; of relays that measure `new estimate`, `interferer
+    /// unclear`, `sensor off`.
     pub what: &'static str,
-    /// Other node of the entry, for example a lost or found neighbour.
+    /// Other node that the event concerns, for example a lost or found neighbour; absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other: Option<u16>,
     /// Number of the view (membership of the chain) that the relay accepted.

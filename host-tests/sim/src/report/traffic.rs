@@ -32,9 +32,9 @@ pub struct TrafficReport {
 pub struct TrafficDetails {
     /// Medium access, by its name in scenario files: `slots`, `channels` or `fitted`.
     pub access: &'static str,
-    /// Bandwidth of one frequency, Hz.
+    /// Bandwidth of one frequency of the data link, Hz.
     pub bandwidth_hz: f64,
-    /// Size of a packet, bytes.
+    /// Size of a data packet, bytes.
     pub packet_bytes: f64,
     /// Largest number of packets in the queue of a node.
     pub queue_packets: usize,

@@ -23,9 +23,9 @@ use super::faults::LinkSpec;
 /// It sends half of the frames back to back from the start of the run, and the others at random times.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Attack {
-    /// Number of forged frames.
+    /// Number of forged frames that the attacker sends.
     pub forged: u32,
-    /// Number of replayed frames.
+    /// Number of recorded frames that the attacker sends again.
     pub replayed: u32,
     /// Time of the last frame of the attack; frames that are sent back to back may end slightly later.
     pub until: Instant,
@@ -136,7 +136,7 @@ impl Attacker {
     }
 }
 
-/// Returns the name of the first counter that is larger in `after` than in `before` a frame.
+/// Returns the name of the first counter that a frame has increased from `before` to `after`.
 ///
 /// It tells how the receiver classified the frame.
 pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {

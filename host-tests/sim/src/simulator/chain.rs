@@ -290,7 +290,7 @@ pub fn run(setup: Setup) -> Result<Outcome, SetupError> {
 #[derive(Debug)]
 struct Member {
     relay: Relay,
-    /// Relay number in the mission, from 1.
+    /// Number of the relay in the mission, from 1.
     node: u16,
     /// Outgoing serial lines of the relay: first toward Tx, or to a shared channel, then toward Rx.
     lines: [Line; 2],
@@ -545,14 +545,14 @@ pub enum QueuedEvent {
     Bytes {
         /// Port of the relay at which the bytes arrive.
         port: Port,
-        /// Received bytes.
+        /// Bytes that arrive at the relay.
         bytes: Vec<u8>,
     },
     /// The relay's timer expires.
     Wake,
     /// Bytes arrive at a ground station.
     Heard {
-        /// Received bytes.
+        /// Bytes that arrive at the ground station.
         bytes: Vec<u8>,
     },
     /// A ground station's timer expires.

@@ -123,7 +123,7 @@ impl Body {
     }
 }
 
-/// Closest approach of two drones.
+/// Closest approach of two drones: which two, how near, and when.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
     /// Smallest distance of the two drones, m.

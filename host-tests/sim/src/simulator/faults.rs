@@ -162,9 +162,9 @@ pub struct OneWayFailure {
     pub by: u16,
     /// Number of the relay that is not received, from 1.
     pub of: u16,
-    /// Start of the failure.
+    /// Start of the one-way link failure.
     pub from: Instant,
-    /// End of the failure; `None` if it is permanent.
+    /// End of the one-way link failure; `None` if it is permanent.
     pub until: Option<Instant>,
 }
 

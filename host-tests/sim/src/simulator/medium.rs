@@ -31,7 +31,7 @@ pub type Agenda = Vec<(Instant, AirEvent)>;
 pub struct Sent {
     /// Index of the node that sent the frame, from 0.
     pub from: usize,
-    /// Bytes of the frame.
+    /// Bytes of the frame that was sent.
     pub frame: Vec<u8>,
     /// Nodes that received the frame intact.
     pub heard_by: Vec<usize>,

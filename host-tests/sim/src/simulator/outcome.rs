@@ -87,7 +87,7 @@ pub enum TimelineEvent {
 /// Entry in the log of a run: an event at one node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moment {
-    /// Time of the entry.
+    /// Time of the event.
     pub at: Instant,
     /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     pub relay: u16,
@@ -261,13 +261,13 @@ impl Outcome {
 /// State of a relay after a change, for the animation of a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
-    /// Time of the change.
+    /// Time of the change of the relay's state.
     pub at: Instant,
-    /// Relay number, from 1.
+    /// Number of the relay whose state changed, from 1.
     pub relay: u16,
     /// True while the relay is switched on.
     pub is_on: bool,
-    /// Setpoint, if any; a relay that is switched off keeps its last one.
+    /// Setpoint of the relay; `None` before its first one. A relay that is switched off keeps its last one.
     pub place: Option<Placement>,
     /// Number of frames sent on all links until this time.
     pub messages: u64,

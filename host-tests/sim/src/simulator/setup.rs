@@ -47,7 +47,7 @@ pub struct UploadSpec {
 /// Data rate and number of users of a link or a radio channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Channel {
-    /// Data rate, bit/s.
+    /// Data rate of the link or the channel, bit/s.
     pub baud: u32,
     /// Largest number of relays that receive each other at one point, including the relay itself.
     ///
@@ -115,7 +115,7 @@ pub struct Setup {
     pub sky: Option<TrueInterference>,
     /// Fixed end of the run; its availability is then measured. `None` to end the run when the chain settles.
     pub soak: Option<Instant>,
-    /// Time from which links cause no more faults; `None` for never.
+    /// Time from which links cause no more faults; `None` if they do to the end.
     pub faults_end: Option<Instant>,
     /// True to record all frames, for [`Chain::frames`](super::chain::Chain::frames).
     pub record: bool,
