@@ -89,7 +89,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` in a table that also has a key of the same meaning.
+    /// Rejects `key` if the table also has a key that excludes it, as `power_w` excludes `power_dbm`.
     fn alone(
         &self,
         path: &str,
@@ -170,10 +170,10 @@ impl Check<'_> {
     }
 }
 
-/// Least Jaro-Winkler similarity (0 to 1) for a suggestion.
+/// Least Jaro-Winkler similarity, 0 to 1, of a known key that an error message suggests.
 const ALIKE: f64 = 0.8;
 
-/// Returns a suggestion of the known key most similar to an unknown one, or an empty text.
+/// Returns "; did you mean KEY?" with the known key most similar to `name`. Empty if none is similar.
 fn nearest(name: &str, keys: impl IntoIterator<Item = &'static Key>) -> String {
     let alike = keys
         .into_iter()
@@ -200,9 +200,9 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Creates the error for a table whose keys [`table`] accepts, but whose values serde rejects.
+/// Creates the error for a table that [`table`] accepts but serde cannot convert.
 ///
-/// It is a fault of the program: the key table and the types differ.
+/// This is a fault of the program: the table of allowed keys and the Rust types differ.
 pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),
@@ -213,7 +213,8 @@ pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
     }
 }
 
-/// Largest file size, bytes. Far more than 1000 relays and as many interferers, and it bounds `/dev/zero`.
+/// Largest size of a scenario file, bytes. It is far more than 1000 relays and as many interferers need, and stops
+/// the reading of endless files such as `/dev/zero`.
 const LONGEST: u64 = 1 << 20;
 
 pub(super) fn text_of(path: &Path) -> Result<String, ScenarioError> {
@@ -277,7 +278,7 @@ pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
     Ok(table)
 }
 
-/// Returns line and column (from 1, in characters) of a byte offset, and the text of that line.
+/// Returns the line and column (from 1, in characters) of a byte offset, and the text of that line.
 fn place(text: &str, byte: usize) -> (usize, usize, &str) {
     let before = text.get(..byte).unwrap_or(text);
     let start = before.rfind('\n').map_or(0, |newline| newline + 1);

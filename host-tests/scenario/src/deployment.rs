@@ -11,106 +11,108 @@ use super::keys::SECTIONS;
 use crate::check;
 use crate::error::{Problem, ScenarioError};
 
-/// Default network number of all tools.
+/// Default network number of all tools. Relays ignore frames with another network number.
 pub const NETWORK: u16 = 1;
 
-/// Sections of the file; a missing value is `None`, and the program's default applies.
+/// Settings of the programs in a scenario file: `[network]`, `[companion]` and `[ground]`. For a missing value,
+/// `None`, the program uses its default.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Deployment {
-    /// Settings that all members of the network share.
+    /// Section `[network]`: settings that all members of the network share.
     pub network: Network,
-    /// Companion computer of one drone.
+    /// Section `[companion]`: the companion computer of one drone.
     pub companion: Companion,
-    /// Ground station.
+    /// Section `[ground]`: the ground station.
     pub ground: Ground,
 }
 
-/// Settings that all members of the network share.
+/// Section `[network]` of a scenario file: settings that all members of the network share.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Network {
-    /// Network number, 0 to 65535.
+    /// Network number, 0 to 65535. Relays ignore frames with another number.
     pub id: Option<u16>,
     /// Number of relays in the chain, 1 to 1000.
     pub relays: Option<u16>,
-    /// File with the network key.
+    /// File with the secret key that signs the frames of the network.
     pub key_file: Option<PathBuf>,
     /// Placement method: `align`, `joint` or `adjust`.
     pub method: Option<String>,
-    /// Data rate of the ports, bit/s, 1200 to 4000000.
+    /// Data rate of the serial ports between relays, bit/s, 1200 to 4000000.
     pub baud: Option<u32>,
-    /// Silence before a neighbour is probed, ms, 1 to 3600000.
+    /// Time without a frame from a neighbour before the relay probes it, ms, 1 to 3600000.
     pub probe_after_ms: Option<u32>,
-    /// Silence after which a neighbour is lost, ms, 1 to 3600000.
+    /// Time without a frame from a neighbour after which it counts as lost, ms, 1 to 3600000.
     pub dead_after_ms: Option<u32>,
 }
 
-/// Companion computer of one drone. Paths in a file are relative to its folder.
+/// Section `[companion]` of a scenario file: the companion computer of one drone. Paths are relative to the file's
+/// folder.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Companion {
-    /// Index of its relay, 1 to 1000.
+    /// Index of the relay that this drone carries, 1 to 1000; 1 is next to the transmitter.
     pub index: Option<u16>,
-    /// Serial port toward the transmitter.
+    /// Serial port of the link to the neighbour toward the transmitter.
     pub upstream: Option<PathBuf>,
-    /// Serial port toward the receiver.
+    /// Serial port of the link to the neighbour toward the receiver.
     pub downstream: Option<PathBuf>,
-    /// Serial port to a channel that all relays share, in place of both.
+    /// Serial port of a radio channel that all relays share. It replaces `upstream` and `downstream`.
     pub shared: Option<PathBuf>,
-    /// File with the persisted epoch.
+    /// File that stores the epoch, a start counter that prevents replays of frames from earlier starts.
     pub epoch_file: Option<PathBuf>,
-    /// File with the newest uploaded mission.
+    /// File that stores the newest mission that was uploaded to the relay.
     pub upload_file: Option<PathBuf>,
-    /// File with the persisted votes on views.
+    /// File that stores the relay's votes on the membership of the chain. It prevents a second vote after a reboot.
     pub view_file: Option<PathBuf>,
     /// Autopilot: a serial port, or a UDP address as parsed by [`Endpoint`](crate::endpoint::Endpoint).
     pub autopilot: Option<String>,
     /// Data rate of the autopilot's serial port, bit/s, 1200 to 4000000.
     pub autopilot_baud: Option<u32>,
-    /// File with the key that the autopilot signs with.
+    /// File with the key that signs the MAVLink messages exchanged with the autopilot.
     pub autopilot_key_file: Option<PathBuf>,
     /// Greatest speed of the drone, m/s, 0.1 to 20.
     pub speed_m_s: Option<f32>,
-    /// FIFO with positions.
+    /// FIFO from which the companion reads the drone's own position. Another program writes it.
     pub positions: Option<PathBuf>,
     /// Largest reported position error of a hovering drone, m, 0 to 1000.
     pub position_error_m: Option<f32>,
-    /// True for log lines in JSON.
+    /// True to write log lines as JSON.
     pub json: Option<bool>,
-    /// Log file in place of standard output.
+    /// Log file of the companion, in place of its standard output.
     pub log_file: Option<PathBuf>,
-    /// Socket that reports counters.
+    /// Unix socket at which the companion reports its status and counters.
     pub status_socket: Option<PathBuf>,
-    /// Capture file for the traffic on its ports.
+    /// File to which the traffic on the companion's ports is captured.
     pub capture: Option<PathBuf>,
 }
 
-/// Ground station. Paths in a file are relative to its folder.
+/// Section `[ground]` of a scenario file: the ground station. Paths are relative to the file's folder.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ground {
-    /// Serial port toward the chain.
+    /// Serial port of the link from the ground station to the chain.
     pub tty: Option<PathBuf>,
     /// True if the port leads to a channel that all relays share.
     pub shared: Option<bool>,
-    /// End of the chain: `tx` or `rx`.
+    /// End of the chain at which the ground station is: `tx` (transmitter) or `rx` (receiver).
     pub end: Option<String>,
-    /// File with the persisted epoch.
+    /// File that stores the epoch, a start counter that prevents replays of frames from earlier starts.
     pub epoch_file: Option<PathBuf>,
-    /// Time limit, s, 1 to 86400.
+    /// Time after which the ground station gives up an upload, s, 1 to 86400.
     pub timeout_s: Option<u32>,
-    /// True to keep running as an end of the chain.
+    /// True if the ground station keeps running at its end of the chain instead of ending after an upload.
     pub stand: Option<bool>,
     /// Source of interference measurements: a FIFO, a file, or `udp:[HOST:]PORT`.
     pub measurements: Option<String>,
-    /// True for log lines in JSON.
+    /// True to write log lines as JSON.
     pub json: Option<bool>,
-    /// Log file in place of standard output.
+    /// Log file of the ground station, in place of its standard output.
     pub log_file: Option<PathBuf>,
-    /// Socket that reports counters.
+    /// Unix socket at which the ground station reports its status and counters.
     pub status_socket: Option<PathBuf>,
-    /// Capture file for the traffic on its port.
+    /// File to which the traffic on the ground station's port is captured.
     pub capture: Option<PathBuf>,
 }
 
@@ -122,7 +124,9 @@ pub(super) fn split(mut table: Table) -> (Table, Table) {
     (table, sections)
 }
 
-/// Converts sections that [`check::table`] has accepted.
+/// Converts the `[network]`, `[companion]` and `[ground]` tables of a file to their types.
+///
+/// [`check::table`] must have accepted the tables.
 pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, ScenarioError> {
     let sections = sections.clone();
     sections
@@ -130,7 +134,7 @@ pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, Sce
         .map_err(|error| check::unread(file, &error))
 }
 
-/// Rejects a `[network]` whose number of relays differs from a plan's.
+/// Checks that the number of relays in `[network]` equals the one in `[plan]`, if both are given.
 ///
 /// # Errors
 /// Names the key, its value and the plan's number.

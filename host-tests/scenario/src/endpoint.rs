@@ -7,24 +7,25 @@ use core::fmt;
 
 const PREFIX: &str = "udp:";
 
-/// Ports at which PX4's simulation listens for a companion, and the first port that it sends to. Both are numbered by vehicle.
+/// Ports at which PX4's simulation listens for a companion computer, one for each vehicle from 0 to 9.
+/// [`PX4_SENDS_TO`] is the port to which vehicle 0 sends.
 const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
 const PX4_SENDS_TO: u16 = 14_540;
 
-/// Difference between the default local port and the autopilot's port, for all other ports.
+/// Default local port minus the autopilot's port, for ports outside of [`PX4_LISTENS`].
 const APART: u16 = 1_000;
 
-/// Form of an address, and the allowed ports.
+/// Description of a valid UDP address and its ports, for error messages.
 pub const FORM: &str = "udp:HOST:PORT or udp:HOST:PORT@LOCAL, PORT and LOCAL within 1 to 65535, without @LOCAL PORT within 1 to 64535";
 
-/// A UDP port of an autopilot, and the local port to reach it from.
+/// UDP address of an autopilot, with the local port that the companion uses to reach it.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Endpoint {
     /// Host of the autopilot: a name, an IPv4 address, or an IPv6 address in brackets.
     pub host: String,
-    /// Port of the autopilot.
+    /// UDP port of the autopilot.
     pub port: u16,
-    /// Local port.
+    /// Local port from which the companion sends, and at which it receives.
     pub local: u16,
     is_stated: bool,
 }
@@ -74,7 +75,7 @@ fn of_address(address: &str) -> Result<Endpoint, EndpointError> {
     })
 }
 
-/// Parses a port number in decimal digits, above 0.
+/// Parses a port number, 1 to 65535, in decimal digits; `None` for any other text.
 fn number(text: &str) -> Option<u16> {
     let is_plain = text.bytes().all(|digit| digit.is_ascii_digit());
     let number = text.parse().ok().filter(|port| *port > 0);
@@ -101,19 +102,19 @@ impl fmt::Display for Endpoint {
     }
 }
 
-/// The part of an address that is missing or wrong.
+/// Error in a UDP address: the part that is missing or wrong.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum EndpointError {
-    /// The host is missing.
+    /// The address has no host.
     NoHost,
-    /// The port is missing, or not within 1 to 65535.
+    /// The autopilot's port is missing, or not within 1 to 65535.
     NoPort,
-    /// The stated local port is not within 1 to 65535.
+    /// The local port after `@` is not within 1 to 65535.
     NoLocal,
-    /// The local port is not stated, and the default is above 65535.
+    /// The address states no local port, and the default for the autopilot's port would be above 65535.
     NoDefault {
-        /// Port of the autopilot.
+        /// UDP port of the autopilot, for which there is no default local port.
         port: u16,
     },
 }

@@ -6,21 +6,21 @@ use toml::Value;
 
 use crate::endpoint::EndpointError;
 
-/// Length at which a quoted value is cut, characters.
+/// Length at which an error message cuts a quoted value, characters.
 const QUOTED: usize = 60;
 
 /// A mistake in a scenario file; displayed as exactly one line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScenarioError {
-    /// File name as given by the user.
+    /// Name of the scenario file, as given by the user.
     pub file: String,
     /// Location: a key such as `relay[1].index`, or a line and column. `None` if the whole file is at fault.
     pub key: Option<String>,
-    /// Offending value as TOML, cut if long; `None` if there is none.
+    /// Wrong value as TOML, cut if it is long; `None` if the mistake is not in a value.
     pub value: Option<String>,
-    /// Kind of mistake.
+    /// Kind of the mistake.
     pub problem: Problem,
-    /// Allowed values: a range with its unit, or the keys of that table.
+    /// Allowed values, for the message: a range with its unit, or the keys that the table may have.
     pub allowed: String,
 }
 
@@ -28,59 +28,59 @@ pub struct ScenarioError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The file does not exist.
+    /// The scenario file does not exist.
     NoSuchFile,
-    /// The name is that of a directory.
+    /// The path names a directory instead of a file.
     Directory,
-    /// The system does not allow the file to be read.
+    /// The operating system refused to read the file, with this error.
     Unreadable(std::io::ErrorKind),
-    /// The file exceeds the limit of 1 MiB.
+    /// The scenario file exceeds the limit of 1 MiB.
     TooLong,
-    /// The file is not UTF-8 text.
+    /// The scenario file is not UTF-8 text.
     NotUtf8,
-    /// The file contains only blanks and comments.
+    /// The scenario file contains only blanks and comments.
     Empty,
-    /// The file is not TOML.
+    /// The scenario file is not valid TOML.
     Syntax,
-    /// The key is unknown in its table.
+    /// The table of a scenario file has a key that no such table may have.
     UnknownKey,
-    /// A required key is missing.
+    /// The table of a scenario file lacks a required key.
     Missing,
-    /// Two keys have the same meaning.
+    /// Two keys that exclude each other are both given, such as a power in W and in dBm.
     SaidTwice,
-    /// A geographic position needs `[site]`.
+    /// A position in latitude and longitude is given without the table `[site]`, to which it relates.
     NoSite,
-    /// The text is not one of the allowed values.
+    /// The value of a key is a text that is not one of those allowed.
     UnknownChoice,
-    /// The UDP address is malformed.
+    /// The UDP address of an autopilot is malformed.
     NoEndpoint(EndpointError),
-    /// The list has another number of entries than another key requires.
+    /// The plan has another number of places, or `[network]` another number of relays, than `plan.uavs`.
     OtherNumber,
-    /// A single table is given instead of a list of tables.
+    /// The file has a single table where a list of tables is required.
     NoList,
-    /// A list of tables is given instead of a single table.
+    /// The file has a list of tables where a single table is required.
     NoTable,
-    /// The value has the wrong type.
+    /// The value of a key has the wrong type.
     WrongType,
-    /// The value is outside its range, NaN or infinite.
+    /// The value of a key is outside its range: also a number that is NaN or infinite, or an empty text.
     OutOfRange,
-    /// The list needs at least one entry.
+    /// The value of a key is an empty list, although it needs an entry.
     EmptyList,
-    /// `[field]` and `[[interferer]]` are both given.
+    /// `[field]` and `[[interferer]]` are both given, although they exclude each other.
     TwoInterferences,
-    /// `[listen]` and `[field]` are both given.
+    /// `[listen]` and `[field]` are both given: relays cannot locate an interferer in a random field.
     MeasuredField,
     /// Neither `[field]` nor `[[interferer]]` is given.
     NoInterference,
-    /// A relay is described twice.
+    /// Two `[[relay]]` tables have the same index.
     DuplicateRelay,
-    /// A relay's description changes nothing.
+    /// A `[[relay]]` table gives the relay neither an altitude nor a power of its own.
     NothingDiffers,
-    /// The distance contradicts that of the sites.
+    /// The given distance between Tx and Rx contradicts the one computed from their geographic positions.
     OtherDistance,
-    /// The values are not in increasing order.
+    /// The values of a list are not in increasing order.
     Unsorted,
-    /// The bandwidths of the link and of the noise differ.
+    /// The bandwidths in `[link]` and in `[noise]` differ.
     OtherBandwidth,
 }
 
@@ -138,7 +138,7 @@ impl fmt::Display for ScenarioError {
 
 impl std::error::Error for ScenarioError {}
 
-/// Escapes characters that a terminal or log reader could treat as a line end.
+/// Escapes line ends and control characters, so that the text stays one line in a terminal or log.
 fn one_line(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

@@ -17,8 +17,9 @@ use super::spec::{
     PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source,
 };
 
-/// Scenario file as serde reads it. `deny_unknown_fields` guards the table of keys: a key that is listed there but missing here
-/// fails at once.
+/// Scenario file as serde reads it, before the keys are checked against each other.
+///
+/// `deny_unknown_fields` finds a key that the table of allowed keys has and this type lacks: parsing then fails.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFile {
@@ -95,7 +96,7 @@ struct RawDataLink {
 }
 
 impl RawDataLink {
-    /// Returns true if the table describes a radio, and not only the way back.
+    /// Returns true if `[link]` describes a radio. A table with only the key `reverse` does not.
     const fn has_radio(&self) -> bool {
         self.access.is_some()
             || self.bandwidth_hz.is_some()
@@ -153,7 +154,7 @@ struct RawPlan {
     places: Vec<PlannedPlace>,
 }
 
-/// Converts a table that [`crate::check::table`] has accepted.
+/// Converts the table of a file to [`RawFile`]. [`crate::check::table`] must have accepted the table.
 pub(super) fn from_table(file: &str, table: &Table) -> Result<RawFile, ScenarioError> {
     let table = table.clone();
     table.try_into().map_err(|error| unread(file, &error))
@@ -456,7 +457,7 @@ fn relays(
     Ok(relays)
 }
 
-/// Builds the plan and checks that it has a position for every relay.
+/// Builds the `[plan]` of a file; an error unless it has exactly one position for every relay.
 fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
     if raw.places.len() != usize::from(raw.uavs) {
         return Err(mistake(
@@ -492,7 +493,10 @@ struct RawSite {
     amsl_m: f64,
 }
 
-/// Returns the geographic line, if there are sites, and the distance from Tx to Rx. The given one, or that of the sites.
+/// Returns the geographic line from Tx to Rx, if the file has `[site]`, and its length, m.
+///
+/// Without `[site]` the distance is the given `distance_m`, otherwise that between the sites. It is an error if both
+/// are given and differ.
 pub(super) fn line(
     file: &str,
     sites: Option<RawSites>,
@@ -565,7 +569,7 @@ fn line_on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
 //
 // An antenna has the same gain in all directions; a null toward the interferer is not modelled.
 
-/// EIRPs that a mission accepts for Tx and relays, W, and for interferers.
+/// Range of the EIRPs, W, that a mission accepts for Tx, Rx and relays. [`SOURCE_EIRP`] is the range for interferers.
 const EIRP: [f64; 2] = [1e-6, 1e6];
 const SOURCE_EIRP: [f64; 2] = [1e-6, 1e9];
 
@@ -592,14 +596,14 @@ pub(super) struct Powers {
     pub(super) rx_gain_dbi: f64,
 }
 
-/// A sender's power in one of the forms that a table allows.
+/// Power of a sender as the file gives it: in W, in dBm, or as an EIRP, each with the name of its key.
 pub(super) struct Said<'a> {
-    /// Name of the table, such as `interferer[0].`, and the keys in it.
+    /// Prefix of the keys' names in error messages: the table with a dot, such as `interferer[0].`
     pub(super) table: &'a str,
     pub(super) in_w: (&'a str, Option<f64>),
     pub(super) in_dbm: (&'a str, Option<f64>),
     pub(super) eirp: (&'a str, Option<f64>),
-    /// Key and value of the antenna gain.
+    /// Name of the key, and value in dBi, of the antenna gain.
     pub(super) gain: (&'a str, Option<f64>),
 }
 
@@ -675,7 +679,9 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
     })
 }
 
-/// Largest change of interference, dB, by ignoring an interferer's height. It holds anywhere that relays or Rx may be.
+/// Largest error of the interference, dB, at which an interferer above or below the ground is accepted.
+///
+/// The mission has all interferers on the ground. The limit holds at every position that relays or Rx may have.
 const MOST_OFF_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -699,7 +705,7 @@ pub(super) struct Room<'a> {
     pub(super) lateral_m: [f64; 2],
 }
 
-/// Returns the interferers of a file whose keys have been checked.
+/// Converts the `[[interferer]]` tables of a file to EIRPs and positions. Their keys must have been checked.
 pub(super) fn sources(
     file: &str,
     raw: &[RawSource],
@@ -725,7 +731,10 @@ pub(super) fn sources(
     .collect()
 }
 
-/// Converts geographic coordinates to a position along the line and to its right, m.
+/// Converts an interferer's latitude and longitude to x, along the line to Rx, and y, to its right, m.
+///
+/// It is an error if the file has no `[site]`, if the interferer is too far away, or if its height changes the
+/// interference too much.
 fn on_earth(
     file: &str,
     table: &str,
@@ -788,10 +797,10 @@ fn on_earth(
 }
 
 impl Room<'_> {
-    /// Returns the largest difference, dB, of the interference by a source's height. The source is `above_m` over (`x_m`, `y_m`),
-    /// or on the ground below.
+    /// Returns the largest error of the interference, dB, if a source above ground is treated as on it.
     ///
-    /// At a given altitude it is largest for the nearest relay position; altitudes are tried in steps. Rx is a further receiver.
+    /// The source is at (`x_m`, `y_m`), `above_m` over the ground, m. For each of 65 altitudes, the error is that at
+    /// the nearest position which a relay may have, where it is largest. Rx, on the ground, is one more receiver.
     fn off_by_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;
         let ratio_db = |beside_m: f64, h: f64| {

@@ -11,49 +11,55 @@
 use super::Source;
 use super::scene::{Place, Scene};
 
-/// Approximate number of points of the grid search.
+/// Approximate number of quadrature points for the error during the grid search, which needs speed.
 const COARSE: usize = 400;
 
-/// Approximate number of points at the end of the search.
+/// Approximate number of quadrature points for the error in the final refinement of the position.
 const FINE: usize = 4_000;
 
-/// Steps along the line and sideways at which both sides are compared.
+/// Number of grid steps along the line, for the decision on which side of it the interferer is.
+///
+/// [`ASIDE`] is the number of lateral steps of that grid.
 const ALONG: u32 = 64;
 const ASIDE: u32 = 8;
 
-/// Approximate number of points for the reported error.
+/// Approximate number of quadrature points for the error that is reported with the result.
 const REPORTED: usize = 60_000;
 
-/// Largest y_H relative to the size of the scene.
+/// Largest lateral distance y_H of the hypothetical interferer, relative to the extent of the scene.
+///
+/// At 30 times the extent, the interference is uniform to a thousandth.
 const FAR: f64 = 30.0;
 
-/// Grid step in asinh(y_H / least altitude): a factor of 1.4 once y_H is above that altitude.
+/// Grid step in u = asinh(y_H / lowest altitude). For y_H well above that altitude it is a factor of 1.4 in y_H.
 const RISE: f64 = 0.35;
 
-/// Number of the grid's local minima that are refined, and of the true sources.
+/// Largest number of the grid's local minima, and of true sources, from which local searches start.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
 
-/// A hypothetical interferer in place of several, and its error.
+/// A hypothetical interferer that replaces all interferers of a scene, and the error that it causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothetical {
-    /// Transmit power p_H, W, > 0.
+    /// Transmit power of the hypothetical interferer (p_H), W, > 0.
     pub power_w: f64,
-    /// Position x_H along the line from Tx to Rx, m.
+    /// Position of the hypothetical interferer along the line from Tx to Rx (x_H), m.
     pub x_m: f64,
-    /// Lateral position y_H, m; positive to the right of the line.
+    /// Lateral position of the hypothetical interferer (y_H), m; positive to the right of the line.
     pub y_m: f64,
-    /// Mean absolute error of the interference at a relay, W.
+    /// Mean absolute error of the interference power over the possible relay positions above the line, W.
     pub mean_abs_error_w: f64,
-    /// Integral of the absolute error over that of the true interference; 0 is perfect.
+    /// Integral of the absolute error divided by the integral of the true interference; 0 is a perfect fit.
     pub relative_error: f64,
 }
 
 impl Hypothetical {
-    /// Chooses the side of the line with the smaller error, for lateral room from `least_m` to `most_m`, m.
+    /// Mirrors the interferer to the other side of the line if its error is smaller there.
     ///
-    /// Above the line both sides are equal.
+    /// The error is the sum of |ln(I_H / I)| over relay positions with lateral offsets from `least_m` to `most_m`, m,
+    /// where I_H is the interference from the hypothetical interferer and I the true one. Directly above the line,
+    /// I_H is equal for both sides.
     #[must_use]
     pub fn sided(self, scene: &Scene, least_m: f64, most_m: f64) -> Self {
         let other = Self {
@@ -87,7 +93,7 @@ impl Hypothetical {
         }
     }
 
-    /// Returns the interferer as a source of a scenario.
+    /// Returns the hypothetical interferer as an interfering transmitter of a scenario.
     pub fn source(&self) -> Source {
         Source {
             power_w: self.power_w,
@@ -97,21 +103,21 @@ impl Hypothetical {
     }
 }
 
-/// Best position of the hypothetical interferer found on a given raster.
+/// Best position of the hypothetical interferer for a given set of quadrature points ([`Raster`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
-    /// x_H, m.
+    /// Position x_H of the hypothetical interferer along the line from Tx, m.
     pub x_m: f64,
-    /// y_H, m, >= 0.
+    /// Lateral distance y_H of the hypothetical interferer from the line, m, >= 0.
     pub y_m: f64,
-    /// Best power of an interferer at this position, and the remaining error on the raster.
+    /// Best power of an interferer at this position, and the error that remains with it.
     pub weighed: Weighed,
 }
 
-/// Returns the hypothetical interferer of a scene; `None` without interferers.
+/// Returns the single interferer that best replaces all interferers of `scene`; `None` if it has none.
 ///
-/// Usually about 1 500 evaluations of 400 points, 600 of 4 000 and one of 60 000. The errors are accurate to 3e-5, relative
-/// (`the_rasters_are_fine_enough` in `host-tests/tests/several`).
+/// The search usually evaluates about 1 500 positions with 400 quadrature points, 600 with 4 000 and one with 60 000.
+/// The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in `host-tests/tests/several`).
 pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     let found = fit(scene, &Raster::graded(scene, None, FINE))?;
     let place = (found.x_m, found.y_m);
@@ -126,7 +132,9 @@ pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     })
 }
 
-/// Returns the best hypothetical interferer found on `raster`; `None` without interferers or points.
+/// Returns the best hypothetical interferer for the quadrature points of `raster`.
+///
+/// `None` without interferers or points.
 pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     if scene.sources.is_empty() || raster.is_empty() {
         return None;
@@ -154,7 +162,9 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     })
 }
 
-/// Returns the starting points in `space`: the grid's deepest local minima and the best true sources.
+/// Returns the starting points of the local searches, as (x, u) in `space`.
+///
+/// They are the deepest local minima of a grid, and the true sources with the smallest errors.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -207,7 +217,10 @@ fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Search space: x in metres, and u = asinh(y / least altitude). u is linear in y below that altitude and logarithmic above.
+/// Search space of the interferer's position: x in metres, and u = asinh(y / lowest altitude).
+///
+/// y is the lateral distance from the line. u is linear in y below the lowest altitude of relays, and logarithmic
+/// above it.
 struct Space {
     distance_m: f64,
     low: f64,
@@ -247,7 +260,8 @@ impl Space {
         raster.weigh(x, y).error
     }
 
-    /// Returns the grid along x: spacing D / 16 in the middle, wider further out.
+    /// Returns the grid of the search along x, m. The spacing is D / 16 in the middle between Tx and Rx, and wider
+    /// further out.
     fn columns(&self) -> Vec<f64> {
         let half = 0.5 * self.distance_m;
         let middle = Centre {
@@ -261,7 +275,10 @@ impl Space {
         graded(0.0, self.most_u, &[], 0.0, RISE)
     }
 
-    /// Minimises the error by a simplex from `start`, with a size of `share` of the local length scale.
+    /// Minimises the error by the simplex method from `start`, as (x, u) in the search space.
+    ///
+    /// The first simplex has `share` times the length over which the error changes. The search ends at the relative
+    /// `tolerance` or after `most` steps.
     fn descend(
         &self,
         raster: &Raster,
@@ -286,7 +303,7 @@ impl Space {
     }
 }
 
-/// Largest cell width relative to the distance to the nearest source.
+/// Largest width of a quadrature cell, relative to the distance to the nearest source.
 const WIDEST_STEP: f64 = 0.9;
 
 const TRIES: u32 = 6;
@@ -296,11 +313,13 @@ struct Node {
     x: f64,
     h_squared: f64,
     weight: f64,
-    /// Sum of p / distance^2 over the true sources, W/m^2.
+    /// Sum of p / distance^2 over the true sources of power p, at this quadrature point, W/m^2.
     truth: f64,
 }
 
-/// Quadrature over [0, D] x altitude band, or over the line if the band is a single altitude.
+/// Quadrature points in the vertical plane from Tx to Rx, between the lowest and highest altitude.
+///
+/// If both altitudes are equal, the points are on a line at that altitude.
 #[derive(Debug, Clone)]
 pub struct Raster {
     nodes: Vec<Node>,
@@ -308,20 +327,25 @@ pub struct Raster {
     total: f64,
 }
 
-/// Best power of a hypothetical interferer at a given position, and its error.
+/// Best power of a hypothetical interferer at a given position, and the error that remains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weighed {
-    /// Transmit power, W, > 0.
+    /// Best transmit power of the hypothetical interferer at its position, W, > 0.
     pub power_w: f64,
-    /// Integral of the absolute difference from the true sum of p / distance^2. W over an area, W/m over a line.
+    /// Integral of |p / d^2 - S| over the points, with this interferer's power p and its distance d.
+    ///
+    /// S is the sum of p / d^2 over the true interferers. The unit is W for an integral over distance and altitude,
+    /// and W/m for one over distance at a single altitude.
     pub error: f64,
 }
 
-/// A coordinate and its quadrature weight.
+/// A coordinate of a quadrature point, and its weight in that direction.
 type Share = (f64, f64);
 
 impl Raster {
-    /// Creates a midpoint rule on `columns` x `rows` equal cells; one row if the band is a single altitude.
+    /// Creates quadrature points at the centres of `columns` x `rows` equal cells.
+    ///
+    /// There is one row if the lowest and the highest altitude are equal.
     pub fn even(scene: &Scene, columns: u32, rows: u32) -> Self {
         let midpoints = |low: f64, high: f64, count: u32| -> Vec<Share> {
             let cell = (high - low) / f64::from(count);
@@ -338,9 +362,10 @@ impl Raster {
         Self::of(scene, &rows, |_| midpoints(0.0, scene.distance_m, columns))
     }
 
-    /// Creates a two-point Gauss rule per cell and direction. Cells shrink toward sources and `also` (x, y in metres).
+    /// Creates quadrature points in cells that are smaller near the sources and near `also`, (x, y) in m.
     ///
-    /// At most about `most` points, > 100, unless the number of sources alone requires more.
+    /// Each cell has two Gauss points per direction. The number of points is at most about `most`, > 100, unless the
+    /// number of sources alone requires more.
     pub fn graded(scene: &Scene, also: Option<(f64, f64)>, most: usize) -> Self {
         let sharp: Vec<(f64, f64)> = scene
             .sources
@@ -409,30 +434,32 @@ impl Raster {
         }
     }
 
-    /// Returns the number of points.
+    /// Returns the number of quadrature points.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Returns true if there are no points.
+    /// Returns true if there are no quadrature points.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
-    /// Returns the area of integration, m^2, or its length, m.
+    /// Returns the area over which the points integrate, m^2, or the length, m, if they are on a line.
     pub fn area(&self) -> f64 {
         self.area
     }
 
-    /// Returns the integral of the true sum of p / distance^2, in the unit of [`Weighed::error`].
+    /// Returns the integral of the sum of p / distance^2 over the true sources. The unit is that of
+    /// [`Weighed::error`].
     pub fn total(&self) -> f64 {
         self.total
     }
 
-    /// Returns the best power of a hypothetical interferer at (`x`, `y`), m, and the remaining error.
+    /// Returns the best power of a hypothetical interferer at (`x`, `y`), m, and the error that remains.
     ///
-    /// With the shape g = 1 / distance^2 and the true sum S, the integral of |p g - S| is that of g |p - S/g|: its minimum over p
-    /// is the median of S/g, weighted by g. Linear in the number of points.
+    /// The error is the integral of |p g - S|, where g = 1 / distance^2 is the effect of the interferer per watt, p
+    /// its power, and S the same from the true sources. The best p is the median of S / g, weighted by g. The time is
+    /// linear in the number of points.
     pub fn weigh(&self, x: f64, y: f64) -> Weighed {
         let shape = |node: &Node| {
             let dx = node.x - x;
@@ -460,7 +487,8 @@ impl Raster {
     }
 }
 
-/// Two-point Gauss rule per cell: exact for cubic functions.
+/// Returns two Gauss points, with weights, in each cell between neighbouring `ends`. They integrate cubic functions
+/// exactly.
 fn gauss(ends: &[f64]) -> Vec<Share> {
     let cells = ends.iter().zip(ends.iter().skip(1));
     cells
@@ -472,13 +500,13 @@ fn gauss(ends: &[f64]) -> Vec<Share> {
         .collect()
 }
 
-/// Ratio S / g of the true sum to the shape at one point, and its weight in the median.
+/// Power with which an interferer would cause the true interference at a point, and the point's weight.
 struct Ratio {
     value: f64,
     weight: f64,
 }
 
-/// Returns the weighted median in linear time; 0 without values. Reorders `ratios`.
+/// Returns the weighted median of `ratios` in linear time; 0 if there are none. Changes their order.
 fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     let mut half = 0.5 * ratios.iter().map(|ratio| ratio.weight).sum::<f64>();
     let mut median = 0.0;
@@ -500,26 +528,27 @@ fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     median
 }
 
-/// A point of rapid change, at a scale of about `width`.
+/// Position near which a function changes rapidly, over a length of about `width`. Quadrature cells are smallest
+/// there.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
-    /// Position.
+    /// Coordinate of the rapid change, in the unit of the grid.
     pub at: f64,
-    /// Scale of the finest cells.
+    /// Length over which the function changes at this position.
     pub width: f64,
 }
 
 impl Centre {
-    /// Returns the length scale of changes at `x` caused by this centre.
+    /// Returns the length over which the function changes at `x`: the hypotenuse of distance and `width`.
     fn scale(&self, x: f64) -> f64 {
         (x - self.at).hypot(self.width)
     }
 }
 
-/// Returns the cell ends from `low` to `high`, rising.
+/// Returns the ends of grid cells from `low` to `high`, in increasing order. Cells are smaller near the `centres`.
 ///
-/// Cells are at most 1.5 times `widest` wide, and at most about 1.5 times `step` (below 1) of the distance to a centre. About
-/// (high - low) / widest ends, and 2 ln(2 (high - low) / width) / step more per centre.
+/// A cell is at most 1.5 times `widest` wide, and at most about 1.5 times `step` (below 1) of the distance to a
+/// centre. There are about (high - low) / widest ends, and 2 ln(2 (high - low) / width) / step more for each centre.
 pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -> Vec<f64> {
     let mut ends = vec![low];
     let mut at = low;
@@ -545,9 +574,11 @@ struct Corner {
     value: f64,
 }
 
-/// Returns the best point found by the simplex method from `start` with initial `steps`. It is never worse than `start`.
+/// Returns the lowest point that the simplex method finds from `start`, with its value. It is never worse than
+/// `start`.
 ///
-/// Ends when the values at the corners agree to `tolerance` (relative), or after `most` steps of at most four evaluations.
+/// `steps` is the size of the first simplex. The search ends when the values at the corners agree to the relative
+/// `tolerance`, or after `most` steps of at most four evaluations of `f`.
 fn minimise(
     f: impl Fn((f64, f64)) -> f64,
     start: (f64, f64),
@@ -596,7 +627,7 @@ fn minimise(
     best
 }
 
-/// Interpolates from `from` to `to`; extrapolates for a share above 1.
+/// Returns the point at the fraction `share` of the way from `from` to `to`. Above 1 it lies beyond `to`.
 fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
     (
         from.0 + share * (to.0 - from.0),
@@ -627,7 +658,7 @@ mod tests {
         close(median(&[]), 0.0);
     }
 
-    /// Checks a minimum in a narrow pit, which the simplex reaches only by shrinking.
+    /// Checks that the simplex method finds the minimum of a narrow pit. It has to shrink the simplex to reach it.
     #[test]
     fn a_simplex_that_is_too_large_shrinks() {
         let pit = |(x, y): (f64, f64)| {

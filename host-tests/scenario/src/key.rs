@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-/// Reads the key in `file`, which `option` named.
+/// Reads the secret key in `file`. `option` is the command-line option that named the file, for error messages.
 ///
 /// # Errors
-/// A line that names both and the problem, such as a file that other users can read; never the content.
+/// A line with the option, the file and the problem, such as a file that other users can read; never the file's
+/// content.
 pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     let named = |error: &str| format!("{option} {}: {error}", file.display());
     check_mode(file).map_err(|error| named(&error))?;
@@ -14,7 +15,9 @@ pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
     parse(&text).map_err(named)
 }
 
-/// Rejects a file that users other than its owner and group can read or write. Errors of access are left to the reader.
+/// Rejects a key file that users other than its owner and group can read or write.
+///
+/// A file that is missing or unreadable passes: reading it fails afterwards.
 #[cfg(unix)]
 fn check_mode(file: &Path) -> Result<(), String> {
     use std::os::unix::fs::PermissionsExt as _;
@@ -31,16 +34,16 @@ fn check_mode(file: &Path) -> Result<(), String> {
     }
 }
 
-/// Accepts any file: other systems have no file mode.
+/// Accepts any key file: other systems than Unix have no file mode to check.
 #[cfg(not(unix))]
 fn check_mode(_: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Parses the key in `text`; surrounding white space is ignored.
+/// Parses a secret key from 64 hexadecimal digits; white space around them is ignored.
 ///
 /// # Errors
-/// The problem.
+/// The problem: other characters, another length, or a key of zeros.
 pub fn parse(text: &str) -> Result<[u8; 32], &'static str> {
     let text = text.trim();
     if !text.bytes().all(|digit| digit.is_ascii_hexdigit()) {

@@ -11,7 +11,7 @@ use super::endpoint::FORM;
 use super::link::Access;
 use super::spec::PlannedMethod;
 
-/// Range of numbers; both ends are included, except a low end that is `open`.
+/// Range of a number in a scenario file. Both ends are included; the low end is excluded if `open` is true.
 pub(super) struct Range {
     low: f64,
     high: f64,
@@ -22,12 +22,12 @@ pub(super) struct Range {
 pub(super) enum Rule {
     Number(Range),
     Whole(Range),
-    /// "los", "nlos" or a number.
+    /// Text "los" (line of sight) or "nlos" (obstructed), or a number within this range.
     LinkOrNumber(Range),
     Flag,
     Choice(&'static [&'static str]),
     Text,
-    /// A serial port, or the UDP address of an autopilot.
+    /// Text that names a serial port or the UDP address of an autopilot.
     TtyOrUdp,
     Table(Keys),
     /// An array of tables with at least this number of entries.
@@ -38,14 +38,14 @@ pub(super) enum Rule {
 pub(super) enum Need {
     Always,
     Never,
-    /// Required unless the table has one of these keys.
+    /// The key is required unless its table has at least one of these other keys.
     Unless(&'static [&'static str]),
 }
 
 pub(super) struct Key {
     pub(super) name: &'static str,
     pub(super) need: Need,
-    /// Keys with the same or an overlapping meaning, which exclude this key.
+    /// Other keys that may not be given beside this key, because their meanings overlap.
     pub(super) without: &'static [&'static str],
     pub(super) rule: Rule,
 }
@@ -88,7 +88,7 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Creates a key that is required unless the table has one of `others`, which exclude it.
+/// Creates a key that a table must have, unless it has one of `others`. The key and `others` exclude each other.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),
@@ -96,7 +96,7 @@ const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule)
     }
 }
 
-/// Creates an optional key that `others` exclude.
+/// Creates an optional key that may not be given beside any of `others`.
 const fn without(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         name,
@@ -259,7 +259,7 @@ const BETA: Keys = &[
 ];
 
 impl Key {
-    /// Returns true if `table`, which lacks the key, must have it.
+    /// Returns true if `table`, which does not have this key, is required to have it.
     pub(super) fn is_missed(&self, table: &Table) -> bool {
         match self.need {
             Need::Always => true,
@@ -268,7 +268,7 @@ impl Key {
         }
     }
 
-    /// Returns the keys of the same table that may replace this key.
+    /// Returns the keys that the table may have in place of this required key. `keys` are all keys of the table.
     pub(super) fn instead(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,
@@ -337,7 +337,8 @@ impl fmt::Display for Rule {
     }
 }
 
-/// Returns all keys of a file, as `table.key`; lists of tables are treated as tables.
+/// Returns the names of all keys that a scenario file may have, as `table.key`. A list of tables is treated as one
+/// table.
 pub fn all() -> Vec<String> {
     let mut names = Vec::new();
     collect("", FILE, &mut names);

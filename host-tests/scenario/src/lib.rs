@@ -37,7 +37,7 @@ pub use spec::{
     PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source,
 };
 
-/// Text of the default scenario file.
+/// Text of the scenario file that tools use by default, as TOML.
 pub const DEFAULT: &str = include_str!("default.toml");
 
 impl Scenario {
@@ -67,7 +67,7 @@ impl Scenario {
 }
 
 impl deployment::Deployment {
-    /// Reads both parts of a file: the scenario and the sections.
+    /// Reads a scenario file: the scenario, and the settings in `[network]`, `[companion]` and `[ground]`.
     ///
     /// # Errors
     /// Those of [`Scenario::load`], and a number of relays in `[network]` that differs from `[plan]`.
@@ -80,7 +80,10 @@ impl deployment::Deployment {
         Ok((scenario, sections))
     }
 
-    /// Parses the sections of a file whose plan is about to be replaced. `file_name` is used only in error messages.
+    /// Parses only the settings in `[network]`, `[companion]` and `[ground]` of a scenario file.
+    ///
+    /// Other than [`Self::load`] it accepts another number of relays than that of the plan, because the caller is
+    /// about to replace the plan. `file_name` is used only in error messages.
     ///
     /// # Errors
     /// Invalid TOML, and any mistake in a section.

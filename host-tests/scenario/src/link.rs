@@ -17,24 +17,24 @@ use serde::Deserialize;
 use crate::Scenario;
 use crate::number::factor;
 
-/// Access of the hops to the radio.
+/// Medium access: how the hops of a chain share frequencies and time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Access {
-    /// A single frequency, with one of N + 1 equal time slots for each hop.
+    /// A single frequency. Each of the N + 1 hops has one of N + 1 equal time slots.
     #[default]
     Slots,
-    /// A frequency for each hop.
+    /// A separate frequency for each hop, so that all hops send at the same time.
     Channels,
-    /// A single frequency, with a time slot for each hop that is as long as the hop needs.
+    /// A single frequency. Each hop has a time slot as long as it needs for the same amount of data.
     Fitted,
 }
 
 impl Access {
-    /// Names in files.
+    /// Names of the access methods in scenario files.
     pub const NAMES: &'static [&'static str] = &["slots", "channels", "fitted"];
 
-    /// Returns the name in files.
+    /// Returns the name of the access method in scenario files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Slots => "slots",
@@ -43,7 +43,7 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots in which a chain of `relays` relays forwards one packet per hop.
+    /// Returns the number of time slots in which every hop of a chain of `relays` relays sends once.
     pub const fn slots(self, relays: u16) -> u32 {
         match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
@@ -52,25 +52,27 @@ impl Access {
     }
 }
 
-/// Step of a radio's modulation and coding.
+/// A modulation and coding scheme of a radio: the SINR that it needs and its spectral efficiency.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RateStep {
-    /// Lowest SINR at which the step works, dB, -60 to 90.
+    /// Lowest SINR at which the modulation and coding scheme works, dB, -60 to 90.
     pub sinr_db: f64,
-    /// Spectral efficiency, bit/s/Hz, above 0 and at most 100.
+    /// Spectral efficiency of the modulation and coding scheme, bit/s/Hz, above 0 and at most 100.
     pub bits_per_hz: f64,
 }
 
 /// Spectral efficiency of a hop as a function of its SINR.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RateModel {
-    /// log2(1 + SINR / gap).
+    /// Shannon's formula with a gap: the spectral efficiency is log2(1 + SINR / gap) bit/s/Hz.
     Shannon {
-        /// Gap to Shannon's limit, dB, 0 to 30.
+        /// Loss of SINR relative to Shannon's limit, dB, 0 to 30.
         gap_db: f64,
     },
-    /// The step with the largest SINR that the hop has; 0 below the first. Both numbers increase strictly.
+    /// Table of modulation and coding schemes. SINR and spectral efficiency increase strictly.
+    ///
+    /// A hop uses the last scheme whose SINR it reaches. Below the first its spectral efficiency is 0.
     Steps(Vec<RateStep>),
 }
 
@@ -81,7 +83,7 @@ impl Default for RateModel {
 }
 
 impl RateModel {
-    /// Returns the spectral efficiency at `sinr` (linear), bit/s/Hz.
+    /// Returns the spectral efficiency, bit/s/Hz, of a hop with the linear SINR `sinr`.
     pub fn bits_per_hz(&self, sinr: f64) -> f64 {
         match self {
             // `libm` gives the same result on every machine.
@@ -96,36 +98,36 @@ impl RateModel {
     }
 }
 
-/// Data link of a scenario.
+/// Data link of a scenario: how hops share the radio, its bandwidth and its spectral efficiency.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Link {
-    /// Access of the hops to the radio.
+    /// Medium access: how the hops share frequencies and time.
     pub access: Access,
-    /// Bandwidth of one frequency, Hz, 1 to 1e12; `None` for that of the noise.
+    /// Bandwidth of one frequency, Hz, 1 to 1e12; `None` to use the scenario's noise bandwidth.
     pub bandwidth_hz: Option<f64>,
-    /// Spectral efficiency.
+    /// Spectral efficiency of a hop as a function of its SINR.
     pub model: RateModel,
 }
 
-/// Data link of a chain and the bandwidth of one frequency.
+/// Data link of a chain with a known bandwidth. It computes data rates from SIRs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radio {
-    /// Access and spectral efficiency.
+    /// Medium access and spectral efficiency. The bandwidth in it is replaced by `bandwidth_hz`.
     pub link: Link,
-    /// Bandwidth, Hz, 1 to 1e12.
+    /// Bandwidth of one frequency, Hz, 1 to 1e12.
     pub bandwidth_hz: f64,
 }
 
-/// Bandwidth that is missing, or given twice with different values.
+/// Error: the bandwidth is missing, or given twice with different values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BandwidthError {
-    /// Neither an option nor the scenario has a bandwidth.
+    /// Neither the command's option nor the scenario gives a bandwidth.
     Missing,
-    /// The option contradicts the scenario.
+    /// The command's option and the scenario give different bandwidths.
     Contradicts {
-        /// Bandwidth of the option, Hz.
+        /// Bandwidth in the command's option, Hz.
         option_hz: f64,
-        /// Bandwidth of `[link]`, Hz.
+        /// Bandwidth in the scenario's `[link]`, Hz.
         file_hz: f64,
     },
 }
@@ -147,12 +149,12 @@ impl fmt::Display for BandwidthError {
 impl std::error::Error for BandwidthError {}
 
 impl Radio {
-    /// Returns the data link of `scenario`, by default that of an empty `[link]`.
+    /// Creates the data link of `scenario`. Without `[link]` in the file, the defaults of its keys apply.
     ///
-    /// `option_hz` is the bandwidth of a command's option, if given.
+    /// `option_hz` is the bandwidth in a command's option; `None` uses the bandwidth in the scenario.
     ///
     /// # Errors
-    /// [`BandwidthError`].
+    /// [`BandwidthError`] if there is no bandwidth, or if option and scenario differ.
     pub fn new(scenario: &Scenario, option_hz: Option<f64>) -> Result<Self, BandwidthError> {
         let link = scenario.link.clone().unwrap_or_default();
         if let (Some(option_hz), Some(file_hz)) = (option_hz, link.bandwidth_hz)
@@ -167,14 +169,14 @@ impl Radio {
         })
     }
 
-    /// Returns the data rate of a hop while it sends, bit/s; the interference counts as noise. `sir` is linear.
+    /// Returns the data rate of a hop while it sends, bit/s, from its linear SIR. Interference counts as noise.
     pub fn hop_bps(&self, sir: f64) -> f64 {
         self.bandwidth_hz * self.link.model.bits_per_hz(sir)
     }
 
-    /// Returns the data rate of a chain in one direction, bit/s, from the SIR (linear) of each of its hops.
+    /// Returns the data rate of a chain in one direction, bit/s, from the linear SIR of each of its hops.
     ///
-    /// 0 without hops, and if a hop carries nothing.
+    /// It is 0 without hops, and if the rate of any hop is 0.
     pub fn chain_bps(&self, sirs: &[f64]) -> f64 {
         let rates = || sirs.iter().map(|sir| self.hop_bps(*sir));
         let worst = rates().reduce(f64::min).unwrap_or(0.0);
@@ -186,7 +188,7 @@ impl Radio {
         }
     }
 
-    /// Returns how `hops` hops share the radio, as the beginning of a sentence.
+    /// Returns a text that says how `hops` hops share the radio. It can begin a sentence.
     pub fn sharing(&self, hops: usize) -> String {
         match self.link.access {
             Access::Slots => {

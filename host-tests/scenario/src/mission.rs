@@ -12,28 +12,30 @@ use crate::number::narrow;
 use crate::scene::Scene;
 use crate::{Interference, Scenario, Source};
 
-/// Reason for which a scenario is not a valid mission.
+/// Error: the reason for which a scenario is not a valid mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// No single hypothetical interferer can replace the scenario's interferers.
+    /// The scenario has several interferers, and no single hypothetical interferer can replace them.
     NoHypothetical,
-    /// Several interferers and a way back: the hypothetical interferer is fitted to one direction.
+    /// The scenario has several interferers, and SIRs are also required from Rx to Tx.
+    ///
+    /// The single interferer that would replace them is fitted for the direction from Tx to Rx only.
     ReverseSources,
-    /// The relays do not fit on the distance with their least separation.
+    /// The distance from Tx to Rx is too short for the relays with their least separation.
     NoRoom {
         /// Number of relays.
         relays: u16,
-        /// Least separation, m.
+        /// Least separation of two relays, m.
         apart_m: f32,
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// The mission rejects a parameter.
+    /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),
-    /// The channel rejects a parameter.
+    /// [`Channel`] rejects a value of the scenario.
     Channel(ChannelError),
-    /// The field rejects its points.
+    /// [`Field`] rejects the distributions of the interference in the scenario.
     Field(FieldError),
 }
 
@@ -65,7 +67,9 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// Returns the mission of `uavs` relays and the relays' own profiles. One interferer replaces several; indices begin with 1.
+/// Converts a scenario to the mission of `uavs` relays, and the profiles of relays that differ.
+///
+/// Several interferers are replaced by one. The profiles come with the index of their relay, from 1.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -145,7 +149,9 @@ pub fn mission(
     Ok((mission, profiles))
 }
 
-/// Returns the hypothetical interferer of a scenario with several. `None` with fewer, or if there is no good one.
+/// Returns the single interferer that best replaces the scenario's interferers.
+///
+/// `None` if there are fewer than two, or if the search finds none.
 pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     match &scenario.interference {
         Interference::Sources(sources) if sources.len() > 1 => {
@@ -157,7 +163,7 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     }
 }
 
-/// Returns the error line for a described relay beyond a chain of `uavs`; `None` if there is none.
+/// Returns an error line if the scenario describes a relay beyond a chain of `uavs`. Otherwise `None`.
 pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
     let (index, _) = scenario.relays.last_key_value()?;
     (*index > uavs).then(|| {
@@ -165,7 +171,7 @@ pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
     })
 }
 
-/// Returns the relays with a fixed altitude of their own, by index from 1.
+/// Returns the indices, from 1, of relays up to `uavs` for which the scenario sets a fixed altitude.
 pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
     scenario
         .relays
@@ -175,7 +181,10 @@ pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission with the Upsilon of Rx everywhere. The knowledge of relays before any measurement.
+/// Returns the mission as relays know it before they measure: a field with the same Upsilon everywhere.
+///
+/// Upsilon, the mean of the inverse interference in 1/W, is that at Rx. Missions without a field are returned
+/// unchanged.
 #[must_use]
 pub fn told_of_an_even_field(mission: &Mission) -> Mission {
     let config = mission.config();
@@ -199,7 +208,10 @@ pub fn told_of_an_even_field(mission: &Mission) -> Mission {
         .unwrap_or(*mission)
 }
 
-/// Returns alpha and beta of the distribution of I / `i_max_w` at `x_m`. alpha and Upsilon are interpolated.
+/// Returns the Beta distribution's alpha and beta, for the interference at `x_m` relative to `i_max_w`.
+///
+/// Between two points of the field, alpha and Upsilon (the mean of `i_max_w` / I) are interpolated, and beta follows
+/// from them.
 pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);
@@ -222,7 +234,9 @@ pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     (alpha, (upsilon - 1.0) * (alpha - 1.0))
 }
 
-/// Returns the field of `spec`, with a static lifetime, as in a firmware's image.
+/// Converts the scenario's field of interference to that of a mission.
+///
+/// A mission borrows its points for the program's lifetime, as from a firmware's image, so they are never freed.
 fn field(spec: &crate::Field) -> Result<Field, FieldError> {
     let points: Option<Vec<FieldPoint>> = spec
         .beta

@@ -5,32 +5,32 @@ use uav_relay::{Channel, Placement};
 
 use crate::{Interference, Scenario, Source};
 
-/// A relay of a [`Scene`].
+/// A relay of a chain in a [`Scene`]: its altitude and its transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
-    /// Initial altitude, m, > 0.
+    /// Altitude of the relay, m, > 0. The joint methods may change it unless `holds` is true.
     pub altitude_m: f64,
-    /// Transmit power, W, > 0.
+    /// Transmit power of the relay, W, > 0.
     pub power_w: f64,
-    /// True if the altitude is fixed, whatever the band.
+    /// True if the relay keeps its altitude, even outside the band of altitudes that other relays may have.
     pub holds: bool,
 }
 
-/// Altitudes and lateral positions open to relays, m; positive to the right.
+/// Limits on the altitudes and lateral positions of relays, m. Lateral positions are positive to the right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
-    /// Lowest altitude, > 0.
+    /// Lowest altitude of a relay, m, > 0.
     pub least_m: f64,
-    /// Highest altitude.
+    /// Highest altitude of a relay, m.
     pub most_m: f64,
-    /// Limit to the left, <= 0.
+    /// Lateral limit to the left of the line from Tx to Rx, m, <= 0.
     pub left_m: f64,
-    /// Limit to the right, >= 0.
+    /// Lateral limit to the right of the line from Tx to Rx, m, >= 0.
     pub right_m: f64,
 }
 
 impl Corridor {
-    /// Creates the plane above Tx-Rx, between two altitudes, m.
+    /// Creates limits without lateral freedom: the vertical plane from Tx to Rx, between two altitudes, m.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,
@@ -50,37 +50,37 @@ pub struct Scene {
     pub min_separation_m: f64,
     /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,
-    /// Transmit power of Rx on the way back, W, > 0.
+    /// Transmit power of Rx when it sends toward Tx, W, > 0.
     pub rx_w: f64,
-    /// Interferers; at least one.
+    /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
-    /// Path-loss factor between two relays, 1/m^2, > 0.
+    /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
     pub mu_los: f64,
-    /// Path-loss factor between two points on the ground, 1/m^2, > 0.
+    /// Path-loss factor mu between two points on the ground, 1/m^2, > 0. The path loss at distance d is mu d^2.
     pub mu_nlos: f64,
-    /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
+    /// Path-loss factor eta between a relay and the ground, 1/m^2, > 0. The path loss at distance d is eta d^2.
     pub eta: f64,
-    /// Noise power of every receiver, W, >= 0; if above 0, SIR means SINR.
+    /// Noise power of every receiver, W, >= 0. If it is above 0, the methods that return SIRs return SINRs.
     pub noise_w: f64,
     /// Altitude limits of relays without a fixed altitude, and lateral limits of all relays.
     pub band: Corridor,
-    /// Relays 1 to N from Tx to Rx.
+    /// Relays 1 to N, in order from Tx to Rx.
     pub relays: Vec<Relay>,
 }
 
-/// Position of a relay.
+/// Position of a relay relative to the line from Tx to Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Distance along the line from Tx, m.
+    /// Distance of the relay from Tx along the line to Rx, m.
     pub x: f64,
-    /// Lateral position, m; positive to the right of the line.
+    /// Lateral position of the relay, m; positive to the right of the line.
     pub y: f64,
-    /// Height above ground, m, > 0.
+    /// Height of the relay above ground, m, > 0.
     pub h: f64,
 }
 
 impl From<(f64, f64)> for Place {
-    /// Converts (x, h), in metres, to a position above the line between Tx and Rx.
+    /// Converts (x, h), distance from Tx and altitude in metres, to a position with lateral offset 0.
     fn from((x, h): (f64, f64)) -> Self {
         Self { x, y: 0.0, h }
     }
@@ -94,9 +94,10 @@ impl From<Placement> for Place {
 }
 
 impl Scene {
-    /// Creates the scene of `relays` relays in `scenario`.
+    /// Creates the scene of a chain of `relays` relays in `scenario`.
     ///
-    /// `None` for a field of interference, and for a channel or a list of interferers that no scenario file can have.
+    /// `None` if the interference is a random field, or if the channel or the list of interferers is invalid. A
+    /// scenario from a file has neither an invalid channel nor, unless relays locate the interferer, an empty list.
     pub fn new(scenario: &Scenario, relays: u16) -> Option<Self> {
         let Interference::Sources(sources) = &scenario.interference else {
             return None;
@@ -134,7 +135,7 @@ impl Scene {
         })
     }
 
-    /// Returns the interference power at a relay, W: the sum over all sources.
+    /// Returns the interference power at a relay at the position `at`, W: the sum over all sources.
     pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
         let Place { x, y, h } = at.into();
         let each = self.sources.iter().map(|source| {
@@ -144,12 +145,12 @@ impl Scene {
         each.sum()
     }
 
-    /// Returns the interference power at Rx, W; infinite with an interferer at Rx.
+    /// Returns the interference power at Rx, W; infinite if an interferer is at the same point.
     pub fn interference_rx_w(&self) -> f64 {
         self.interference_on_ground_w(self.distance_m)
     }
 
-    /// Returns the interference power on the ground at `x_m` on the line, W.
+    /// Returns the interference power on the ground at the distance `x_m` from Tx toward Rx, W.
     pub fn interference_on_ground_w(&self, x_m: f64) -> f64 {
         let each = self.sources.iter().map(|source| {
             let dx = x_m - source.x_m;
@@ -158,9 +159,10 @@ impl Scene {
         each.sum()
     }
 
-    /// Returns the SIR (linear) of the N + 1 hops of a chain with relay k at `places[k - 1]`.
+    /// Returns the linear SIRs of the N + 1 hops from Tx to Rx, with relay k at `places[k - 1]`.
     ///
-    /// Infinite if two relays share a position; empty unless there is one position per relay, and at least one relay.
+    /// A SIR is infinite if its two nodes share a position. The list is empty unless there is one position per relay,
+    /// and at least one relay.
     pub fn hop_sirs(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         if places.len() != self.relays.len() {
             return Vec::new();
@@ -177,10 +179,10 @@ impl Scene {
         sirs
     }
 
-    /// Returns the SIR (linear) of the N + 1 hops on the way back from Rx to Tx.
+    /// Returns the linear SIRs of the N + 1 hops from Rx to Tx, with relay k at `places[k - 1]`.
     ///
-    /// Hop k is sent by node k and received by node k - 1, where node 0 is Tx and node N + 1 is Rx. The interference is that at its
-    /// receiver. Empty and infinite as [`Scene::hop_sirs`].
+    /// Entry k - 1 is the hop from node k to node k - 1, where node 0 is Tx and node N + 1 is Rx. The interference is
+    /// that at node k - 1. The list is empty, and a SIR infinite, under the conditions of [`Scene::hop_sirs`].
     pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
             return Vec::new();
@@ -203,22 +205,22 @@ impl Scene {
         sirs
     }
 
-    /// Returns the SIR (linear) of the worst hop; 0 if [`Scene::hop_sirs`] is empty.
+    /// Returns the linear SIR of the worst hop from Tx to Rx; 0 if [`Scene::hop_sirs`] returns no hop.
     pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
         sirs.reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// Returns the SIR (linear) of the worst hop. Relays are at `along`, m from Tx, at their own altitudes above the line.
+    /// Returns the linear SIR of the worst hop if relays are `along` metres from Tx, with lateral offset 0.
     ///
-    /// 0 unless there is one position per relay.
+    /// Each relay has its own altitude. Returns 0 unless there is one position per relay.
     pub fn sir_along(&self, along: &[f64]) -> f64 {
         let places = along.iter().zip(&self.relays);
         let places: Vec<(f64, f64)> = places.map(|(&x, relay)| (x, relay.altitude_m)).collect();
         self.chain_sir(&places)
     }
 
-    /// Returns Tx as a sender.
+    /// Returns Tx as a sender, for [`Scene::sir_at`].
     pub fn tx(&self) -> Sender {
         Sender {
             at: Place::from((0.0, 0.0)),
@@ -227,7 +229,7 @@ impl Scene {
         }
     }
 
-    /// Returns a relay as a sender to other relays.
+    /// Returns `relay` at the position `at` as a sender to another relay, for [`Scene::sir_at`].
     pub fn sender(&self, at: impl Into<Place>, relay: &Relay) -> Sender {
         Sender {
             at: at.into(),
@@ -236,7 +238,7 @@ impl Scene {
         }
     }
 
-    /// Returns the SIR (linear) at a relay.
+    /// Returns the linear SIR at a relay at `at` that receives from the sender `from`.
     pub fn sir_at(&self, from: Sender, at: impl Into<Place>) -> f64 {
         let (to, by) = (at.into(), from.at);
         let signal = received_w(
@@ -249,7 +251,7 @@ impl Scene {
         signal / (self.interference_w(to) + self.noise_w)
     }
 
-    /// Returns the SIR (linear) at Rx of the last relay, `relay`, at `at`.
+    /// Returns the linear SIR at Rx if the last relay of the chain is `relay`, at the position `at`.
     pub fn sir_at_rx(&self, at: impl Into<Place>, relay: &Relay) -> f64 {
         let Place { x, y, h } = at.into();
         let signal = received_w(relay.power_w, self.eta, self.distance_m - x, y, h);
@@ -257,10 +259,10 @@ impl Scene {
     }
 }
 
-/// A sender to relays: position, power and path-loss factor.
+/// Sender of a signal that a relay receives: its position, its power and the path-loss factor.
 #[derive(Debug, Clone, Copy)]
 pub struct Sender {
-    /// Position.
+    /// Position of the sender.
     pub at: Place,
     power_w: f64,
     factor: f64,
@@ -276,7 +278,7 @@ fn relay(scenario: &Scenario, index: u16) -> Relay {
     }
 }
 
-/// Returns the received power over a squared-distance path loss, W; offsets in metres.
+/// Returns the received power, W: `power_w` / (`factor` d^2). The offset (`dx`, `dy`, `dz`), m, has the length d.
 fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -> f64 {
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }

@@ -9,90 +9,95 @@ use uav_relay::{Duration, Geodetic, Listen};
 use super::link::Link;
 use super::number::{factor, narrow, watts};
 
-/// Parameters of a flight, in SI units. x is along the line from Tx (x = 0) to Rx, y to its right as seen from above.
+/// Parameters of a flight in a scenario file, in SI units. The coordinate x is the distance from Tx toward Rx, y the
+/// offset to the right of that line.
 ///
 /// Values from [`Scenario::load`] or [`Scenario::parse`] are within the ranges given here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// Geographic line from Tx to Rx, if the scenario has sites.
+    /// Line from Tx to Rx in geographic coordinates; `None` if the scenario has no `[site]`.
     pub line: Option<Line>,
     /// Distance D from Tx to Rx, m, 1 to 1e6.
     pub distance_m: f64,
-    /// Common altitude of the relays, m, 0.1 to 1e4.
+    /// Altitude of all relays that have none of their own, m, 0.1 to 1e4.
     pub altitude_m: f64,
-    /// Lowest altitude for the joint methods, m, 0.1 to `altitude_m` (its default).
+    /// Lowest altitude for methods that choose altitudes, m, 0.1 to `altitude_m` (its default).
     pub altitude_min_m: f64,
-    /// Highest altitude for the joint methods, m, `altitude_m` (its default) to 1e4.
+    /// Highest altitude for methods that choose altitudes, m, `altitude_m` (its default) to 1e4.
     pub altitude_max_m: f64,
-    /// Lateral limit to the left for the joint method, y in m, -1e5 to 0 (its default).
+    /// Lateral limit to the left for the method `joint`, y in m, -1e5 to 0 (its default).
     pub lateral_min_m: f64,
-    /// Lateral limit to the right for the joint method, y in m, 0 (its default) to 1e5.
+    /// Lateral limit to the right for the method `joint`, y in m, 0 (its default) to 1e5.
     pub lateral_max_m: f64,
     /// Least distance between two relays, m, 0 (its default) to 1e5.
     pub min_separation_m: f64,
     /// EIRP of the transmitter (power and antenna gain), W, 1e-6 to 1e6.
     pub tx_w: f64,
-    /// EIRP of the receiver on the way back to Tx, W, 1e-6 to 1e6; `tx_w` by default.
+    /// EIRP of the receiver Rx when it sends toward Tx, W, 1e-6 to 1e6; `tx_w` by default.
     pub rx_w: f64,
     /// EIRP of every relay without its own `power_w`, W, 1e-6 to 1e6.
     pub uav_w: f64,
-    /// Radio channel.
+    /// Radio channel: the carrier and the path losses.
     pub channel: ChannelSpec,
-    /// Interferers, or interference field, of the scenario.
+    /// Interference: a list of interfering transmitters, or a random field.
     pub interference: Interference,
-    /// Settings for relays that locate the interferer. [`Self::interference`] is then their initial knowledge, if any.
+    /// Settings for relays that locate the interferer by measurements; `None` if they do not.
+    ///
+    /// [`Self::interference`] is then their initial knowledge, if any.
     pub listen: Option<ListenSpec>,
-    /// Receiver noise.
+    /// Noise of the receivers: of the relays and of Rx.
     pub noise: Noise,
-    /// Data link, if the file has one.
+    /// Data link, for data rates; `None` if the file has none.
     pub link: Option<Link>,
-    /// SIR that a hop needs on the way back from Rx to Tx, relative to that on the way there, 0 to 1. With 0 only the way there counts.
+    /// SIR that hops need from Rx to Tx, as a fraction (0 to 1) of the SIR that they need from Tx to Rx.
+    ///
+    /// With 0, only the direction from Tx to Rx counts.
     pub reverse: f64,
-    /// Differences of single relays, by index (1 to 1000, 1 is next to Tx).
+    /// Relays with their own altitude or power, by index (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
-    /// Plan, if the file has one.
+    /// Plan of relay positions; `None` if the file has none.
     pub plan: Option<Planned>,
 }
 
-/// Geographic line and its sites.
+/// Line from Tx to Rx in geographic coordinates, and the sites of its ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// Line from Tx to Rx.
+    /// Coordinate system of the line from Tx to Rx. It converts between geographic and local positions.
     pub axis: Axis,
-    /// Sites of the transmitter and the receiver.
+    /// Geographic positions of the transmitter Tx and the receiver Rx.
     pub sites: [Geodetic; 2],
-    /// Height of the mean sea level above the WGS84 ellipsoid, m, -120 to 100, if given.
+    /// Height of the mean sea level above the WGS84 ellipsoid, m, -120 to 100; `None` if not given.
     pub geoid_m: Option<f64>,
 }
 
-/// Radio channel: carrier and excess losses over free space.
+/// Radio channel: the carrier frequency, and the losses in addition to that of free space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelSpec {
-    /// Carrier frequency, Hz, 1e6 to 1e12.
+    /// Carrier frequency of the radio channel, Hz, 1e6 to 1e12.
     pub carrier_hz: f64,
-    /// Excess loss of a line-of-sight link, dB, 0 to 200.
+    /// Loss of a line-of-sight link in addition to that of free space, dB, 0 to 200.
     pub excess_loss_los_db: f64,
-    /// Excess loss of an obstructed link, dB, `excess_loss_los_db` to 200.
+    /// Loss of an obstructed link in addition to that of free space, dB, `excess_loss_los_db` to 200.
     pub excess_loss_nlos_db: f64,
-    /// Path loss of links between ground and air.
+    /// Kind of the links between ground and air: line of sight, obstructed, or a mixture.
     pub air_ground: AirGround,
 }
 
-/// Settings for locating the interferer; missing values default to those of [`Listen`].
+/// Settings for relays that locate the interferer. For a missing value, `None`, that of [`Listen`] applies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ListenSpec {
-    /// True if the interferer moves: missing values then default to those of [`Listen::following`].
+    /// True if the interferer moves. The defaults of the other settings are then those of [`Listen::following`].
     pub following: bool,
     /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
-    /// Half-life of a measurement's weight, s, 0.01 to 1e12.
+    /// Age at which a measurement counts half as much as a new one, s, 0.01 to 1e12.
     pub half_life_s: Option<f64>,
-    /// Relative error of one measurement, 1e-3 to 1.
+    /// Relative error of one interference measurement, 1e-3 to 1.
     pub relative_error: Option<f64>,
 }
 
 impl ListenSpec {
-    /// Returns the measurement settings of the relays in a chain of `uavs` relays.
+    /// Returns the measurement settings with defaults filled in, for a chain of `uavs` relays.
     pub fn of(&self, uavs: u16) -> Listen {
         let default = if self.following {
             Listen::following(uavs)
@@ -113,16 +118,16 @@ impl ListenSpec {
     }
 }
 
-/// Receiver noise, from bandwidth and noise figure or given directly.
+/// Receiver noise: either bandwidth and noise figure, or the noise power itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Noise {
     /// Noise bandwidth, Hz, 0 (its default: no noise) to 1e12.
     pub bandwidth_hz: f64,
-    /// Noise figure, dB, 0 to 60; 6 by default.
+    /// Noise figure of the receivers, dB, 0 to 60; 6 by default.
     pub figure_db: f64,
-    /// Noise power, dBm, -200 to 0, in place of bandwidth and noise figure.
+    /// Noise power, dBm, -200 to 0. If given, it replaces the one from bandwidth and noise figure.
     pub power_dbm: Option<f64>,
-    /// Antenna gains of the relays and of Rx, dBi, -30 to 60; 0 by default.
+    /// Antenna gains, dBi, -30 to 60: first that of the relays, then that of Rx. The default is 0.
     pub gains_dbi: [f64; 2],
 }
 
@@ -144,7 +149,10 @@ impl Noise {
     /// Reference temperature T0 of noise figures, K.
     pub const STANDARD_K: f64 = 290.0;
 
-    /// Returns the noise power at the input of a receiver, W: k T0 B F, or the given power.
+    /// Returns the noise power at the input of a receiver, W.
+    ///
+    /// It is k T0 B F, with Boltzmann's constant k, the reference temperature T0, the bandwidth B and the noise
+    /// figure F, or the given power.
     pub fn receiver_w(&self) -> f64 {
         self.power_dbm.map_or_else(
             || BOLTZMANN * Self::STANDARD_K * self.bandwidth_hz * factor(self.figure_db),
@@ -152,83 +160,91 @@ impl Noise {
         )
     }
 
-    /// Returns the noise power of all receivers in a mission, W.
+    /// Returns the noise power that a mission uses for all receivers, W.
     ///
-    /// It is [`Self::receiver_w`] divided by the antenna gain: the lower one if those of the relays and of Rx differ.
+    /// It is [`Self::receiver_w`] divided by the antenna gain. If the gains of the relays and of Rx differ, the lower
+    /// one is used.
     pub fn power_w(&self) -> f64 {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the mission's noise is too high for some receivers: the antenna gains differ.
+    /// Returns true if the mission's noise power is too high for some receivers.
+    ///
+    /// A mission has one noise power. It is that of the lowest antenna gain, so it is too high where the gain is
+    /// higher.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
     }
 }
 
-/// Path loss eta of links between ground and air.
+/// Kind of the links between ground and air, which determines their path-loss factor eta.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AirGround {
-    /// Line of sight.
+    /// Links between ground and air have line of sight.
     Los,
-    /// Obstructed.
+    /// Links between ground and air are obstructed.
     Nlos,
-    /// Mixture: this weight, 0 to 1, of line of sight, the rest obstructed.
+    /// Mixture of both kinds of link. The value, 0 to 1, is the weight of line of sight.
     Weight(f64),
 }
 
-/// Interference: known transmitters, or a random field along x.
+/// Interference in a scenario: known transmitters, or a random field along x.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Interference {
-    /// Interferers; empty only if the relays locate an unknown one.
+    /// Known interfering transmitters. The list is empty only if the relays have to locate an unknown one.
     Sources(Vec<Source>),
-    /// Interference power known only by its distribution.
+    /// Interference power of which only the probability distribution at each x is known.
     Field(Field),
 }
 
 /// An interfering transmitter on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
-    /// EIRP, W, 1e-6 to 1e9.
+    /// EIRP of the interferer, W, 1e-6 to 1e9.
     pub power_w: f64,
-    /// Position along the line from Tx to Rx, m, -1e7 to 1e7 (0 is Tx; beyond Rx is allowed).
+    /// Position of the interferer along the line from Tx (0) to Rx, m, -1e7 to 1e7.
     pub x_m: f64,
-    /// Lateral position on the ground, m, -1e7 to 1e7; positive to the right.
+    /// Lateral position of the interferer, m, -1e7 to 1e7; positive to the right of the line.
     pub y_m: f64,
 }
 
-/// Interference power I(x) such that I / `i_max_w` has a Beta distribution that depends on x.
+/// Random field of interference power I(x), W. I(x) / `i_max_w` has a Beta distribution that depends on x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     /// Upper bound on the received interference power, W, 1e-30 to 1e6.
     pub i_max_w: f64,
-    /// Distributions at some positions, strictly increasing in x; never empty if read from a file.
+    /// Beta distributions at some positions, x strictly increasing. Never empty if read from a file.
     pub beta: Vec<BetaPoint>,
 }
 
-/// Distribution of the interference at one position.
+/// Beta distribution of the interference power at one position on the line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BetaPoint {
     /// Position along the line from Tx to Rx, m, -1e7 to 1e7.
     pub x_m: f64,
-    /// First shape parameter, above 1 (E[1/I] is infinite otherwise) and at most 1e6.
+    /// First shape parameter of the Beta distribution, above 1 and at most 1e6.
+    ///
+    /// At 1 or less the mean of 1/I would be infinite, for the interference power I.
     pub alpha: f64,
     /// Second shape parameter of the Beta distribution, above 0 and at most 1e6.
     pub beta: f64,
 }
 
-/// Differences of one relay; at least one field is set if read from a file.
+/// Altitude and power of one relay that differ from those of the others. At least one is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
-    /// Fixed altitude, m, 0.1 to 1e4; not limited by the altitude band of the joint methods.
+    /// Fixed altitude of this relay, m, 0.1 to 1e4. It may be outside the band of the methods that choose altitudes.
     pub altitude_m: Option<f64>,
-    /// EIRP, W, 1e-6 to 1e6.
+    /// EIRP of this relay, W, 1e-6 to 1e6.
     pub power_w: Option<f64>,
 }
 
 impl Default for ChannelSpec {
-    /// Returns the paper's channel. 2 GHz, 0.1 dB and 21 dB of excess loss, line of sight between ground and air.
+    /// Returns the paper's channel: 2 GHz, excess losses of 0.1 and 21 dB, line of sight to the ground.
+    ///
+    /// 0.1 dB is the excess loss with line of sight, 21 dB that of an obstructed link.
     fn default() -> Self {
         Self {
             carrier_hz: 2e9,
@@ -240,7 +256,9 @@ impl Default for ChannelSpec {
 }
 
 impl Default for Scenario {
-    /// Returns the paper's multi-hop scenario. 1 km, relays at 20 m and 4 m apart at least, one 80 W interferer halfway.
+    /// Returns the paper's multi-hop scenario.
+    ///
+    /// Tx and Rx are 1 km apart, relays at 20 m altitude and at least 4 m apart, and one 80 W interferer is halfway.
     fn default() -> Self {
         Self {
             line: None,
@@ -271,7 +289,7 @@ impl Default for Scenario {
 }
 
 impl Scenario {
-    /// Returns the bandwidth of the data link, Hz.
+    /// Returns the bandwidth of the data link, Hz, as the scenario gives it.
     ///
     /// It is that of `[link]`, or else that of `[noise]`; `None` without either.
     pub fn bandwidth_hz(&self) -> Option<f64> {
@@ -279,12 +297,12 @@ impl Scenario {
         own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))
     }
 
-    /// Returns true if the interference is given; it may be missing if the relays locate the interferer.
+    /// Returns true if the scenario gives the interference. It may be missing if the relays locate the interferer.
     pub fn knows_interference(&self) -> bool {
         !matches!(&self.interference, Interference::Sources(sources) if sources.is_empty())
     }
 
-    /// Returns the interferers for pictures: power in W, x and y in m; none in a field.
+    /// Returns power, W, and position x and y, m, of every interferer, for pictures. Empty for a random field.
     pub fn sources(&self) -> Vec<(f64, f64, f64)> {
         match &self.interference {
             Interference::Sources(sources) => {
@@ -295,48 +313,48 @@ impl Scenario {
     }
 }
 
-/// A plan in a scenario file, from `cargo plan --out` to `cargo provision`.
+/// Plan of relay positions in a scenario file. `cargo plan --out` writes it and `cargo provision` reads it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
     /// Number of relays, 1 to 1000.
     pub uavs: u16,
     /// Placement method of the relays.
     pub method: PlannedMethod,
-    /// Relative tolerance on the achieved SIR, 1e-6 to 0.1.
+    /// Relative tolerance of the SIR that the placement method achieves, 1e-6 to 0.1.
     pub tolerance: f64,
-    /// SIR of the worst hop at these positions, dB, -400 to 400.
+    /// SIR of the chain's worst hop at the planned positions, dB, -400 to 400.
     pub sir_db: f64,
-    /// Positions, relay 1 first; one per relay.
+    /// Planned positions, one per relay, relay 1 first.
     pub places: Vec<PlannedPlace>,
 }
 
-/// Placement method of relays that fly a plan.
+/// Placement method in a plan that relays can fly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PlannedMethod {
-    /// Fixed altitudes: Algorithm 1, in a field Algorithm 4.
+    /// Placement at fixed altitudes: the paper's Algorithm 1, or Algorithm 4 in a random field.
     Align,
-    /// Positions, sides and altitudes together.
+    /// Placement along the line, sideways and in altitude together.
     Joint,
 }
 
-/// Position of a relay.
+/// Planned position of a relay.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedPlace {
-    /// Distance along the line from Tx, m.
+    /// Distance of the relay from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// Lateral position, m; positive to the right as seen from above.
+    /// Lateral position of the relay, m; positive to the right of the line as seen from above.
     pub y_m: f64,
-    /// Altitude above ground, m, 0.1 to 1e4.
+    /// Altitude of the relay above ground, m, 0.1 to 1e4.
     pub altitude_m: f64,
 }
 
 impl PlannedMethod {
-    /// Names of the methods in files.
+    /// Names of the placement methods in scenario files.
     pub const NAMES: &'static [&'static str] = &["align", "joint"];
 
-    /// Returns the name in files.
+    /// Returns the name of the placement method in scenario files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Align => "align",

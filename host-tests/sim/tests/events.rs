@@ -32,7 +32,7 @@ fn of(outcome: &Outcome, what: fn(TimelineEvent) -> bool) -> Vec<(u16, Option<u1
         .collect()
 }
 
-/// A dead relay is reported by its number; its replacement is reported by its own.
+/// Checks that relays report a lost neighbour by its number, and the next neighbour by its own number.
 #[test]
 fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(200));
@@ -52,7 +52,9 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
     );
 }
 
-/// Relay 3 does not receive relay 2. Relay 2 receives relay 3 and must be told why they are no neighbours.
+/// Checks that a relay learns which neighbour does not receive it.
+///
+/// Relay 3 does not receive relay 2, but relay 2 receives relay 3. It must learn why they are no neighbours.
 #[test]
 fn a_relay_that_is_not_heard_is_told_by_whom() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
@@ -69,7 +71,9 @@ fn a_relay_that_is_not_heard_is_told_by_whom() {
     );
 }
 
-/// Lost and corrupted frames never cause reports of deaf nodes, wrong keys or old epochs.
+/// Checks that lost and corrupted frames cause no false reports about other nodes.
+///
+/// Such reports would be of nodes that do not receive, of wrong keys, or of old epochs.
 #[test]
 fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
     for seed in 1..=3 {
@@ -93,7 +97,9 @@ fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
     }
 }
 
-/// Two of five relays have no quorum. They keep requesting a view but report this once.
+/// Checks that relays report a missing quorum only once, although they keep requesting a view.
+///
+/// Two of five relays are too few for a quorum.
 #[test]
 fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(600));
@@ -108,7 +114,7 @@ fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
     }
 }
 
-/// Time step and duration of a frame, ms.
+/// Time step of the simulated channel, ms. A frame arrives one step after it was sent.
 const STEP_MS: u64 = 10;
 
 pub(crate) const KEY: [u8; 32] = [7; 32];
@@ -120,18 +126,18 @@ pub(crate) fn auth(key: [u8; 32], epoch: u32) -> Option<Auth> {
 
 pub(crate) struct Air {
     pub(crate) relays: Vec<Relay>,
-    /// True for relays that are switched off.
+    /// State of each relay, by index from 0: true if it is switched off.
     pub(crate) off: Vec<bool>,
     pub(crate) ground: Option<Ground>,
-    /// Share of frames that each receiver loses.
+    /// Probability that a receiver loses a frame.
     pub(crate) loss: f64,
     pub(crate) now: Instant,
-    /// Events, with the index (from 0) of the relay that raised them.
+    /// Events reported so far, each with the index (from 0) of the relay that reported it.
     pub(crate) told: Vec<(usize, Event)>,
-    /// Withheld frames of the ground; `withheld` selects them.
+    /// Frames of the ground station that the attacker has withheld. The function `withheld` selects them.
     pub(crate) recorded: Vec<Vec<u8>>,
     pub(crate) withheld: fn(&[u8]) -> bool,
-    /// Frames on the air with the index of the sending relay; `usize::MAX` for other senders.
+    /// Frames on the air, each with the index (from 0) of its sender; `usize::MAX` if that is no relay.
     flying: Vec<(usize, Vec<u8>)>,
     rng: ChaCha8Rng,
 }
@@ -152,7 +158,7 @@ impl Air {
         }
     }
 
-    /// Returns a chain with keys and epochs from `auth`, by index from 1.
+    /// Creates a chain of relays with the keys and epochs that `auth` returns for each index, from 1.
     pub(crate) fn of(mission: &Mission, auth: impl Fn(u16) -> Option<Auth>, loss: f64) -> Self {
         let relays = (1..=mission.relays())
             .map(|index| relay(mission, index, auth(index), Instant::ZERO))
@@ -221,12 +227,12 @@ impl Air {
         }
     }
 
-    /// Sends `bytes` as an unknown sender.
+    /// Sends `bytes` to all nodes, from a sender that is no relay.
     pub(crate) fn play(&mut self, bytes: &[u8]) {
         self.flying.push((usize::MAX, bytes.to_vec()));
     }
 
-    /// Returns the relay index of each occurrence of `event`.
+    /// Returns the index (from 0) of the reporting relay for each report of `event`.
     pub(crate) fn told(&self, event: Event) -> Vec<usize> {
         let told = self.told.iter().filter(|(_, told)| *told == event);
         told.map(|(by, _)| *by).collect()
@@ -253,7 +259,9 @@ pub(crate) fn mission(relays: u16) -> Mission {
 
 const TAKEN: Event = Event::DuplicateIndex { node: 3 };
 
-/// Returns a flying chain of five with a second relay 3 that has just been switched on, and its index.
+/// Returns a chain of five relays with positions, in which a second relay 3 was switched on.
+///
+/// The second value is the index (from 0) of that relay.
 fn joined(loss: f64, seed: u64) -> (Air, usize) {
     let mission = mission(5);
     let begun = Instant::ZERO;
@@ -271,7 +279,9 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// Runs `COUNT` chains for each loss rate.
+/// Checks that the later of two relays with one number gets no setpoint, and that both report it.
+///
+/// Runs as many chains for each loss rate as the variable `COUNT` says.
 #[test]
 fn the_later_of_two_relays_with_one_number_has_no_set_point_and_both_are_told() {
     for loss in [0.0, 0.3, 0.5] {
@@ -316,7 +326,9 @@ fn the_later_one_takes_part_once_the_other_is_gone() {
     }
 }
 
-/// Checks two relays with one number that start together: in the end one flies, and one is passive.
+/// Checks that of two relays with one number that start together, one flies in the end.
+///
+/// The other one is passive.
 #[test]
 fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
     for seed in 0..6 {
@@ -334,7 +346,9 @@ fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
     }
 }
 
-/// Signed duplicates: the larger epoch wins; the other relay becomes passive and reports the duplicate.
+/// Checks two relays with one number that sign their frames: the one with the larger epoch stays.
+///
+/// The other one becomes passive and reports the duplicate.
 #[test]
 fn with_a_key_the_one_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {
@@ -355,7 +369,7 @@ fn with_a_key_the_one_with_the_larger_epoch_stays() {
     }
 }
 
-/// An attacker without the key can cause a report, but no relay becomes passive.
+/// Checks that an attacker without the key can cause a report of a duplicate, but no passive relay.
 #[test]
 fn forged_frames_have_nobody_stand_down() {
     let mission = mission(3);
@@ -379,7 +393,7 @@ fn forged_frames_have_nobody_stand_down() {
     );
 }
 
-/// Relay 2 of three has another key: it and its neighbours report this once.
+/// Checks that a relay with another key and its neighbours report each other once.
 #[test]
 fn another_key_is_told_with_the_node() {
     for loss in [0.0, 0.3] {
@@ -395,7 +409,7 @@ fn another_key_is_told_with_the_node() {
     }
 }
 
-/// Two handshakes with a wrong key cause no report.
+/// Checks that two handshakes with a wrong key cause no report: it takes more of them.
 #[test]
 fn two_forged_handshakes_are_noise() {
     let mission = mission(3);
@@ -412,7 +426,9 @@ fn two_forged_handshakes_are_noise() {
     assert!(air.told(Event::KeyMismatch { node: 2 }).is_empty());
 }
 
-/// Relay 2 restarts with an older epoch: its neighbours reject it, and all three relays report it.
+/// Checks that a relay that restarts with an older epoch is rejected. It and its neighbours report it.
+///
+/// A newer epoch is accepted without a report.
 #[test]
 fn an_epoch_that_went_back_is_told_with_the_node() {
     for (loss, again, back) in [(0.0, 1, true), (0.3, 1, true), (0.3, 6, false)] {
@@ -431,9 +447,10 @@ fn an_epoch_that_went_back_is_told_with_the_node() {
     }
 }
 
-/// Relay 2 restarts with the epoch that it had, so its neighbours take it for a duplicate of itself. With the larger claim it takes part.
-/// With the smaller one it reports that its number is taken, and has no setpoint until they have received nothing of the larger one for
-/// `dead_after`.
+/// Checks a relay that restarts with the epoch that it had. Its neighbours take it for a second relay 2.
+///
+/// With the larger random claim it takes part at once. With the smaller one it reports that its number is taken, and
+/// gets no setpoint until its neighbours have received nothing of the larger claim for `dead_after`.
 #[test]
 fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() {
     let mut waited = 0;
@@ -461,7 +478,7 @@ fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() 
     assert!((1..12).contains(&waited), "{waited} of 12");
 }
 
-/// Checks a relay whose two wires lead to relays with the same number: it reports the duplicate.
+/// Checks that a relay with neighbours of the same number at both of its ports reports a duplicate.
 #[test]
 fn a_neighbour_that_is_heard_at_both_ports_is_told() {
     let mission = mission(3);
@@ -500,7 +517,7 @@ fn moved(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Offers are by far the longest frames of the ground.
+/// Returns true for the offer of an upload. Offers are by far the longest frames of a ground station.
 const fn is_offer(bytes: &[u8]) -> bool {
     bytes.len() > MAX_FRAME - 24
 }
@@ -515,7 +532,9 @@ fn station(base: &Mission, epoch: u32) -> Ground {
     )
 }
 
-/// Returns a chain of four relays and the offers of version 1 that the attacker withheld.
+/// Returns a chain of relays that fly, and the offers of an upload that an attacker withheld from them.
+///
+/// The upload has version 1. The ground station is gone.
 fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
     let mut air = Air::of(base, |_| auth(KEY, 1), loss);
     air.run(60);
@@ -535,7 +554,9 @@ fn begin_upload(air: &mut Air, base: &Mission, epoch: u32) {
     air.ground = Some(ground);
 }
 
-/// An attacker withholds the ground's offers and replays them after the upload was given up.
+/// Checks that relays refuse an attacker's replay of withheld offers after the upload was given up.
+///
+/// They accept a new upload afterwards.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same() {
     let after = Settings::default().dead_after.times(2).as_micros() / 1_000_000;
@@ -578,7 +599,7 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
     }
 }
 
-/// Checks that the offer of the previous test is accepted if it arrives within the time limit.
+/// Checks that a withheld offer is accepted if the attacker sends it within the time limit of offers.
 #[test]
 fn an_offer_that_comes_at_once_is_taken() {
     let base = mission(4);

@@ -25,7 +25,7 @@ use uav_relay_sim::simulator::outcome::{Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::{Partition, Setup};
 use uav_relay_sim::simulator::watch::groups;
 
-/// Returns the mission of `cargo chain --uavs N`.
+/// Returns the mission of `cargo chain --uavs N`, that is, of the default scenario, for N relays.
 fn paper(relays: u16) -> Mission {
     mission::mission(&Scenario::default(), relays, 1e-4)
         .unwrap()
@@ -42,12 +42,12 @@ const fn at(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-/// Returns a number from the environment, or the default.
+/// Returns the number in the environment variable `name`; `usual` if it is not set.
 fn number(name: &str, usual: u64) -> u64 {
     env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// Runs all `setups` on all cores. Returns the results of `of` in order.
+/// Simulates all `setups` on all cores and returns `of(setup, outcome)` of each, in their order.
 fn run_all<T: Send>(setups: &[Setup], of: impl Fn(&Setup, Outcome) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let work = || {
@@ -76,10 +76,12 @@ fn median_and_worst(mut all: Vec<f64>) -> (f64, f64) {
     (middle.unwrap_or(f64::NAN), worst.unwrap_or(f64::NAN))
 }
 
-/// Time at which relay 4 of eight dies, s.
+/// Time at which relay 4 of eight is switched off, s.
 const DIES_S: u64 = 20;
 
-/// Returns the time without a correct chain after the death, s. `None` unless the remaining relays hold their positions.
+/// Returns the time, s, for which the chain was not as good as possible after relay 4 was switched off.
+///
+/// `None` unless the seven remaining relays are in one view at the end.
 fn recovery(outcome: &Outcome) -> Option<f64> {
     let left = || outcome.relays.iter().filter(|relay| relay.killed.is_none());
     // The remaining relays may be forming another view when the run ends.
@@ -90,7 +92,9 @@ fn recovery(outcome: &Outcome) -> Option<f64> {
     same.then_some(wrong + (first - DIES_S as f64).max(0.0))
 }
 
-/// Returns the loss, the number of seeds without recovery, and the median and worst recovery times, s.
+/// Simulates the loss of relay 4 with `seeds` seeds, and prints the times until the chain recovers.
+///
+/// Returns the loss rate of frames, the number of seeds without recovery, and the median and worst time, s.
 fn dying(loss: f64, seeds: u64) -> (f64, usize, f64, f64) {
     let setups: Vec<Setup> = (1..=seeds)
         .map(|seed| {
@@ -118,7 +122,7 @@ fn without_losses_a_death_is_got_over_within_a_minute() {
     assert!(worst < 60.0, "{worst}");
 }
 
-/// Prints the seeds that do not recover.
+/// Prints the recovery times after the loss of a relay on bad channels, and the seeds without recovery.
 #[test]
 #[ignore = "prints a table"]
 fn deaths_on_bad_channels() {
@@ -129,7 +133,7 @@ fn deaths_on_bad_channels() {
     }
 }
 
-/// Time limit from the last healing to a common view, s.
+/// Longest allowed time from the end of all partitions until all relays are in one view, s.
 const MOST_S: f64 = 120.0;
 
 fn cut(after: u16, from: u64, until: u64) -> Partition {
@@ -140,7 +144,9 @@ fn cut(after: u16, from: u64, until: u64) -> Partition {
     }
 }
 
-/// Returns all pairs of different partitions of eight relays, simultaneous and staggered.
+/// Returns the setups of runs with all pairs of different partitions of eight relays.
+///
+/// Both begin at the same time, or the second one begins later.
 fn cuts() -> Vec<Setup> {
     let mut all = Vec::new();
     for one in 1..8 {
@@ -155,7 +161,7 @@ fn cuts() -> Vec<Setup> {
     all
 }
 
-/// Returns the first time after `healed` at which all eight relays are in one view.
+/// Returns the first time, `healed` or later, at which all eight relays are in one view.
 fn joined(outcome: &Outcome, healed: Instant) -> Option<Instant> {
     let mut views = [(0, 8); 8];
     for moment in &outcome.moments {
@@ -201,11 +207,13 @@ fn after_two_cuts_all_come_back_into_one_view() {
     assert!(wrong.is_empty(), "{} of 84: {wrong:#?}", wrong.len());
 }
 
-/// Duration of a run, and of the stable period at its end, s.
+/// Duration of a run with a one-way link, s. In its last [`STILL_S`] seconds nothing may change.
 const ONE_WAY_S: u64 = 400;
 const STILL_S: u64 = 120;
 
-/// Returns all one-way links in chains of 4 and 8 relays. They have tags or not, and begin at 0 s or at 20 s.
+/// Returns the setups of runs with each possible one-way link in chains of 4 and 8 relays.
+///
+/// Frames are signed or not, and the link fails in one direction at 0 s or at 20 s.
 fn one_way_links(seed: u64) -> Vec<Setup> {
     let mut all = Vec::new();
     for relays in [4, 8] {
@@ -227,7 +235,9 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
     all
 }
 
-/// Describes the error in the final state, if any.
+/// Describes what is wrong at the end of a run with a one-way link; `None` if nothing is.
+///
+/// All relays but one of the two at the link have to hold positions in one view, without recent changes.
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.seen).collect();
     let agreements = groups(&seen);
@@ -286,17 +296,17 @@ fn in_the_end_all_but_one_of_those_that_hear_each_other_have_one_agreement() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Period in which faults begin, s.
+/// Time within which all faults of a random run begin, s.
 const EVENTS_S: u64 = 240;
 
-/// Duration of a run, s.
+/// Duration of a random run, s.
 const ALL_S: u64 = 360;
 
 fn during(rng: &mut ChaCha8Rng) -> Instant {
     Instant::from_millis(rng.random_range(0..1_000 * EVENTS_S))
 }
 
-/// Draws a period of up to 10 s, of 5 s to 2 min, or without an end.
+/// Draws start and end of a fault that lasts up to 10 s, 5 s to 2 min, or to the end of the run.
 fn spell(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     let from = during(rng);
     let span = match rng.random_range(0..4) {
@@ -307,7 +317,7 @@ fn spell(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     (from, span.map(|span| from + Duration::from_millis(span)))
 }
 
-/// Draws three to ten relays with partitions, one-way links, losses, deaths and reboots.
+/// Draws a run of three to ten relays with partitions, one-way links, losses, failures and reboots.
 fn sequence(seed: u64) -> Setup {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let relays = rng.random_range(3..=10);
@@ -357,7 +367,7 @@ fn sequence(seed: u64) -> Setup {
     setup.soaked(at(ALL_S))
 }
 
-/// Returns the equivalent command line.
+/// Returns the `cargo chain` command that repeats the run of `setup`.
 fn command(setup: &Setup) -> String {
     let until =
         |until: Option<Instant>| until.map_or(String::new(), |at| format!("-{}", seconds(at)));
@@ -433,7 +443,10 @@ fn whatever_happens_one_group_flies_at_most() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
-/// Regression test. A view accepted only by the last relay was followed by one without its leased voters.
+/// Repeats a run in which two groups flew at once before a fix.
+///
+/// A view that only the last relay had accepted was followed by one without the relays that had voted for it and held
+/// its lease.
 #[test]
 fn what_was_decided_and_not_heard_of_ends_no_lease() {
     let mut sequence = sequence(6_450);
@@ -447,7 +460,9 @@ fn in_ten_thousand_sequences_one_group_flies_at_most() {
     fly(number("SEED", 1_000), number("COUNT", 10_000));
 }
 
-/// Returns a setup of eight signed relays with CSMA at 57 600 baud.
+/// Returns the setup of eight relays that sign their frames on a CSMA channel of 57 600 baud.
+///
+/// `loss` is the fraction of lost frames, `burst` the mean number of frames in a burst of losses.
 fn losing(loss: f64, burst: f64) -> Setup {
     let mut setup = by_radio(8, 57_600);
     setup.auth = true;
@@ -456,7 +471,9 @@ fn losing(loss: f64, burst: f64) -> Setup {
     setup
 }
 
-/// Loss, mean burst length (1 for independent losses), and required availability.
+/// Required availability for a fraction of lost frames and a mean length of their bursts.
+///
+/// Each entry is loss, burst length in frames (1 for independent losses), availability.
 const ASKED: [(f64, f64, f64); 4] = [
     (0.5, 1.0, 0.999),
     (0.7, 1.0, 0.97),
@@ -464,7 +481,7 @@ const ASKED: [(f64, f64, f64); 4] = [
     (0.5, 20.0, 0.85),
 ];
 
-/// Results of several seeds: availabilities and times of the first agreement, s.
+/// Results of runs with several seeds: availability of the chain and time of the first agreement, s.
 struct Soaked {
     shares: Vec<(u64, f64)>,
     firsts: Vec<f64>,

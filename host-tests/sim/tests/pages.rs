@@ -18,7 +18,7 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(root().join(name)).unwrap()
 }
 
-/// Returns all pages of the repository and of the crate's documentation.
+/// Returns the paths of all Markdown pages of the repository and of the crate's documentation.
 fn pages() -> Vec<PathBuf> {
     let mut all = vec![];
     for folder in ["", "examples", "host-tests", "src/docs", "src/wire"] {
@@ -33,7 +33,7 @@ fn pages() -> Vec<PathBuf> {
     all
 }
 
-/// Returns the lines outside code blocks, with their numbers.
+/// Returns the lines of a Markdown page that are outside code blocks, with their numbers from 1.
 fn prose(text: &str) -> Vec<(usize, &str)> {
     let mut code = false;
     let outside = |(_, line): &(usize, &str)| {
@@ -44,7 +44,7 @@ fn prose(text: &str) -> Vec<(usize, &str)> {
     (1..).zip(text.lines()).filter(outside).collect()
 }
 
-/// A row after a blank line has no header and is displayed as text.
+/// Checks that no blank line cuts a table. Rows after it have no header and would be shown as text.
 #[test]
 fn every_row_of_a_table_is_displayed_in_a_table() {
     let mut cut = vec![];
@@ -101,7 +101,7 @@ fn the_pictures_of_the_readme_are_there_and_one_is_of_the_page() {
     );
 }
 
-/// Checks that the README's row on a lost relay matches the output of the command in that row.
+/// Checks that the README's row about a lost relay has the times that the command in that row prints.
 #[test]
 fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
     let text = read("README.md");
@@ -134,7 +134,7 @@ fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
     assert_eq!(cells[2], expected, "{command} prints: {line}");
 }
 
-/// RESULTS.md must not deny measurements that FIRMWARE.md (SiK radio) and LINUX.md (receiver) describe.
+/// Checks that RESULTS.md denies no measurement that FIRMWARE.md or LINUX.md describes.
 #[test]
 fn the_limits_do_not_deny_what_the_guides_describe() {
     let limits = read("examples/RESULTS.md");

@@ -85,7 +85,7 @@ fn fly(
     Ok(chain.finish())
 }
 
-/// Runs the chain until it settles, with a progress line.
+/// Runs the simulated chain until the run ends, writes its frames to `capture`, and shows the progress.
 fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(), Failure> {
     let mut line = Progress::begin();
     while !chain.step(20_000) {
@@ -100,7 +100,7 @@ fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(),
     Ok(())
 }
 
-/// Prints the report; an error in it is returned as the failure.
+/// Prints the report as a table or as JSON. If the report contains an error, returns it as a failure.
 fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     command::print(&if options.json {
         command::json(report)?
@@ -113,15 +113,15 @@ fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     }
 }
 
-/// Run time before the line is shown.
+/// Duration of a run before its progress line is shown. Short runs show none.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// Update interval of the line.
+/// Least time between two updates of the progress line.
 const EVERY: Duration = Duration::from_millis(100);
 
 const ERASE: &str = "\r\u{1b}[K";
 
-/// Progress line on standard error, erased at the end of the run.
+/// Progress line of a run on standard error, if that is a terminal. It is erased at the end of the run.
 struct Progress {
     started: Instant,
     shown: Option<Instant>,
@@ -137,7 +137,7 @@ impl Progress {
         }
     }
 
-    /// Shows `text` if an update is due.
+    /// Writes `text` to the progress line, unless the run is too short or the last update too recent.
     fn show(&mut self, text: impl FnOnce() -> String) {
         let elapsed = self.started.elapsed();
         let is_due = self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);
@@ -156,13 +156,13 @@ impl Drop for Progress {
     }
 }
 
-/// Ignores write errors: a closed terminal is not an error of the run.
+/// Writes `text` to standard error. Errors are ignored, because a closed terminal is not an error of the run.
 fn write(text: &str) {
     let mut out = io::stderr();
     _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
 
-/// Capture of a run, with virtual times.
+/// Capture file (pcapng) of the frames of a run, with their virtual times.
 struct AirCapture {
     file: PathBuf,
     capture: Capture<BufWriter<File>>,
@@ -171,7 +171,7 @@ struct AirCapture {
 }
 
 impl AirCapture {
-    /// Creates `file` for a run of `setup`.
+    /// Creates the capture file `file`. Its comment has the number of relays, the seed and the key of `setup`.
     fn begin(file: &Path, setup: &Setup) -> Result<Self, Failure> {
         // The key is not secret: it is drawn from the seed, for this run only.
         let key = setup.secret().map_or_else(String::new, |key| {
@@ -193,7 +193,7 @@ impl AirCapture {
         })
     }
 
-    /// Writes the frames that have ended by now, or all frames if `to_the_end` is true.
+    /// Writes the frames whose transmission has ended by now. With `to_the_end`, writes all frames.
     fn follow(&mut self, chain: &mut Chain, to_the_end: bool) -> Result<(), Failure> {
         let until = if to_the_end {
             uav_relay::Instant::from_micros(u64::MAX)

@@ -33,7 +33,7 @@ pub struct Data {
     queue_packets: Option<u32>,
 }
 
-/// Direction of the traffic.
+/// Directions in which data is sent through the chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Way {
     /// Packets from Tx to Rx
@@ -43,7 +43,9 @@ enum Way {
 }
 
 impl Data {
-    /// Rejects traffic options without `--traffic`, and a way back whose SIRs are not known.
+    /// Rejects traffic options without `--traffic`, and traffic toward Tx if its SIRs are not known.
+    ///
+    /// They are unknown in a random field, and after an upload. `uploads` is true if the run has one.
     pub(super) fn agree(&self, interference: &Interference, uploads: bool) -> Result<(), Failure> {
         let told = [
             given("--bandwidth-hz", self.bandwidth_hz),
@@ -66,7 +68,7 @@ impl Data {
         Err(Failure::input(line))
     }
 
-    /// Returns the requested traffic over the data link of `scenario`.
+    /// Returns the requested data traffic over the data link of `scenario`; `None` without `--traffic`.
     pub(super) fn spec(&self, scenario: &Scenario) -> Result<Option<TrafficSpec>, Failure> {
         let Some(way) = self.traffic else {
             return Ok(None);

@@ -61,21 +61,21 @@ pub struct Hostile {
     pub flight: Flight,
 }
 
-/// Event of a relay with its time.
+/// Relay to which an option applies, and the virtual time of the event, as in `--kill I@S`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct One {
     index: u16,
     at: Instant,
 }
 
-/// Duration of an attack after the last other event, s.
+/// Time for which an attack continues after the last other event, s.
 const ATTACK_S: u64 = 30;
 
-/// Time limit of a run after its last event, s.
+/// Time after the last event at which a run ends at the latest, s of virtual time.
 const PATIENCE_S: u64 = 3_600;
 
 impl Hostile {
-    /// Returns true if the options add events to the run.
+    /// Returns true if the options add failures, attacks, uploads or drones, or fix the run's duration.
     fn is_eventful(&self) -> bool {
         !(self.kill.is_empty() && self.boot.is_empty() && self.partition.is_empty())
             || self.is_attack()
@@ -88,7 +88,7 @@ impl Hostile {
         self.forge.is_some() || self.replay.is_some()
     }
 
-    /// Returns the time of the last event, without attacks.
+    /// Returns the virtual time of the last event that the options request, not counting attacks.
     fn last(&self) -> Instant {
         let ones = self.kill.iter().chain(&self.boot).map(|one| one.at);
         let parts = self
@@ -103,7 +103,9 @@ impl Hostile {
         all.max().unwrap_or(Instant::ZERO)
     }
 
-    /// Checks the options against a chain of `uavs` relays. If `is_loop` is true, `--closed-loop` is checked, too.
+    /// Checks that the options fit together and to a chain of `uavs` relays.
+    ///
+    /// `is_loop` is true if `--closed-loop` is given, which allows no such events.
     pub fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
@@ -142,7 +144,7 @@ impl Hostile {
         Ok(())
     }
 
-    /// Checks the order of the kills and boots of each relay.
+    /// Rejects a `--kill` of a silent relay, and a `--boot` of a relay before its first `--kill`.
     fn in_order(&self) -> Result<(), Failure> {
         let kills = self.kill.iter().map(|one| (one, true));
         let mut all: Vec<(&One, bool)> = kills
@@ -177,7 +179,7 @@ impl Hostile {
         Ok(())
     }
 
-    /// Checks that all events begin before the run ends.
+    /// Rejects events that begin after the end of the run, if `--soak` sets an end.
     fn in_time(&self) -> Result<(), Failure> {
         let Some(end) = self.air.soaked() else {
             return Ok(());
@@ -207,7 +209,8 @@ impl Hostile {
         }
     }
 
-    /// Applies the options to a setup.
+    /// Adds the requested failures, attack and uploads to `setup`. `sites` are those of Tx and Rx, if the scenario
+    /// has them.
     pub fn prepare(&self, setup: &mut Setup, sites: Option<Sites>) -> Result<(), Failure> {
         let pairs = |ones: &[One]| ones.iter().map(|one| (one.index, one.at)).collect();
         setup.kills = pairs(&self.kill);
@@ -298,28 +301,28 @@ enum Sharing {
 }
 
 impl Air {
-    /// Returns true if the options request a shared channel.
+    /// Returns true if `--air` is given. All relays then share one radio channel with that access method.
     pub fn is_chosen(&self) -> bool {
         self.sharing.is_some()
     }
 
-    /// Returns true if the options can separate relays from the chain or fix the run's duration.
+    /// Returns true if `--deaf` (one-way link failures) or `--soak` (a fixed duration of the run) is given.
     pub fn is_eventful(&self) -> bool {
         !self.deaf.is_empty() || self.soak.is_some()
     }
 
-    /// Returns the end of a soak, if requested.
+    /// Returns the end of the run that `--soak` sets; `None` without that option.
     pub const fn soaked(&self) -> Option<Instant> {
         self.soak
     }
 
-    /// Returns the failure options with their start times.
+    /// Returns the text of each `--deaf` option, for messages, with the start of the failure.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |deaf: &OneWayFailure| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
         self.deaf.iter().map(name)
     }
 
-    /// Returns the times of all events.
+    /// Returns the end of each `--deaf` failure, or its start if it has no end, and the end of a `--soak`.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
             .iter()
@@ -327,7 +330,7 @@ impl Air {
             .chain(self.soak)
     }
 
-    /// Checks the options against a chain of `uavs` relays.
+    /// Checks that the relays of all `--deaf` options are in a chain of `uavs` relays.
     pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
         let wrong = self.deaf.iter().find(|deaf| {
             !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
@@ -339,7 +342,9 @@ impl Air {
         Ok(())
     }
 
-    /// Applies the options to a setup that loses `loss` of the frames. The wiring must already be set.
+    /// Applies the options to a setup whose frames are lost with the probability `loss`.
+    ///
+    /// The setup's wiring must already be set, because the access method depends on it.
     pub fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
         if self.burst > 1.0 && loss <= 0.0 {
             let line = format!("--burst {}: would be ignored without --loss", self.burst);
@@ -410,12 +415,16 @@ fn soak(text: &str) -> Result<Instant, String> {
     instant(text).ok_or_else(|| "must be a number within 1.0 to 1e6".to_owned())
 }
 
-/// Bounds on the constant and the random position error, m; standard deviation of gusts, m/s.
+/// Bound on the constant error of a drone's reported position, m.
+///
+/// [`NOISE_M`] bounds its random error, m. [`GUST_MPS`] is the standard deviation of the gusts, m/s.
 const BIAS_M: f64 = 0.5;
 const NOISE_M: f64 = 0.3;
 const GUST_MPS: f64 = 0.3;
 
-/// Largest reported distance of a hovering drone from its setpoint, m: position noise and gusts.
+/// Largest distance of a hovering drone's reported position from its setpoint, m.
+///
+/// It allows for the errors of the position and for gusts.
 const HOVER_M: f32 = 1.5;
 
 /// Command-line options for drones.
@@ -443,20 +452,20 @@ impl Flight {
         self.fly
     }
 
-    /// Returns the takeover options with their start times.
+    /// Returns the text of each `--takeover` option, for messages, with the start of the takeover.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |it: &Takeover| (format!("--takeover {}", it.relay), it.from);
         self.takeover.iter().map(name)
     }
 
-    /// Returns the times of all events.
+    /// Returns the end of each takeover by a pilot, or its start if it has no end.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.takeover
             .iter()
             .map(|takeover| takeover.until.unwrap_or(takeover.from))
     }
 
-    /// Checks the options against a chain of `uavs` relays.
+    /// Rejects `--takeover` without `--fly`, or of a drone that a chain of `uavs` relays does not have.
     pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
         if let (false, Some(Takeover { relay, .. })) = (self.fly, self.takeover.first()) {
             let line = format!("--takeover {relay}@..: would be ignored without --fly");
@@ -472,7 +481,9 @@ impl Flight {
         }
     }
 
-    /// Adds the drones to the setup; by default evenly spaced along the line.
+    /// Adds the drones to `setup` if `--fly` is given. Without `--start` they start evenly spaced from Tx to Rx.
+    ///
+    /// `axis` is the geographic line from Tx to Rx. `None` takes an arbitrary place on Earth.
     pub fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
         if !self.fly {
             return Ok(());
@@ -526,7 +537,7 @@ fn takeover(text: &str) -> Result<Takeover, String> {
     })
 }
 
-/// Reads the start positions of all drones from a file.
+/// Reads the start positions of all drones, relay 1 first, from the file of `--start`.
 fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
     let named = |what: String| Failure::input(format!("--start {}: {what}", file.display()));
     let text = std::fs::read_to_string(file).map_err(|error| named(error.to_string()))?;

@@ -84,7 +84,7 @@ pub struct Options {
     pub hostile: Hostile,
 }
 
-/// Planning method.
+/// Method by which relays agree on their positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Method {
     /// Algorithm 1 with bracketed targets
@@ -103,7 +103,7 @@ pub enum Method {
 }
 
 impl Options {
-    /// Rejects options that the method would ignore.
+    /// Rejects options that have no effect with the chosen method. `method` is its name, for the message.
     pub(super) fn agree(&self, method: &str) -> Result<(), Failure> {
         let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);
         let is_adjust = self.method == Method::Adjust;
@@ -154,7 +154,7 @@ fn grid_said(grid: uav_relay::Local) -> String {
 }
 
 impl Method {
-    /// Returns true if the method is for a field of interference instead of an interferer.
+    /// Returns true if the method needs a random field of interference. The other methods need an interferer.
     pub const fn is_for_fields(self) -> bool {
         matches!(self, Self::Stochastic | Self::StochasticStep)
     }
@@ -201,7 +201,7 @@ pub struct Listening {
 }
 
 impl Listening {
-    /// Rejects measurement options without `--listen`.
+    /// Rejects options about measurements if `--listen` is missing.
     pub fn agree(&self) -> Result<(), Failure> {
         let velocity = self
             .move_interferer
@@ -220,7 +220,9 @@ impl Listening {
         }
     }
 
-    /// Changes the setup so that the relays have to find the interferers of `scenario`.
+    /// Hides the interferers of `scenario` from the relays, if `--listen` is given. They have to locate them.
+    ///
+    /// `uavs` is the number of relays. Without `--listen`, `setup` stays as it is.
     pub fn prepare(
         &self,
         setup: &mut Setup,
@@ -272,7 +274,7 @@ impl Listening {
         Ok(())
     }
 
-    /// Returns `mission` with the interferer's position at `then`.
+    /// Returns `mission` with the interferer's position at the time `then`, if `--move-interferer` is set.
     pub fn moved(&self, mission: Mission, then: Instant) -> Mission {
         let (Some([along, aside]), Some(source)) = (self.move_interferer, mission.known_source())
         else {

@@ -20,25 +20,27 @@ use crate::simulator::traffic::{TrafficSpec, traffic};
 use crate::simulator::true_interference::beta_w;
 use crate::svg::{OtherInterferers, Picture, room};
 
-/// Setup of a run, with the true mission for its evaluation.
+/// A run that is ready to start: its setup, and the mission with the true interference to evaluate it.
 #[derive(Debug)]
 pub struct Prepared<'a> {
     options: &'a Options,
     scenario: Scenario,
     method: String,
-    /// Setup of the run.
+    /// Setup of the simulated run: relays, links, faults and events.
     pub setup: Setup,
     told: Mission,
-    /// Requested data traffic.
+    /// Data traffic that the options request; `None` if they request none.
     data: Option<TrafficSpec>,
 }
 
 /// Reason why a run was not started.
 #[derive(Debug)]
 pub enum Refused {
-    /// Invalid input.
+    /// Invalid options or scenario.
     Failed(Failure),
-    /// Report that the relays cannot be placed, with a failure if the input is at fault.
+    /// The relays cannot be placed, as the report says.
+    ///
+    /// The failure is set only if the options are at fault: with the default scenario, which the user cannot change.
     Reported(Box<ChainReport>, Option<Failure>),
 }
 
@@ -48,11 +50,13 @@ impl From<Failure> for Refused {
     }
 }
 
-/// Samples per relay and position in a closed loop.
+/// Number of interference samples that a relay takes at its position in each round of `--closed-loop`.
 const SAMPLES: u32 = 10_000;
 
 impl<'a> Prepared<'a> {
-    /// Prepares a run. `name` is the scenario's name in messages; `None` for the default scenario.
+    /// Prepares a run from options and a scenario.
+    ///
+    /// `name` is the scenario's file name for messages; `None` for the default scenario.
     ///
     /// # Errors
     /// [`Refused`]: contradictory options, or a chain that cannot be placed.
@@ -129,7 +133,10 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Runs `setup`, in a closed loop with all its measurements. `watch` runs a chain until it settles.
+    /// Runs the simulation of `setup` and returns the chain at its end. `watch` runs a chain until it settles.
+    ///
+    /// With `--closed-loop`, the relays then measure the interference and agree on positions again, the requested
+    /// number of times.
     ///
     /// # Errors
     /// A setting that a relay rejects, or an error of `watch`.
@@ -165,7 +172,9 @@ impl<'a> Prepared<'a> {
         Ok(chain)
     }
 
-    /// Reports the outcome against the true interference, which also replaces the setup's mission.
+    /// Returns the report of a run. Its SIRs are those with the true interference at the end of the run.
+    ///
+    /// The mission in `self.setup` is replaced by that with the true interference.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
         let (options, scenario) = (self.options, &self.scenario);
         let listened = SensingReport::of(&self.setup, outcome);
@@ -183,10 +192,10 @@ impl<'a> Prepared<'a> {
         report
     }
 
-    /// Returns the data traffic of a run; `None` if it is not requested, or without an agreement.
+    /// Returns the data traffic of a run. `None` if none is requested, or if the relays never agreed.
     ///
     /// # Errors
-    /// Traffic that is too much to simulate.
+    /// More traffic than can be simulated.
     pub fn traffic(&self, outcome: &Outcome) -> Result<Option<TrafficReport>, Failure> {
         let Some(spec) = &self.data else {
             return Ok(None);
@@ -197,7 +206,7 @@ impl<'a> Prepared<'a> {
         Ok(traffic.map(|traffic| TrafficReport::new(spec, &traffic)))
     }
 
-    /// Returns the SIR of every hop from Tx to Rx, linear, with the true interference at `then`.
+    /// Returns the linear SIR of every hop from Tx to Rx, with the interferer where it is at `then`.
     ///
     /// `places` has the relays' indices (from 1) and positions in the order of the chain. The mission is the one
     /// loaded at the start, even after an upload.
@@ -216,7 +225,7 @@ impl<'a> Prepared<'a> {
         report::hop_sirs(&mission, &places)
     }
 
-    /// Returns the picture of the final chain; call [`report`](Self::report) first.
+    /// Returns the picture of the chain at the end of a run. [`report`](Self::report) must be called before.
     pub fn picture(&self, outcome: &Outcome, report: &ChainReport) -> Picture {
         let flown = report::flown(&self.setup, outcome);
         drawn(&flown, &self.scenario, outcome, report)

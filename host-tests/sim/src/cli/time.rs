@@ -4,7 +4,7 @@ use uav_relay::Instant;
 
 use crate::command::number;
 
-/// Parses seconds after the start, 0 to 1e6.
+/// Parses a virtual time in seconds after the start, 0 to 1e6; `None` for other text.
 pub(super) fn instant(text: &str) -> Option<Instant> {
     let seconds = number(text, 0.0, 1e6).ok()?;
     #[expect(
@@ -16,7 +16,7 @@ pub(super) fn instant(text: &str) -> Option<Instant> {
     Some(Instant::from_micros(micros))
 }
 
-/// Parses a period `S-E`, or a start time `S` without an end.
+/// Parses a period `S-E` of virtual times in seconds, or a start `S` alone. `None` for other text.
 pub(super) fn span(text: &str) -> Option<(Instant, Option<Instant>)> {
     if let Some(from) = instant(text) {
         return Some((from, None));

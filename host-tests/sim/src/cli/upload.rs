@@ -68,7 +68,9 @@ enum Key {
     RxHeight,
 }
 
-/// Names and ranges of the keys, as in a scenario file, a mission's noise and `--tolerance`.
+/// Keys that `--upload` can change: name, key, smallest and largest value.
+///
+/// The names are those of scenario files, and `noise_w` and `tolerance`.
 const KEYS: [(&str, Key, f64, f64); 20] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
@@ -93,17 +95,17 @@ const KEYS: [(&str, Key, f64, f64); 20] = [
 ];
 
 impl Uploads {
-    /// Returns true if the command line requests an upload.
+    /// Returns true if the options request at least one upload.
     pub fn are_planned(&self) -> bool {
         !self.upload.is_empty()
     }
 
-    /// Returns true if simulated relays keep an uploaded mission over a restart.
+    /// Returns true unless `--no-store` is given: relays then keep an uploaded mission over a reboot.
     pub fn are_stored(&self) -> bool {
         !self.no_store
     }
 
-    /// Rejects upload options without an upload, and `--no-store` without a reboot.
+    /// Rejects upload options without `--upload`, and `--no-store` if no relay reboots (`boots` is false).
     pub fn agree(&self, boots: bool) -> Result<(), Failure> {
         let given = match (self.upload_from, self.no_store) {
             (Some(End::Tx), _) => "--upload-from tx",
@@ -122,18 +124,21 @@ impl Uploads {
         Ok(())
     }
 
-    /// Returns the uploads' options and start times.
+    /// Returns the text of each `--upload` option, for messages, with the upload's start time.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |one: &Planned| (format!("--upload {}", one.text), one.at);
         self.upload.iter().map(name)
     }
 
-    /// Returns the uploads' start times.
+    /// Returns the start time of each upload.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.upload.iter().map(|one| one.at)
     }
 
-    /// Returns the uploads in order of time. `base` is the relays' mission, `sites` their sites, if known.
+    /// Returns the uploads in order of time, with versions from 1.
+    ///
+    /// `base` is the mission that the relays have at the start, `sites` are the geographic positions of Tx and Rx, if
+    /// known.
     pub fn of(&self, base: &Mission, sites: Option<Sites>) -> Result<Vec<UploadSpec>, Failure> {
         let end = match self.upload_from {
             None | Some(End::Tx) => Side::Upstream,
@@ -168,7 +173,9 @@ impl Uploads {
 }
 
 impl Planned {
-    /// Returns the new sites if the upload moves an end.
+    /// Returns the new geographic positions of Tx and Rx; `None` if the upload moves neither.
+    ///
+    /// `sites` are the positions before, `None` if the scenario has no `[site]`.
     fn moved(&self, sites: Option<Sites>) -> Result<Option<Sites>, &'static str> {
         let of = |key| {
             let mut changes = self.changes.iter();
@@ -198,7 +205,7 @@ impl Planned {
         }))
     }
 
-    /// Returns `base` with the requested changes.
+    /// Returns the parameters of the uploaded mission: `base` with the values that `--upload` changes.
     fn changed(&self, base: &MissionConfig) -> Result<MissionConfig, &'static str> {
         let Interference::Source(at) = base.interference else {
             return Err("a [field] of interference cannot be uploaded");

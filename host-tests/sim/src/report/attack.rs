@@ -8,45 +8,51 @@ use serde::Serialize;
 use crate::simulator::attack::AttackKind;
 use crate::simulator::outcome::{Moment, Outcome, TimelineEvent};
 
-/// Attacker's frames of one kind.
+/// Counts of the attacker's frames of one kind, forged or replayed.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct StruckReport {
-    /// Frames sent.
+    /// Number of frames that the attacker sent.
     pub sent: u64,
-    /// Frames that a relay accepted as a neighbour's.
+    /// Number of the attacker's frames that a relay accepted as frames of a neighbour.
     pub taken: u64,
-    /// Frames by the relay's counter that grew; `received` are the accepted ones.
+    /// Number of the attacker's frames by the relay's counter that each incremented.
+    ///
+    /// `received` has the accepted frames. The other counters are reasons of rejection.
     pub counted: BTreeMap<&'static str, u64>,
 }
 
-/// Result of an attack.
+/// Result of an attack, in comparison with the same run without it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AttackReport {
-    /// True if frames carried tags.
+    /// True if the relays signed their frames.
     pub auth: bool,
-    /// Forged frames.
+    /// Counts of the forged frames.
     pub forged: StruckReport,
-    /// Replayed frames.
+    /// Counts of the replayed frames.
     pub replayed: StruckReport,
     /// True if the run with the attack ended differently from the run without the attack.
     pub ended_otherwise: bool,
-    /// Relays whose final position or target differs from the run without the attack.
+    /// Number of relays whose final position or target SIR differs from the run without the attack.
     pub moved: u64,
-    /// Largest displacement of those relays (x and altitude), m; absent if one has no position.
+    /// Largest distance, in x and altitude, that the attack moved a relay's final position, m.
+    ///
+    /// Absent if a moved relay has no position in one of the two runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest_m: Option<f64>,
-    /// Positions that relays accepted for targets that do not occur without the attack.
+    /// Number of positions that relays accepted for target SIRs that do not occur without the attack.
     pub misled: u64,
-    /// Views that the chain formed.
+    /// Number of views (memberships of the chain) that relays accepted.
     pub formed: u64,
-    /// Views that the chain forms without the attack.
+    /// Number of views (memberships of the chain) that relays accept without the attack.
     pub formed_without: u64,
-    /// Setpoints outside their limits; nonzero is a bug.
+    /// Number of setpoints outside of the mission's limits. Nonzero is a bug.
     pub unsafe_setpoints: u64,
 }
 
 impl AttackReport {
-    /// Compares a run with an attack to `calm`, the same run without it.
+    /// Compares the outcome of a run under attack with `calm`, the outcome of the same run without it.
+    ///
+    /// `auth` is true if the relays signed their frames.
     pub fn new(auth: bool, outcome: &Outcome, calm: &Outcome) -> Self {
         let moved = outcome
             .relays
@@ -135,14 +141,14 @@ impl AttackReport {
     }
 }
 
-/// Returns the accepted targets as bit patterns.
+/// Returns the target SIRs of all positions that relays accepted, as bit patterns for exact comparison.
 fn targets(outcome: &Outcome) -> impl Iterator<Item = u32> {
     let converged = |moment: &&Moment| moment.what == TimelineEvent::Converged;
     let moments = outcome.moments.iter().filter(converged);
     moments.filter_map(|moment| moment.target.map(f32::to_bits))
 }
 
-/// Returns the number of accepted views.
+/// Returns the number of different views (memberships of the chain) that relays accepted.
 fn formed(outcome: &Outcome) -> u64 {
     let views: BTreeSet<u32> = outcome
         .moments

@@ -20,123 +20,128 @@ use crate::simulator::outcome::{Ending, Outcome, RelayEnd, TimelineEvent};
 use crate::simulator::setup::Setup;
 use crate::simulator::watch::Watched;
 
-/// Counts of frame faults.
+/// Counts of the faults that the simulated links caused, and of rejected frames.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct FaultReport {
-    /// Lost frames.
+    /// Number of frames that the links lost.
     pub lost: u64,
-    /// Corrupted frames.
+    /// Number of frames that the links corrupted.
     pub corrupted: u64,
-    /// Duplicated frames.
+    /// Number of frames that the links delivered twice.
     pub duplicated: u64,
-    /// Delayed frames.
+    /// Number of frames that the links delayed, so that later frames could overtake them.
     pub reordered: u64,
-    /// Frames that the relays rejected for any reason.
+    /// Number of received frames that relays rejected for any reason.
     pub rejected: u64,
 }
 
-/// Result of `cargo chain`.
+/// Result of a run of `cargo chain`, printed as a table or as JSON.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct ChainReport {
     /// Planning method, as on the command line.
     pub method: String,
-    /// Requested number of relays.
+    /// Number of relays for which the run was requested.
     pub uavs: u16,
-    /// Version of the final mission if one was uploaded; 0 for the original one. All SIRs refer to it.
+    /// Version of the mission that the chain flies at the end; 0 for the one loaded at the start.
+    ///
+    /// Absent without uploads. All SIRs of the report refer to this mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best possible SIR, if no positions were found.
+    /// Best possible linear SIR, 0, if no placement gives every hop a SIR above 0; absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
-    /// SIR of the worst hop, linear; absent unless every relay of the chain has a position.
+    /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
     ///
-    /// With a way back the worse of that of the way there, and of the way back divided by `reverse`.
+    /// If the mission also requires SIRs from Rx to Tx, those are divided by `reverse`, and the worst hop of both
+    /// directions counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// SIR of the worst hop, dB.
+    /// SIR of the worst hop, dB: `sir` as decibels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
-    /// Worst hop of the way back; absent in a mission of one direction.
+    /// Worst hop from Rx to Tx; absent if the mission requires no SIR in that direction.
     #[serde(flatten)]
     pub back: Option<WorstBack>,
     /// Target SIR that the relays agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// True in a field if no chain of equal relays can reach a higher target; false if unknown.
+    /// True if no chain of equal relays can reach a higher target SIR in the random field. False if unknown.
+    ///
+    /// Absent without a field.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
-    /// SIR of the chain before Algorithm 2 and after each round, linear.
+    /// Linear SIR of the chain before the first round of Algorithm 2, and after each round.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<f64>,
     /// Relays of the chain in order from the transmitter; empty unless every relay has a position.
     pub relays: Vec<RelayReport>,
-    /// SIR at the receiver, linear.
+    /// Linear SIR of the last hop, at Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir: Option<f64>,
-    /// SIR at the receiver, dB.
+    /// SIR of the last hop, at Rx, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
-    /// Forward passes along the chain.
+    /// Number of passes (messages forwarded along the whole chain) and view proposals that relays began.
     pub sweeps: u32,
-    /// Frames sent on all links.
+    /// Number of frames sent on all links.
     pub messages: u64,
-    /// Bytes sent on all links.
+    /// Number of bytes sent on all links.
     pub bytes: u64,
     /// Virtual duration of the run, s.
     pub virtual_s: f64,
-    /// Frame faults.
+    /// Counts of link faults and of rejected frames.
     pub faults: FaultReport,
-    /// Detected failures of relays.
+    /// Failed relays, each with the neighbour that detected the failure.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub silences: Vec<SilenceReport>,
-    /// `shared` for a common radio channel; absent for a separate link to each neighbour.
+    /// `shared` if all relays share one radio channel; absent for separate links between neighbours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
-    /// Counters of the channel, unless it is ideal.
+    /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// Statistics over the whole run, if recorded.
+    /// Availability of the chain over the whole run. Its fields are absent if the run does not record them.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
-    /// Result of the search for the interferer, for relays that measure it.
+    /// Estimate of the interferer and its quality; absent unless the relays locate it by measurements.
     #[serde(flatten)]
     pub listened: Option<SensingReport>,
-    /// SIR against all interferers, if the relays assumed a single one.
+    /// SIR with all interferers of the scenario, if the relays assume a single one in their place.
     #[serde(flatten)]
     pub against_all: Option<AllInterferersReport>,
-    /// Number of relays in the chain at the end, if the run had other events than convergence.
+    /// Number of relays in the chain at the end; absent if the only events are accepted positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
-    /// Relays outside the chain, with their last positions.
+    /// Relays that are not in the chain at the end, with their last positions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<LostReport>,
-    /// Final positions of drones with autopilots.
+    /// Final positions of drones with simulated autopilots; empty without them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drones: Vec<DroneReport>,
-    /// Log of the run, if it has more than convergence.
+    /// Log of the run; empty if the only events are accepted positions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub timeline: Vec<MomentReport>,
-    /// Recovery times for each new view.
+    /// Times from a failure to the recovery of the chain, for each new view (membership of the chain).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub recovery: Vec<RecoveryReport>,
-    /// Result of the attack, if any.
+    /// Result of the attack; absent without an attacker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attack: Option<AttackReport>,
-    /// Data traffic, if requested and if there was an agreement.
+    /// Data traffic; absent if it was not requested, or if the relays never agreed on positions.
     #[serde(flatten)]
     pub traffic: Option<TrafficReport>,
-    /// Seed of every random draw.
+    /// Seed of all random draws of the run.
     pub seed: u64,
-    /// True if relays may leave the line: the table then has a y column.
+    /// True if relays may leave the line from Tx to Rx: the table of relays then has a y column.
     #[serde(skip)]
     pub room: bool,
 }
 
 impl ChainReport {
-    /// Report of a run in which the chain's final mission is `mission`.
+    /// Creates the report of a run. `mission` is the mission that the chain flies at the end.
     pub fn new(method: &str, mission: &Mission, outcome: &Outcome, seed: u64) -> Self {
         let chain = left(outcome);
         let timeline = timeline::timeline(&outcome.moments);
@@ -221,7 +226,7 @@ impl ChainReport {
         }
     }
 
-    /// Report of a run that could not be started.
+    /// Creates the report of a run that could not be started, with the reason `why`.
     pub fn refused(method: &str, uavs: u16, seed: u64, why: &str) -> Self {
         Self {
             method: method.to_owned(),
@@ -232,7 +237,7 @@ impl ChainReport {
         }
     }
 
-    /// Formats the report as a table with the cost of the run.
+    /// Formats the report as text: the table of relays, the worst SIR, the messages and bytes, and the log.
     pub fn table(&self) -> String {
         let mut text = hops::hops_table(&self.relays, &self.lost, self.rx_sir, self.room);
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
@@ -321,7 +326,7 @@ impl ChainReport {
         text
     }
 
-    /// Formats the mission that the chain flies; empty without uploads.
+    /// Returns a line of text about the mission that the chain flies at the end; empty without uploads.
     fn flown_text(&self) -> String {
         match self.version {
             None => String::new(),
@@ -334,7 +339,7 @@ impl ChainReport {
         }
     }
 
-    /// Formats the number of remaining relays, with the total if some are lost.
+    /// Formats the number of relays in the chain: "8", or "6 of 8" if some are lost.
     fn relays_left(&self) -> String {
         match self.left {
             Some(left) if left < self.uavs => format!("{left} of {}", self.uavs),
@@ -343,10 +348,10 @@ impl ChainReport {
     }
 }
 
-/// Returns the relays of the chain at the end of the run, with their numbers from 1, in order from Tx.
+/// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
 ///
-/// The chain is the largest complete view, or all living relays if there is none. On separate links a failure is only reported:
-/// all relays stay. Without a quorum there is no chain.
+/// The chain is the largest complete view, or all living relays if there is none. On separate links a failure is only
+/// reported: all relays stay. Without a quorum there is no chain.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -369,14 +374,14 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if these are all relays of their view.
+/// Returns true if `part` has all relays of one view, in the order of their indices in it.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)
         .all(|(place, (_, relay))| relay.index == place && usize::from(relay.relays) == part.len())
 }
 
-/// Reports the relays that are not in `left`.
+/// Reports the relays of a run that are not in `left`, the relays of the chain at its end.
 pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostReport> {
     (1..)
         .zip(&outcome.relays)
@@ -396,7 +401,7 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
         .collect()
 }
 
-/// Returns the mission that the chain flies at the end of a run, with all its relays.
+/// Returns the mission that the chain flies at the end of a run of `setup`, loaded or uploaded.
 pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
     let version = version(outcome);
     let mut uploads = setup.uploads.iter().map(|spec| spec.upload);
@@ -406,14 +411,14 @@ pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
         .unwrap_or(setup.mission)
 }
 
-/// Returns the version of that mission; the newest one if the relays differ.
+/// Returns the version of the mission that the chain flies at the end; the newest one if relays differ.
 pub(super) fn version(outcome: &Outcome) -> u16 {
     let chain = left(outcome);
     let versions = chain.iter().map(|(_, relay)| relay.version);
     versions.max().unwrap_or(0)
 }
 
-/// Returns the reason for a failed run, and the upload that was not adopted, if any.
+/// Returns the error line of a failed run; `None` after success. It names an upload that was not adopted.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
     // A mission counts as adopted even if its relays are lost.
@@ -425,7 +430,7 @@ pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     })
 }
 
-/// Returns the newest mission version that any relay adopted; 0 for the original mission.
+/// Returns the version of the newest mission that any relay adopted; 0 without such a mission.
 fn adopted(outcome: &Outcome) -> u16 {
     let versions = outcome.moments.iter().map(|moment| match moment.what {
         TimelineEvent::Adopted(version) => version,
@@ -461,20 +466,20 @@ fn ended(method: &str, outcome: &Outcome) -> Option<String> {
     }
 }
 
-/// Channel parameters and counters.
+/// Parameters and counters of a radio channel that all relays share.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub struct AirReport {
-    /// Access method: `csma` or `aloha`.
+    /// Access method of the channel: `csma` or `aloha`.
     pub access: &'static str,
-    /// Bits per second.
+    /// Data rate of the channel, bit/s.
     pub baud: u32,
-    /// Counters of the channel.
+    /// Counters of frames and collisions on the channel.
     #[serde(flatten)]
     pub counts: AirCounts,
 }
 
 impl AirReport {
-    /// Returns the channel's report of a run; `None` for wires and for an ideal channel.
+    /// Returns the report of the shared channel of a run; `None` for separate links and an ideal channel.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
         let access = match (setup.settings.wiring, setup.access) {
             (Wiring::Shared, Access::Csma) => "csma",
@@ -488,7 +493,7 @@ impl AirReport {
         })
     }
 
-    /// Formats the report as a line; `virtual_s` is the duration of the run.
+    /// Formats the channel's report as a line; `virtual_s` is the duration of the run, s, for the load.
     pub(super) fn text(&self, virtual_s: f64) -> String {
         let counts = self.counts;
         let load = counts.air_time_us as f64 / 1e6 / virtual_s.max(1e-6);
@@ -502,28 +507,30 @@ impl AirReport {
     }
 }
 
-/// Statistics of the availability over the whole run. All are absent in a run that does not record them.
+/// Availability of the chain over a whole run. All fields are absent if the run does not record them.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct AvailabilityReport {
-    /// Time of the first agreement, s: all relays of a view hold their positions.
+    /// Time when all relays of the chain first held agreed positions, s of virtual time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_agreement_s: Option<f64>,
-    /// Share of the time after the first agreement in which a longest possible chain held its optimum.
+    /// Fraction of the time since the first agreement in which the chain was as good as possible.
+    ///
+    /// The longest possible chain of the living relays then held the positions that it has without faults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub availability: Option<f64>,
-    /// Longest time after the first agreement without a longest possible chain at its optimum, s.
+    /// Longest time since the first agreement in which the chain was not as good as possible, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_outage_s: Option<f64>,
-    /// Largest number of groups that held separate agreements at the same time.
+    /// Largest number of groups of relays that held separate agreements at the same time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_flying: Option<usize>,
-    /// Smallest distance of two relays, m.
+    /// Smallest distance of two relays during the run, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_separation_m: Option<f64>,
 }
 
 impl AvailabilityReport {
-    /// Report of `watched`.
+    /// Creates the report of the statistics `watched`.
     pub fn of(watched: Watched) -> Self {
         let longest = watched.longest_wrong;
         Self {
@@ -563,18 +570,18 @@ impl AvailabilityReport {
     }
 }
 
-/// Final state of a drone.
+/// State of a simulated drone at the end of a run.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct DroneReport {
-    /// Relay number in the mission, from 1.
+    /// Number of the drone's relay in the mission, from 1.
     pub index: u16,
-    /// True position along the line, m.
+    /// True distance of the drone from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// True position to the right of the line, m.
+    /// True position of the drone to the right of the line from Tx to Rx, m.
     pub y_m: f64,
-    /// True height above the ground, m.
+    /// True height of the drone above the ground, m.
     pub h_m: f64,
-    /// True if the relay controls the drone.
+    /// True if the relay, not the pilot, controls the drone.
     pub flown: bool,
     /// Distance of the drone from the relay's setpoint, m; absent without a setpoint.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -599,18 +606,18 @@ fn one(index: u16, at: Point, flown: bool, relay: &RelayEnd) -> DroneReport {
     }
 }
 
-/// Detected failure of a relay.
+/// Failure of a relay, and the neighbour that detected it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SilenceReport {
-    /// Failed relay.
+    /// Number of the failed relay, from 1.
     pub silent: u16,
-    /// Neighbour that detected the failure.
+    /// Number of the neighbour that detected the failure, from 1.
     pub noticed_by: u16,
-    /// Detection time, s of virtual time.
+    /// Time of the detection, s of virtual time.
     pub at_s: f64,
 }
 
-/// Reports which neighbours detected the relays that failed. False detections over bad links are left out.
+/// Reports the neighbours that detected failed relays. False detections over bad links are left out.
 pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     let killed = |index: u16| {
         let at = usize::from(index).checked_sub(1);
@@ -642,19 +649,23 @@ pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     reports.collect()
 }
 
-/// SIR of the chain against all interferers, if its relays assumed a single one.
+/// SIR of the chain with all interferers of the scenario, where the relays assume a single one instead.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct AllInterferersReport {
-    /// SIR of the worst hop against all interferers, linear.
+    /// Linear SIR of the worst hop with all interferers of the scenario.
     pub all_sir: f64,
-    /// SIR of the worst hop against all interferers, dB.
+    /// SIR of the worst hop with all interferers of the scenario, dB.
     pub all_sir_db: f64,
-    /// Relative loss from the SIR that the relays assume; negative for a gain.
+    /// Relative loss: 1 - `all_sir` / the SIR with the single interferer that the relays assume.
+    ///
+    /// It is negative if the true SIR is higher.
     pub all_loss: f64,
 }
 
 impl AllInterferersReport {
-    /// Evaluates `relays`, which assume `sir`; `None` if there is a single interferer or a field.
+    /// Computes the SIR of `relays` with all interferers of the scenario. `sir` is the one that they assume.
+    ///
+    /// `None` if the scenario has a single interferer or a random field.
     pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {
         mission::hypothetical(scenario)?;
         let last = relays.last()?.index;
@@ -679,7 +690,7 @@ impl AllInterferersReport {
         })
     }
 
-    /// Formats the result as a line of text.
+    /// Formats the SIR with all interferers as a line of text.
     pub fn text(&self) -> String {
         let Self {
             all_sir,

@@ -7,24 +7,24 @@ use uav_relay::place::Station;
 use uav_relay::sir::{Sender, at_receiver, at_transmitter};
 use uav_relay::{Mission, Placement, Profile};
 
-/// Position and SIR of a relay.
+/// Position of a relay at the end of a run, and the SIR at which it receives.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RelayReport {
-    /// Index in the chain, from 1.
+    /// Number of the relay, from 1 next to Tx.
     pub index: u16,
-    /// Distance from the transmitter, m.
+    /// Distance of the relay from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// Distance from the line, m, positive to the right as seen toward the receiver.
+    /// Distance of the relay from the line, m, positive to the right as seen toward Rx.
     pub y_m: f64,
-    /// Altitude, m.
+    /// Altitude of the relay, m.
     pub h_m: f64,
-    /// SIR of the hop that ends at the relay, linear.
+    /// Linear SIR of the hop from the previous node to this relay.
     pub sir: f64,
-    /// SIR of the hop that ends at the relay, dB.
+    /// SIR of the hop from the previous node to this relay, dB.
     pub sir_db: f64,
-    /// SIR of the same hop on the way back, at the node before this relay, linear.
+    /// Linear SIR of the hop from this relay back to the previous node.
     ///
-    /// Absent if it is not known.
+    /// Absent if it is unknown, or if the mission requires no SIR from Rx to Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back: Option<f64>,
     /// Version of the relay's mission, 0 for the loaded mission; absent without uploads.
@@ -32,24 +32,27 @@ pub struct RelayReport {
     pub version: Option<u16>,
 }
 
-/// Relay that is no longer in the chain.
+/// Relay that is not in the chain at the end of a run.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LostReport {
-    /// Relay number in the mission, from 1.
+    /// Number of the relay in the mission, from 1.
     pub index: u16,
-    /// Last setpoint: distance from the transmitter, m.
+    /// Last setpoint of the relay: distance from Tx along the line to Rx, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x_m: Option<f64>,
-    /// Last setpoint: distance from the line, m, positive to the right.
+    /// Last setpoint of the relay: distance from the line, m, positive to the right.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_m: Option<f64>,
-    /// Last setpoint: altitude, m.
+    /// Last setpoint of the relay: altitude, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub h_m: Option<f64>,
     /// Last version of the relay's mission; absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// Reason: `silent`; `apart` (alive, cannot reach the others); `no quorum` (alive, no chain is left).
+    /// Reason why the relay is not in the chain.
+    ///
+    /// `silent`: it is off. `apart`: it is on, but cannot reach the others. `no quorum`: it is on, but no chain is
+    /// left.
     pub why: &'static str,
 }
 
@@ -59,9 +62,10 @@ pub fn db(linear: f64) -> f64 {
     10.0 * libm::log10(linear)
 }
 
-/// Returns the SIR of every hop, from the transmitter to the receiver, for relays at `places`.
+/// Returns the linear SIR of every hop from Tx to Rx, for relays at these positions, from relay 1 on.
 ///
-/// Uses the crate's formulas, as on board; limited to the largest f32 for nearly coincident positions.
+/// The formulas are those that relays use on board. A SIR is at most the largest f32, even if two positions nearly
+/// coincide.
 pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let mut sender = Sender::transmitter(mission);
     let mut from_m = 0.0;
@@ -83,9 +87,9 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
     sirs
 }
 
-/// Returns the SIR of every hop on the way back from Rx to Tx. Hop k is received by node k - 1.
+/// Returns the linear SIR of every hop from Rx to Tx. Entry k - 1 is received by node k - 1; node 0 is Tx.
 ///
-/// Uses the crate's formulas, limited as [`hop_sirs`]. Empty unless the mission has one known interferer.
+/// The formulas and the limit are those of [`hop_sirs`]. Empty unless the mission has one known interferer.
 pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let (Some((first, profile)), Some(_)) = (places.first(), mission.known_source()) else {
         return Vec::new();
@@ -105,19 +109,19 @@ pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<
     sirs
 }
 
-/// SIR of the worst hop on the way back.
+/// SIR of the worst hop in the direction from Rx to Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WorstBack {
-    /// SIR needed on the way back, relative to that on the way there: `link.reverse`.
+    /// SIR that hops need from Rx to Tx, as a fraction of that from Tx to Rx (`link.reverse`).
     pub reverse: f64,
-    /// SIR of the worst hop on the way back, linear.
+    /// Linear SIR of the worst hop from Rx to Tx.
     pub worst_back: f64,
-    /// SIR of the worst hop on the way back, dB.
+    /// SIR of the worst hop from Rx to Tx, dB.
     pub worst_back_db: f64,
 }
 
 impl WorstBack {
-    /// Returns the worst of `sirs`, if the mission has a way back.
+    /// Finds the worst of `sirs`, linear SIRs from Rx to Tx. `None` if the mission requires none.
     pub fn of(mission: &Mission, sirs: &[f64]) -> Option<Self> {
         let reverse = f64::from(mission.config().reverse);
         let worst_back = sirs.iter().copied().reduce(f64::min)?;
@@ -128,13 +132,13 @@ impl WorstBack {
         })
     }
 
-    /// Returns the worse of `sir`, that of the way there, and of the way back divided by `reverse`.
+    /// Returns the smaller of `sir`, linear from Tx to Rx, and the SIR from Rx to Tx divided by `reverse`.
     pub fn both(&self, sir: f64) -> f64 {
         sir.min(self.worst_back / self.reverse)
     }
 }
 
-/// Reports the relays at `places` with the SIR of the hop that ends at each.
+/// Reports relays, numbered from 1, with their positions and the linear SIRs at which they receive.
 pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport> {
     (1..)
         .zip(places.iter().zip(sirs))
@@ -151,7 +155,7 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
         .collect()
 }
 
-/// Formats all relays, including lost relays, and Rx as a table; with a y column if `room` is true.
+/// Formats the relays of the chain, lost relays and Rx as a table. With `room` it has a y column.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

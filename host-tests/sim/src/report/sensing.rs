@@ -15,41 +15,41 @@ use crate::simulator::watch::alone;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
-/// Estimated interferer.
+/// Interferer as the relays estimate it from their measurements.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct BelievedReport {
-    /// Transmit power, W.
+    /// Estimated transmit power, W.
     pub power_w: f32,
-    /// Position along the line, m.
+    /// Estimated position along the line from Tx to Rx, m.
     pub x_m: f32,
-    /// Position to the right of the line, m; its sign is arbitrary if the relays never left the line.
+    /// Estimated position to the right of the line, m. The sign is arbitrary if relays never left the line.
     pub y_m: f32,
 }
 
-/// Interference estimate and its quality.
+/// Quality of the relays' interference estimate, and of the positions chosen with it.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct SensingReport {
-    /// Final estimate of relay 1.
+    /// Estimated interferer of relay 1 at the end; absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed: Option<BelievedReport>,
-    /// Number of agreements on new positions, including the first.
+    /// Number of times that the relays agreed on new positions, including the first.
     pub agreements: u32,
-    /// Final SIR of the remaining relays against the true interferers, linear.
+    /// Linear SIR of the worst hop at the end, with the true interferers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub true_sir: Option<f64>,
-    /// Final SIR of the same relays with a known interferer, linear; only for a single interferer.
+    /// Linear SIR that the same relays reach if they know the interferer; only for a single interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimum_sir: Option<f64>,
-    /// Ratio `true_sir` / `optimum_sir`.
+    /// Ratio of the true SIR at the end to the SIR with a known interferer: `true_sir` / `optimum_sir`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share_of_optimum: Option<f64>,
-    /// Mean of that ratio over all measurements since the first agreement.
+    /// Mean of `share_of_optimum`, true SIR / optimum SIR, over all measurements since the first agreement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_share_of_optimum: Option<f64>,
 }
 
 impl SensingReport {
-    /// Report of a run of `setup`; `None` if the relays did not measure.
+    /// Creates the report of a run of `setup`; `None` if the relays measured no interference.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
         let sky = setup.sky.as_ref()?;
         let believed = outcome.relays.first().map(|relay| relay.believed.estimate);
@@ -122,7 +122,7 @@ fn moves(sky: &TrueInterference) -> bool {
     sky.velocity_mps.iter().any(|speed| speed.abs() > 0.0)
 }
 
-/// Returns the scene with only the relays `nodes`, by index from 1.
+/// Returns the scene reduced to the relays with the numbers `nodes`, from 1.
 fn with_relays(scene: Scene, nodes: &[u16]) -> Scene {
     let relay = |node: &u16| {
         scene
@@ -134,7 +134,9 @@ fn with_relays(scene: Scene, nodes: &[u16]) -> Scene {
     Scene { relays, ..scene }
 }
 
-/// Returns the SIR of the chain of `nodes` that knows the single interferer of `scene`, linear.
+/// Returns the linear SIR that the relays `nodes` reach in a separate run if they know the interferer.
+///
+/// `None` unless the scene has exactly one interferer, or if that run fails.
 fn optimum(setup: &Setup, scene: &Scene, nodes: &[u16]) -> Option<f64> {
     let [source] = scene.sources.as_slice() else {
         return None;

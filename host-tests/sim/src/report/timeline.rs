@@ -8,37 +8,41 @@ use uav_relay::Instant;
 
 use crate::simulator::outcome::{Moment, TimelineEvent};
 
-/// Converts to seconds of virtual time since the start.
+/// Converts a virtual time to seconds since the start of the run.
 pub fn seconds(at: Instant) -> f64 {
     at.as_micros() as f64 / 1e6
 }
 
-/// Log entry of a run.
+/// Entry in the log of a run: an event at one node.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MomentReport {
-    /// Time of the entry, s of virtual time.
+    /// Time of the event, s of virtual time.
     pub at_s: f64,
-    /// Relay number from 1; Tx and Rx count as 0 and N + 1; for a partition, the last relay before it.
-    pub relay: u16,
-    /// Kind of the entry.
+    /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     ///
-    /// `silent`, `switched on`, `lost`, `found`, `view accepted`, `no quorum`, `converged`, `infeasible`, `partition`, `partition ended`, `does not receive`, `receives again`,
-    /// `offered`, `stored`, `adopted`, `lease expired`, `not received by`, `mission mismatch`, `key mismatch`, `epoch went back`, `duplicate index`; of autopilots
-    /// `engaged`, `released`, `blind`, `restarted`; of relays that measure `new estimate`, `interferer unclear`, `sensor off`.
+    /// For a partition it is the last relay before the gap.
+    pub relay: u16,
+    /// Kind of the event, in words.
+    ///
+    /// `silent`, `switched on`, `lost`, `found`, `view accepted`, `no quorum`, `converged`, `infeasible`,
+    /// `partition`, `partition ended`, `does not receive`, `receives again`, `offered`, `stored`, `adopted`, `lease
+    /// expired`, `not received by`, `mission mismatch`, `key mismatch`, `epoch went back`, `duplicate index`; of
+    /// autopilots `engaged`, `released`, `blind`, `restarted`; of relays that measure `new estimate`, `interferer
+    /// unclear`, `sensor off`.
     pub what: &'static str,
-    /// Other node of the entry, for example a lost or found neighbour.
+    /// Other node that the event concerns, for example a lost or found neighbour; absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other: Option<u16>,
-    /// Number of the new view.
+    /// Number of the view (membership of the chain) that the relay accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub view: Option<u32>,
-    /// Number of relays in the new view.
+    /// Number of relays in the view that the relay accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relays: Option<u16>,
     /// Version of the mission that was offered, stored or adopted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// Target SIR agreed on, linear.
+    /// Linear target SIR of the position that the relay accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
 }
@@ -99,7 +103,7 @@ impl MomentReport {
     }
 }
 
-/// Returns all log entries; none if the run has only convergence.
+/// Converts the log of a run to report entries; empty if the only events are accepted positions.
 pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
     let plain = |moment: &Moment| {
         matches!(
@@ -113,20 +117,24 @@ pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
     moments.iter().map(MomentReport::of).collect()
 }
 
-/// Log entries of several relays that form one line.
+/// Log entries of several relays about the same event. They form one line of text.
 #[derive(Clone, PartialEq, Debug)]
 struct Group {
     first_s: f64,
     last_s: f64,
-    /// Relays in order of their entries; a pair of neighbours that found each other, in order from Tx.
+    /// Numbers of the relays in the order of their entries, or, for two neighbours that linked, from Tx on.
     relays: Vec<u16>,
     sample: MomentReport,
 }
 
-/// Longest time between entries of one group, s: neighbours may detect a failure at different times.
+/// Longest time between successive log entries about one event, s.
+///
+/// Neighbours may detect the same failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
-/// Groups the log entries. Sorted by a group's last time if all relays have to agree, else by its first.
+/// Groups log entries about the same event, sorted by time.
+///
+/// An event in which all relays must take part counts at its last entry, any other at its first.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {
@@ -188,7 +196,7 @@ impl Group {
         }
     }
 
-    /// Describes the group in a few words, for a picture.
+    /// Describes the event in a few words, for a picture.
     fn words(&self) -> String {
         let who = named(&self.relays);
         let one = &self.sample;
@@ -224,7 +232,7 @@ impl Group {
         }
     }
 
-    /// Describes the group as a line of text.
+    /// Describes the event as a line of the log.
     fn line(&self) -> String {
         let many = self.relays.len() > 1;
         let who = named(&self.relays);
@@ -322,10 +330,10 @@ fn count(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 
-/// Number of lines at the start and at the end of a shortened log.
+/// Number of lines that remain at the start of a shortened log, and at its end.
 const ENDS: usize = 20;
 
-/// Formats the log, one line per group, without the middle of a very long log.
+/// Formats the log with a line for each event. A log of more than 40 lines loses those in the middle.
 pub(super) fn text(timeline: &[MomentReport]) -> String {
     let groups = groups(timeline);
     let mut text = String::new();
@@ -346,7 +354,7 @@ pub(super) fn text(timeline: &[MomentReport]) -> String {
     text
 }
 
-/// Returns the groups' times, s, and short descriptions, for a picture.
+/// Returns the time, s, and a short description of each event in the log, for a picture.
 pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
     groups(timeline)
         .iter()
@@ -355,48 +363,52 @@ pub fn words(timeline: &[MomentReport]) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// New view of the chain. All times are virtual time since the start, s.
+/// New view (membership of the chain) and the times of its formation. Times are s since the start.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecoveryReport {
-    /// Number of the view.
+    /// Number of the view (membership of the chain).
     pub view: u32,
-    /// Number of relays in the view.
+    /// Number of relays in the view (membership of the chain).
     pub relays: u16,
-    /// Relays of the previous view that left.
+    /// Relays of the previous view (membership of the chain) that are not in this one, by number from 1.
     pub lost: Vec<u16>,
-    /// Relays that joined or returned.
+    /// Relays in this view (membership of the chain) that were not in the previous one, by number from 1.
     pub back: Vec<u16>,
     /// Version of an uploaded mission that is first flown in this view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// Start of that upload.
+    /// Time when the upload of that mission began, s; absent without an upload.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offered_s: Option<f64>,
-    /// Time of the cause: the first failure, reboot, partition or reunion of those relays.
+    /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
+    ///
+    /// It is the first such event that concerns a lost or joined relay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
-    /// Time of its first detection by a neighbour.
+    /// Time when a neighbour first detected that a relay was lost or had returned, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detected_s: Option<f64>,
-    /// Time when all its relays had accepted the view.
+    /// Time when the last of its relays accepted the view (membership of the chain), s.
     pub formed_s: f64,
-    /// Time when all its relays held their new positions; absent if another view came first.
+    /// Time when all relays of the view had new positions, s; absent if another view came first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged_s: Option<f64>,
-    /// Sweeps from the detection, or the start of the upload, to convergence, including view requests.
+    /// Number of passes and view proposals from the detection, or from the upload, to convergence.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweeps: Option<u32>,
 }
 
-/// View that all its relays have accepted.
+/// View (membership of the chain) that all its relays have accepted, as found in the log.
 struct View {
     number: u32,
     members: BTreeSet<u16>,
-    /// Log indices of its first and last acceptance.
+    /// Indices in the log of the first and the last relay's acceptance of the view.
     span: (usize, usize),
 }
 
-/// Reports the new views of a run of `relays` relays, in order.
+/// Finds all complete views (memberships of the chain) in the log of a run of `relays` relays.
 pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport> {
     let views = views(moments);
     let mut before: BTreeSet<u16> = (1..=relays).collect();
@@ -461,7 +473,7 @@ fn views(moments: &[Moment]) -> Vec<View> {
     whole.map(|(_, view)| view).collect()
 }
 
-/// Returns the newest uploaded mission that a relay of `view` adopted with it.
+/// Returns the version of the newest mission that relays of `view` adopted before or with it.
 fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
     // A relay logs the adoption right after the view.
     let story = moments.get(..=view.span.1 + 1).unwrap_or(moments);
@@ -478,7 +490,9 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
         .find(|moment| moment.what == TimelineEvent::Offered(version))
 }
 
-/// Returns the time of the first event that removed relays of `lost` or brought back relays of `back`.
+/// Returns the time of the event that caused the loss or the return of relays, `lost` and `back`.
+///
+/// For each relay it is the latest such event in `earlier`, and the result is the first of these times.
 fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {
@@ -496,7 +510,9 @@ fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     gone.into_iter().chain(come).min()
 }
 
-/// Returns the first detection of a lost or returned relay.
+/// Returns the first log entry in which a relay detects the loss or return of another one.
+///
+/// `lost` and `back` are the numbers of lost and returned relays.
 fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
     earlier.iter().find(|moment| match moment.what {
         TimelineEvent::Lost(_) => moment.other.is_some_and(|other| lost.contains(&other)),
@@ -507,7 +523,7 @@ fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a
     })
 }
 
-/// Returns the last convergence among `members`, if all have converged.
+/// Returns the last entry in which one of `members` accepts a position. `None` unless all accept one.
 fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed = |moment: &&Moment| {
         moment.what == TimelineEvent::Converged && members.contains(&moment.relay)
@@ -521,7 +537,9 @@ fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Mom
     later.iter().rfind(placed).filter(|_| all)
 }
 
-/// Returns the number of sweeps that `members` began during `span`, by the sweep counts in the log.
+/// Returns the number of passes and view proposals that `members` began during `span`.
+///
+/// A pass is a message that relays forward along the whole chain.
 fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant)) -> u32 {
     let begun = |relay: u16, by: Instant| {
         let mut story = moments.iter().rev();
@@ -535,7 +553,7 @@ fn sweeps(moments: &[Moment], members: &BTreeSet<u16>, span: (Instant, Instant))
         .sum()
 }
 
-/// Formats a line per view with lost or returned relays or a new mission; other views are only counted.
+/// Formats a line for each view with lost or returned relays or a new mission. Other views are only counted.
 pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
     let mut text = String::new();
     let mut same = 0;

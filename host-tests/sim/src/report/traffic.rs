@@ -7,111 +7,121 @@ use serde::Serialize;
 use crate::simulator::route::{ChainState, Period, Ps, SECOND};
 use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec, quantile_s};
 
-/// Number of periods in the text at its start and at its end.
+/// Number of periods that remain at the start of a shortened text, and at its end.
 const ENDS: usize = 10;
 
-/// Number of queues up to which the text lists all; of more, it lists half as many.
+/// Largest number of queues that the text lists completely. Of more, it lists the 8 longest.
 const SHOWN: usize = 16;
 
-/// Traffic of a run. Arrays have the way to Rx first and then, if data goes both ways, the way back.
+/// Data traffic of a run. Arrays have the direction to Rx first and then, if used, that back to Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficReport {
-    /// Data rates at the positions of the first agreement by the planner's formula, bit/s.
+    /// Data rates at the positions of the first agreement, bit/s, for each direction. The planner's formula gives
+    /// them.
     pub promised_bps: Vec<f64>,
-    /// Offered data rates, bit/s.
+    /// Data rates of the packets that the sources created, bit/s, for each direction.
     pub offered_bps: Vec<f64>,
-    /// Delivered data rates from the first agreement to the end, bit/s.
+    /// Data rates of the packets that arrived since the first agreement, bit/s, for each direction.
     pub delivered_bps: Vec<f64>,
-    /// Details.
+    /// Details of the traffic: its parameters, packets, delays and queues.
     pub traffic: TrafficDetails,
 }
 
-/// Details of the traffic.
+/// Details of the data traffic of a run: its parameters, packets, delays and queues.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficDetails {
-    /// Access of the hops to the radio, as in the file.
+    /// Medium access, by its name in scenario files: `slots`, `channels` or `fitted`.
     pub access: &'static str,
-    /// Bandwidth of one frequency, Hz.
+    /// Bandwidth of one frequency of the data link, Hz.
     pub bandwidth_hz: f64,
-    /// Size of a packet, bytes.
+    /// Size of a data packet, bytes.
     pub packet_bytes: f64,
-    /// Largest number of packets in a queue.
+    /// Largest number of packets in the queue of a node.
     pub queue_packets: usize,
-    /// Start, s of virtual time.
+    /// Start of the traffic, s of virtual time.
     pub from_s: f64,
-    /// Latest end of a direction, s of virtual time.
+    /// End of the traffic in the direction that ends last, s of virtual time.
     pub until_s: f64,
-    /// Each direction.
+    /// Traffic in each direction: to Rx and, if data goes both ways, back to Tx.
     pub flows: Vec<FlowReport>,
-    /// Times in which the view, the state of the chain and the promised rate did not change.
+    /// Periods in which the view, the state of the chain and the promised data rates did not change.
     pub periods: Vec<PeriodReport>,
-    /// Description of the access to the radio.
+    /// Text that says how the hops share frequencies and time.
     #[serde(skip)]
     sharing: String,
 }
 
-/// Traffic in one direction.
+/// Data traffic of a run in one direction.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FlowReport {
-    /// `forward`, from Tx to Rx, or `backward`.
+    /// Direction of the traffic: `forward` is from Tx to Rx, `backward` from Rx to Tx.
     pub direction: &'static str,
-    /// End of its traffic, s of virtual time.
+    /// End of the traffic in this direction, s of virtual time.
     pub until_s: f64,
-    /// Packets of the source.
+    /// Number of packets that the source created.
     pub offered_packets: u64,
-    /// Packets that arrived.
+    /// Number of packets that arrived at the other end of the chain.
     pub delivered_packets: u64,
-    /// Packets dropped by full queues.
+    /// Number of packets that were dropped because a queue was full.
     pub dropped_packets: u64,
-    /// Packets in the queues of relays that went silent.
+    /// Number of packets that were lost in the queues of relays that went silent.
     pub lost_packets: u64,
-    /// Packets in queues at the end.
+    /// Number of packets that are still in queues at the end of the traffic.
     pub queued_packets: u64,
-    /// Median delay of the packets that arrived, s.
+    /// Median delay from end to end of the packets that arrived, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_median_s: Option<f64>,
-    /// Delay that 99 % of them do not exceed, s.
+    /// Delay from end to end that 99 % of the packets that arrived do not exceed, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_99_s: Option<f64>,
-    /// Queue of every node that sends, from Tx to Rx.
+    /// Queue of every node that sends, in order from Tx to Rx.
     pub queues: Vec<QueueReport>,
 }
 
-/// Queue of a node, with the packet that is being sent.
+/// Packet queue of a node. It includes the packet that is being sent.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct QueueReport {
-    /// `Tx`, `Rx`, or the number of the relay.
+    /// Node of the queue: `Tx`, `Rx`, or the number of the relay.
     pub node: String,
-    /// Mean length over time, packets.
+    /// Mean length of the queue over the time of the traffic, packets.
     pub mean_packets: f64,
-    /// Largest length, packets.
+    /// Largest length of the queue, packets.
     pub most_packets: usize,
 }
 
-/// Traffic of a period. Arrays are as in [`TrafficReport`].
+/// Data traffic of a period in which the chain does not change.
+///
+/// Arrays have the direction to Rx first and then, if used, that back to Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PeriodReport {
-    /// Start, s of virtual time.
+    /// Start of the period, s of virtual time.
     pub from_s: f64,
-    /// End, s of virtual time.
+    /// End of the period, s of virtual time.
     pub until_s: f64,
-    /// Number of the view.
+    /// Number of the view (membership of the chain) in this period.
     pub view: u32,
-    /// Number of relays of the view.
+    /// Number of relays in the view (membership of the chain).
     pub relays: u16,
-    /// `agreed`; `pending`: no agreement yet, or drones on their way; `broken`: a relay is missing.
+    /// State of the chain: `agreed`, `pending` or `broken`.
+    ///
+    /// `agreed`: the relays are at agreed positions. `pending`: there is no agreement yet, or drones are on their
+    /// way. `broken`: a relay is missing.
     pub state: &'static str,
-    /// Data rates at the agreed positions, bit/s; absent unless the state is `agreed`.
+    /// Data rates at the agreed positions, bit/s, for each direction; absent unless the state is `agreed`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub promised_bps: Vec<f64>,
-    /// Data rates of the packets that arrived in this time, bit/s.
+    /// Data rates of the packets that arrived in this period, bit/s, for each direction.
     pub delivered_bps: Vec<f64>,
-    /// Packets dropped or lost in this time.
+    /// Number of packets dropped or lost in this period, for each direction.
     pub missing_packets: Vec<u64>,
-    /// Median delays of the packets that arrived in this time, s; absent if none arrived.
+    /// Median delays of the packets that arrived in this period, s, for each direction.
+    ///
+    /// Absent if none arrived in one of the directions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub delay_median_s: Vec<f64>,
-    /// Delays that 99 % of them do not exceed, s.
+    /// Delays that 99 % of the packets that arrived in this period do not exceed, s, for each direction.
+    ///
+    /// Absent if none arrived in one of the directions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub delay_99_s: Vec<f64>,
 }
@@ -123,7 +133,7 @@ fn seconds(at: Ps) -> f64 {
 }
 
 impl TrafficReport {
-    /// Creates the report of `traffic`.
+    /// Creates the report of the simulated traffic `traffic`, whose parameters are `spec`.
     pub fn new(spec: &TrafficSpec, traffic: &Traffic) -> Self {
         let each = |of: fn(&Flow) -> f64| traffic.flows.iter().map(of).collect();
         let nodes = traffic.flows.first().map_or(0, |flow| flow.queues.len());
@@ -157,7 +167,7 @@ impl TrafficReport {
         }
     }
 
-    /// Formats the report as lines of text.
+    /// Formats the report of the traffic as lines of text.
     pub(super) fn text(&self) -> String {
         let TrafficDetails {
             packet_bytes,
@@ -344,17 +354,17 @@ impl PeriodReport {
     }
 }
 
-/// Formats a data rate in Mbit/s with four digits.
+/// Formats a data rate, bit/s, as a number of Mbit/s with four significant digits.
 fn mega(bps: f64) -> String {
     rounded(bps / 1e6)
 }
 
-/// Formats a time in ms with four digits.
+/// Formats a time, s, as a number of ms with four significant digits.
 fn milli(seconds: f64) -> String {
     rounded(seconds * 1e3)
 }
 
-/// Formats a number with four significant digits; small numbers have an exponent.
+/// Formats a number with four significant digits. Numbers below 0.001 have an exponent.
 fn rounded(value: f64) -> String {
     if !(value > 0.0) {
         return "0".to_owned();

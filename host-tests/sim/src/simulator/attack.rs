@@ -18,38 +18,42 @@ pub(super) use uav_relay_scenario::deployment::NETWORK;
 
 use super::faults::LinkSpec;
 
-/// Attack plan. Half of the frames are sent back to back from the start, the others at random times.
+/// Numbers of frames of an attack, and its end. The attacker does not know the network key.
+///
+/// It sends half of the frames back to back from the start of the run, and the others at random times.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Attack {
-    /// Number of forged frames.
+    /// Number of forged frames that the attacker sends.
     pub forged: u32,
-    /// Number of replayed frames.
+    /// Number of recorded frames that the attacker sends again.
     pub replayed: u32,
-    /// Time of the last frame; back-to-back frames may end slightly later.
+    /// Time of the last frame of the attack; frames that are sent back to back may end slightly later.
     pub until: Instant,
 }
 
-/// Kind of an attacker's frame.
+/// Kind of a frame that the attacker sends.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum AttackKind {
-    /// A forged frame.
+    /// A frame that the attacker made or changed.
     Forge,
-    /// A received frame, sent again.
+    /// A recorded frame of a relay, sent again without a change.
     Replay,
 }
 
 /// Counts of the attacker's frames by how the receiving relays classified them.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Struck {
-    /// Frames by kind and by the name of the counter in [`Stats`]. `received` counts frames accepted as a neighbour's.
+    /// Number of frames by kind, and by the counter in [`Stats`] that each incremented at its receiver.
+    ///
+    /// The counter `received` means that the receiver accepted the frame as one of a neighbour.
     pub counted: BTreeMap<(AttackKind, &'static str), u64>,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Recorded {
-    /// Arrival time at the intended receiver; sending it earlier would not be a replay.
+    /// Time when the recorded frame arrives at its receiver. To send it again earlier would be no replay.
     pub(super) arrived: Instant,
-    /// Port at which the receiver gets it.
+    /// Port at which the receiver gets the recorded frame.
     pub(super) port: Port,
     pub(super) bytes: Vec<u8>,
 }
@@ -57,17 +61,17 @@ pub(super) struct Recorded {
 #[derive(Debug)]
 pub(super) struct Attacker {
     pub(super) attack: Attack,
-    /// Separate generator, so that the attacker's draws do not change those of relays and links.
+    /// Random-number generator of the attacker. Its draws do not change those of relays and links.
     pub(super) rng: ChaCha8Rng,
     recorded: VecDeque<Recorded>,
 }
 
 const ATTACKER: u64 = 2;
 
-/// Largest number of recorded frames; older ones are discarded.
+/// Largest number of frames that the attacker records; it discards the oldest.
 const MEMORY: usize = 65_536;
 
-/// Random picks before the search for an arrived frame is given up.
+/// Number of recorded frames that the attacker picks at random before it gives up. It needs one that has arrived.
 const TRIES: usize = 64;
 
 impl Attacker {
@@ -81,7 +85,9 @@ impl Attacker {
         }
     }
 
-    /// Returns the time and the kind of every frame of the attack, unsorted.
+    /// Draws the time and the kind of every frame of the attack. The list is not sorted by time.
+    ///
+    /// Frames that are sent back to back take the time of the longest message on `link` each.
     pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, AttackKind)> {
         let Attack {
             forged,
@@ -114,7 +120,7 @@ impl Attacker {
         self.recorded.push_back(frame);
     }
 
-    /// Returns a random recorded frame that has arrived before `now`; `None` if [`TRIES`] picks find none.
+    /// Returns a random recorded frame that arrived before `now`; `None` if [`TRIES`] picks find none.
     pub(super) fn recall(&mut self, now: Instant) -> Option<Recorded> {
         if self.recorded.is_empty() {
             return None;
@@ -130,7 +136,9 @@ impl Attacker {
     }
 }
 
-/// Returns the name of the first counter that grew from `before` to `after`.
+/// Returns the name of the first counter that a frame has increased from `before` to `after`.
+///
+/// It tells how the receiver classified the frame.
 pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {
     type Counter = (&'static str, fn(&Stats) -> u32);
     // A received but rejected frame increments two counters; the reason for the rejection comes first.
@@ -158,7 +166,7 @@ pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {
         .map_or("oversized", |(name, _)| name)
 }
 
-/// Header flags: a tag follows; the body is a handshake.
+/// Flag in the header of a frame with a tag (signature). The flag [`HELLO`] marks a handshake.
 const SIGNED: u8 = 0x10;
 const HELLO: u8 = 0x20;
 
@@ -173,10 +181,10 @@ pub(super) struct Way {
     pub(super) to: u16,
 }
 
-/// Returns a frame forged by a random method.
+/// Returns a frame forged by a random method. `heard` is a recorded frame, if there is one.
 ///
-/// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a valid CRC,
-/// handshake with a guessed tag, handshake of a relay with another key.
+/// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a
+/// valid CRC, handshake with a guessed tag, handshake of a relay with another key.
 pub(super) fn forge(
     mission: &Mission,
     way: Way,
@@ -202,7 +210,7 @@ pub(super) fn forge(
     }
 }
 
-/// Changes one byte after the header's first eight: of the counter, the body or the tag.
+/// Changes one random byte of a frame after the first eight: in the frame counter, the body or the tag.
 fn altered(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(HEADER - 2..plain.len().max(HEADER));
     if let Some(byte) = plain.get_mut(at) {
@@ -211,13 +219,17 @@ fn altered(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     plain
 }
 
-/// Returns a well-formed, untagged false message: a twisted recorded pass or a new message.
+/// Returns a false message, well-formed and without a tag.
+///
+/// It is a changed copy of the recorded frame `heard` if that is suitable, and otherwise made up.
 fn lie(mission: &Mission, way: Way, heard: Option<Vec<u8>>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let twisted = heard.and_then(|plain| twisted(plain, rng));
     twisted.unwrap_or_else(|| made_up(mission, way, rng))
 }
 
-/// Returns a recorded pass or reply with false values and a similar number; `None` for other messages.
+/// Returns a copy of a recorded frame with false values and the same or a slightly higher number.
+///
+/// `None` unless the frame is a message that relays pass along the whole chain, or a reply to one.
 fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let whole = with_check(plain);
     let (header, message) = frame::decode(&whole).ok()?;
@@ -256,7 +268,7 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     Some(frame.get(..len)?.to_vec())
 }
 
-/// Returns a false message that needs no recorded frame.
+/// Returns a frame with a false message that the attacker makes up without a recorded frame.
 fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
     let mission_id = MissionId { version: 0, digest };
@@ -327,7 +339,9 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     frame.get(..len).unwrap_or_default().to_vec()
 }
 
-/// Returns a forged upload with a newer version and another interferer. `None` in a field, which has no uploads.
+/// Returns a forged upload: a newer mission with another interferer.
+///
+/// `None` unless the mission has an interferer, as missions with a random field cannot be uploaded.
 fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     let config = mission.config();
     let at = mission.interferer()?;
@@ -343,7 +357,7 @@ fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     Upload::new(mission, rng.random_range(1..=3), config).ok()
 }
 
-/// Returns a handshake with random nonces and tag.
+/// Returns a handshake with random nonces and a random tag.
 fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut plain = unsealed(&made_up(mission, way, rng)).unwrap_or_default();
     plain.truncate(HEADER);
@@ -357,7 +371,7 @@ fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u
     sealed(plain)
 }
 
-/// Returns the first handshake of a relay with another key; empty in a chain of one relay.
+/// Returns the handshake of a relay that starts with a random key; empty in a chain of one relay.
 fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>, SetupError> {
     let settings = Settings {
         wiring: Wiring::Shared,
@@ -382,7 +396,7 @@ fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>
     Ok(said)
 }
 
-/// Returns the destination node of a frame; `None` for an invalid frame.
+/// Returns the number of the node to which a frame is addressed; `None` for an invalid frame.
 pub(super) fn destination(bytes: &[u8]) -> Option<u16> {
     let plain = unsealed(bytes)?;
     let [_, _, low, high, ..] = *plain.first_chunk::<HEADER>()?;
@@ -404,7 +418,7 @@ fn flag(plain: &mut [u8], flags: u8) {
     }
 }
 
-/// Removes COBS and the CRC; `None` for an invalid frame.
+/// Decodes a frame from COBS and removes its CRC; `None` for an invalid frame.
 fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut deframer = Deframer::new();
     for &byte in bytes {
@@ -418,7 +432,7 @@ fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
     None
 }
 
-/// Appends the CRC, encodes with COBS and appends the delimiter. Accepts at most 249 bytes.
+/// Appends the CRC to a frame, encodes it with COBS and appends the delimiter. Accepts at most 249 bytes.
 fn sealed(plain: Vec<u8>) -> Vec<u8> {
     let plain = with_check(plain);
     let mut bytes = Vec::with_capacity(plain.len() + 2);

@@ -30,11 +30,11 @@ use fleet::LANDS_AFTER;
 use ground::{Station, stations};
 use judge::Touched;
 
-/// Limit on the events of a run: some minutes of computing.
+/// Largest number of events in a run, which takes some minutes to compute. It ends runs that never settle.
 const MOST_HAPPENINGS: u64 = 400_000_000;
 
 impl Chain {
-    /// Switches every relay on at time 0.
+    /// Creates a simulated chain of the setup's relays and switches all of them on at time 0.
     ///
     /// # Errors
     /// [`SetupError`] if a relay rejects its profile or settings.
@@ -42,12 +42,14 @@ impl Chain {
         Self::begin(setup, |other| run(other).ok())
     }
 
-    /// Returns the number of sweeps begun and the virtual time.
+    /// Returns the number of passes and view proposals that relays began, and the virtual time.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     pub fn progress(&self) -> (u32, Instant) {
         (self.sweeps(), self.now)
     }
 
-    /// Processes up to `happenings` events. Returns true if the run has ended.
+    /// Processes at most `happenings` events. Returns true if the run has ended.
     pub fn step(&mut self, happenings: u64) -> bool {
         for _ in 0..happenings {
             if let Some(ending) = self.ending() {
@@ -70,7 +72,9 @@ impl Chain {
         false
     }
 
-    /// Feeds `samples` interference samples to every living relay that has a setpoint. `draw` returns one, W, for a position.
+    /// Passes `samples` interference samples to every living relay that has a setpoint.
+    ///
+    /// `draw` returns a random sample, W, at a position.
     pub fn measure(
         &mut self,
         samples: u32,
@@ -101,7 +105,7 @@ impl Chain {
             .collect()
     }
 
-    /// Restarts planning at the leader.
+    /// Makes the leader compute the relays' positions again, with the measurements made so far.
     pub fn restart(&mut self) {
         let now = self.now;
         self.holding = 0;
@@ -112,13 +116,13 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Runs to the end.
+    /// Processes all events to the end of the run and returns its outcome.
     pub fn run(mut self) -> Outcome {
         while !self.step(u64::MAX) {}
         self.finish()
     }
 
-    /// Ends the run and returns its outcome.
+    /// Ends the run now and returns its outcome.
     pub fn finish(mut self) -> Outcome {
         self.outcome.ended = self.now;
         self.outcome.sweeps = self.progress().0;
@@ -182,7 +186,7 @@ impl Chain {
         }
     }
 
-    /// Handles an event of relay `index` (from 0).
+    /// Processes an event that concerns only relay `index` (from 0), such as received bytes or a timer.
     fn happen_to(&mut self, index: usize, happening: QueuedEvent) {
         let now = self.now;
         let Some(member) = self.members.get_mut(index) else {
@@ -240,7 +244,7 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Sends the relay's pending frames, handles its events, and schedules its next wake-up.
+    /// Sends the pending frames of relay `index` (from 0), logs its events, and schedules its next timer.
     fn drain(&mut self, index: usize) {
         let now = self.now;
         let mut frame = [0; MAX_FRAME];
@@ -275,7 +279,7 @@ impl Chain {
     }
 }
 
-/// Runs `setup` to the end.
+/// Simulates a run of `setup` to its end and returns its outcome.
 ///
 /// # Errors
 /// [`SetupError`] if a relay rejects its profile or settings.
@@ -286,32 +290,34 @@ pub fn run(setup: Setup) -> Result<Outcome, SetupError> {
 #[derive(Debug)]
 struct Member {
     relay: Relay,
-    /// Relay number in the mission, from 1.
+    /// Number of the relay in the mission, from 1.
     node: u16,
-    /// Transmit lines: toward Tx (or shared), toward Rx.
+    /// Outgoing serial lines of the relay: first toward Tx, or to a shared channel, then toward Rx.
     lines: [Line; 2],
     killed: Option<Instant>,
-    /// True if the relay controlled its drone at the last time step.
+    /// True if the relay controlled its drone at the last time step of the flight.
     lent: bool,
     starts: u32,
-    /// Sweeps begun before the last start.
+    /// Number of passes and view proposals that the relay began before its last start.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     swept: u32,
     stored: Option<Upload>,
-    /// Stored view record, if the relay has voted.
+    /// Stored record of the relay's votes on views, which survives a reboot; `None` before its first vote.
     record: Option<ViewRecord>,
-    /// Last setpoint that passed the limit check.
+    /// Last setpoint that was within its limits, so that it is not checked again.
     safe: Option<Placement>,
-    /// Least and greatest setpoint coordinates since the drone was engaged.
+    /// Smallest and largest coordinates of the relay's setpoints since it last had none.
     been: Option<[Placement; 2]>,
-    /// Position of the last measurement.
+    /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
-    /// Last filmed state: on or off, and the setpoint.
+    /// State last recorded for the animation: true if the relay was on, and its setpoint.
     filmed: Option<(bool, Option<Placement>)>,
-    /// Time of the valid wake-up in the queue, the earliest; others are ignored.
+    /// Earliest time of a queued timer event of the relay. Timer events at other times are ignored.
     wake: Option<Instant>,
 }
 
-/// Simulated chain during a run.
+/// Simulated chain during a run: relays, links and drones on a virtual clock.
 #[derive(Debug)]
 pub struct Chain {
     setup: Setup,
@@ -321,9 +327,11 @@ pub struct Chain {
     outcome: Outcome,
     now: Instant,
     happenings: u64,
-    /// Number of `Converged` events of this relay.
+    /// Number of positions that relays have accepted since the start, or since planning was restarted.
     holding: usize,
-    /// Planned kills, boots, partitions, uploads and attacker frames that are still pending.
+    /// Number of planned events in the queue, such as failures, reboots, uploads and attacker frames.
+    ///
+    /// The run does not settle before all of them have happened.
     ahead: usize,
     stations: Vec<Station>,
     attacker: Option<Attacker>,
@@ -334,27 +342,29 @@ pub struct Chain {
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     medium: Option<Medium>,
     bursts: Option<Bursts>,
-    /// Setpoints of the last agreement.
+    /// Setpoints of all relays at the last agreement; `None` before the first one.
     agreed: Option<Vec<Placement>>,
     agreements: u32,
-    /// True after the last measurement.
+    /// True once the relays have made the last measurement of the interference.
     listened: bool,
-    /// Statistics, for soaks and shared channels.
+    /// Statistics of the availability; `None` unless the run has a fixed end or a shared channel.
     watch: Option<Watch>,
     record: Option<Record>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Start {
-    /// Relay number, from 1.
+    /// Number of the relay that starts, from 1.
     index: u16,
-    /// Number of the start, from 1.
+    /// Number of this start of the relay, from 1. With signed frames it is also the epoch.
     number: u32,
     seed: u32,
     now: Instant,
 }
 
-/// Creates a relay and restores its persistent state.
+/// Creates a relay that is switched on, and restores what it stored before: `stored` and `record`.
+///
+/// `stored` is an uploaded mission, `record` the record of its votes on views.
 fn switched_on(
     setup: &Setup,
     start: Start,
@@ -392,7 +402,9 @@ fn switched_on(
 }
 
 impl Chain {
-    /// Switches every relay on at time 0. `run` computes the reference positions if the run is watched.
+    /// Creates the chain of `setup` and switches all relays on at time 0.
+    ///
+    /// `run` simulates a chain without faults. The statistics use it to judge the positions of this chain.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -503,7 +515,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
     Ok(members)
 }
 
-/// Schedules the events of drones with autopilots and returns their number.
+/// Queues the restarts of autopilots and the landings of drones that a pilot keeps. Returns their number.
 fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     let Some(fleet) = &setup.fleet else {
         return 0;
@@ -526,46 +538,48 @@ fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     fleet.restarts.len() + kept.count()
 }
 
-/// Event of a relay or of the whole run.
+/// Kind of an event in the queue of a run, about one relay or the whole chain.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum QueuedEvent {
     /// Bytes arrive at the relay.
     Bytes {
-        /// Receiving port.
+        /// Port of the relay at which the bytes arrive.
         port: Port,
-        /// Received bytes.
+        /// Bytes that arrive at the relay.
         bytes: Vec<u8>,
     },
     /// The relay's timer expires.
     Wake,
     /// Bytes arrive at a ground station.
     Heard {
-        /// Received bytes.
+        /// Bytes that arrive at the ground station.
         bytes: Vec<u8>,
     },
     /// A ground station's timer expires.
     Ask,
-    /// An upload begins; the relay index is the upload's number.
+    /// A ground station begins an upload. The event's relay index is the upload's index in the setup.
     Upload,
-    /// Time step of all drones.
+    /// A time step of the drones' flight.
     Fly,
     /// The autopilot of the relay's drone restarts.
     Restart,
-    /// The relay goes silent.
+    /// The relay is switched off: it neither sends nor receives.
     Kill,
     /// The relay is switched on again.
     Boot,
     /// A partition or a one-way link failure begins or ends.
     Part,
-    /// An event of the shared channel; the relay index is unused.
+    /// A radio on the shared channel reaches its next step, such as the end of a frame.
+    ///
+    /// The event's relay index is unused.
     Air(AirEvent),
-    /// Interference measurement of all relays.
+    /// Measurement of the interference by every relay at its position.
     Listen,
     /// The attacker sends a frame to a relay.
     AttackKind(AttackKind),
 }
 
-/// Queued event. Events of the same time keep their order of insertion.
+/// Event in the queue, with its time and relay. Events of the same time keep their order of insertion.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Entry {
     at: Instant,
@@ -586,7 +600,7 @@ impl PartialOrd for Entry {
     }
 }
 
-/// Pending events.
+/// Queue of pending events, sorted by time.
 #[derive(Debug, Default)]
 pub struct Queue {
     entries: BinaryHeap<Reverse<Entry>>,
@@ -594,7 +608,7 @@ pub struct Queue {
 }
 
 impl Queue {
-    /// Schedules `happening` for `relay` (from 0) at `at`.
+    /// Adds the event `happening` of relay `relay` (from 0) at the time `at`.
     pub fn put(&mut self, at: Instant, relay: usize, happening: QueuedEvent) {
         self.entries.push(Reverse(Entry {
             at,
@@ -605,14 +619,16 @@ impl Queue {
         self.order += 1;
     }
 
-    /// Removes the next event and returns its time, relay and kind.
+    /// Removes the earliest event and returns its time, relay (from 0) and kind; `None` if there is none.
     pub fn take(&mut self) -> Option<(Instant, usize, QueuedEvent)> {
         let Reverse(entry) = self.entries.pop()?;
         Some((entry.at, entry.relay, entry.happening))
     }
 }
 
-/// Runs `setup` with each of `seeds` on all cores and maps each outcome with `of`. The results keep the order of the seeds.
+/// Simulates `setup` with each of `seeds`, on all cores, and returns `of(seed, outcome)` of each run.
+///
+/// The results are in the order of the seeds.
 ///
 /// # Errors
 /// [`SetupError`] if a relay rejects its profile or settings.

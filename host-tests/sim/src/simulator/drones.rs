@@ -6,10 +6,10 @@ use uav_relay::{Duration, Instant, Placement};
 
 use uav_relay_scenario::number::narrow;
 
-/// Position: x, y and altitude, m.
+/// Position along the line from Tx to Rx, to its right, and above the ground, m.
 pub type Point = [f64; 3];
 
-/// Returns the coordinates of a placement.
+/// Converts a relay's placement to a position in f64.
 pub fn point(place: Placement) -> Point {
     [place.x_m, place.y_m, place.altitude_m].map(f64::from)
 }
@@ -23,30 +23,32 @@ pub(super) fn placement(at: Point) -> Placement {
     }
 }
 
-/// Random-number stream of the position errors.
+/// Random-number stream of the drones' position errors.
 const ERRORS: u64 = 2;
 
-/// Flight parameters of the drones.
+/// Parameters of simple drones, which fly to their setpoints without an autopilot.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FlightSpec {
     /// Initial hover position of each drone: x, y and altitude, m.
     pub start: Vec<Point>,
-    /// Speed limit of each drone per axis, m/s, above 0.
+    /// Largest speed of each drone per axis, m/s, above 0.
     pub speed_mps: Vec<f64>,
-    /// Acceleration limit per axis, m/s^2, above 0; infinite for instant changes of speed.
+    /// Largest acceleration of each drone per axis, m/s^2, above 0. Infinite for instant changes of speed.
     pub acceleration_mps2: f64,
     /// Bound on each drone's constant position error per axis, m.
     pub bias_m: f64,
     /// Bound on the additional error of each position report per axis, m.
     pub noise_m: f64,
-    /// Simulation time step.
+    /// Time step of the flight simulation.
     pub step: Duration,
-    /// Time steps between two position reports, at least 1.
+    /// Number of time steps between two position reports, at least 1.
     pub report_steps: u32,
 }
 
 impl FlightSpec {
-    /// Drones with unlimited acceleration and exact positions, reported at each time step.
+    /// Creates the parameters of drones with unlimited acceleration and exact positions.
+    ///
+    /// They report their positions at each time step.
     pub fn exact(start: Vec<Point>, speed_mps: Vec<f64>, step: Duration) -> Self {
         Self {
             start,
@@ -59,7 +61,7 @@ impl FlightSpec {
         }
     }
 
-    /// Drones with 10 m/s and 3 m/s^2 that report their positions five times per second.
+    /// Creates the parameters of drones with 10 m/s and 3 m/s^2. They report their positions five times a second.
     pub fn multicopters(start: Vec<Point>, bias_m: f64, noise_m: f64) -> Self {
         Self {
             speed_mps: vec![10.0; start.len()],
@@ -72,17 +74,17 @@ impl FlightSpec {
     }
 }
 
-/// Point mass with per-axis speed and acceleration limits that stops at its goal.
+/// Point mass that flies to a goal and stops there, with limited speed and acceleration per axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
-    /// Position, m.
+    /// True position of the body, m.
     pub at: Point,
-    /// Velocity, m/s.
+    /// Velocity of the body, m/s.
     pub velocity_mps: Point,
 }
 
 impl Body {
-    /// Body at rest at `at`.
+    /// Creates a body at rest at the position `at`.
     pub const fn hovering(at: Point) -> Self {
         Self {
             at,
@@ -98,7 +100,7 @@ impl Body {
         sum(self.at, braked)
     }
 
-    /// Flies toward `goal` for `step_s` seconds.
+    /// Moves the body toward `goal` for `step_s` seconds, within its limits of speed and acceleration.
     pub fn fly(&mut self, goal: Point, speed_mps: f64, acceleration_mps2: f64, step_s: f64) {
         let axes = self.at.iter_mut().zip(&mut self.velocity_mps);
         for ((at, velocity), goal) in axes.zip(goal) {
@@ -121,10 +123,10 @@ impl Body {
     }
 }
 
-/// Closest approach of two drones.
+/// Closest approach of two drones: which two, how near, and when.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
-    /// Smallest distance, m.
+    /// Smallest distance of the two drones, m.
     pub apart_m: f64,
     /// Indices of the two drones, from 1.
     pub pair: [usize; 2],
@@ -133,7 +135,7 @@ pub struct Nearest {
 }
 
 impl Nearest {
-    /// Returns the closest pair of `places` at `now`; `None` for fewer than two.
+    /// Returns the two closest of `places` at `now`, and their distance; `None` for fewer than two.
     pub(super) fn of(places: &[Point], now: Instant) -> Option<Self> {
         let mut nearest: Option<Self> = None;
         for (one, at) in places.iter().enumerate() {
@@ -172,7 +174,7 @@ pub(super) struct Drone {
 }
 
 impl Drone {
-    /// Flies toward the goal for `step_s` seconds, using the drone's own position estimate.
+    /// Moves the drone toward its goal for `step_s` seconds. It navigates by its own position estimate.
     pub(super) fn fly(&mut self, step_s: f64) {
         let goal = sum(self.goal, self.bias.map(|part| -part));
         self.body
@@ -213,7 +215,7 @@ impl Flight {
         }
     }
 
-    /// Advances all drones by one time step. Returns true if positions are reported at its end.
+    /// Moves all drones for one time step. Returns true if they report their positions after it.
     pub(super) fn go_on(&mut self) -> bool {
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
         let step_s = self.step.as_micros() as f64 / 1e6;
@@ -224,7 +226,7 @@ impl Flight {
         self.steps.is_multiple_of(self.report_steps.max(1))
     }
 
-    /// Returns the reported position of drone `index` (from 0).
+    /// Returns the position that drone `index` (from 0) reports: the true position, its bias and noise, m.
     pub(super) fn reported(&mut self, index: usize) -> Option<Point> {
         let drone = self.drones.get(index)?;
         let noise = off(&mut self.rng, drone.noise_m);
@@ -237,7 +239,7 @@ impl Flight {
     }
 }
 
-/// Draws an error of at most `most_m` per axis.
+/// Draws a random position error of at most `most_m` metres per axis.
 fn off(rng: &mut ChaCha8Rng, most_m: f64) -> Point {
     [0; 3].map(|_| most_m * rng.random_range(-1.0..=1.0))
 }

@@ -7,43 +7,43 @@ use rand::RngExt;
 use uav_relay::wire::frame::MAX_SWEEP;
 use uav_relay::{Duration, Instant};
 
-/// Probability of each fault per frame, 0 to 0.9. Faults are independent: several may affect one frame.
+/// Probability of each fault of a frame, 0 to 0.9. Faults are independent: several may hit one frame.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
-    /// The frame never arrives.
+    /// Probability that a frame never arrives.
     pub loss: f64,
-    /// Frame corruption: one to eight bytes change; the delimiter may be among them.
+    /// Probability that one to eight bytes of a frame change. The delimiter may be among them.
     pub corrupt: f64,
-    /// The frame arrives twice.
+    /// Probability that a frame arrives twice.
     pub duplicate: f64,
-    /// The frame arrives so late that later frames may overtake it.
+    /// Probability that a frame arrives so late that later frames may overtake it.
     pub reorder: f64,
 }
 
-/// Counts of the injected faults.
+/// Counts of the frame faults that the simulated links caused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Injected {
-    /// Lost frames.
+    /// Number of frames that never arrived.
     pub lost: u64,
-    /// Corrupted frames.
+    /// Number of frames whose bytes were changed.
     pub corrupted: u64,
-    /// Duplicated frames.
+    /// Number of frames that arrived twice.
     pub duplicated: u64,
-    /// Delayed frames.
+    /// Number of frames that arrived late, so that later frames could overtake them.
     pub reordered: u64,
 }
 
 /// Arrival of a frame at a receiver.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Arrival {
-    /// Received bytes.
+    /// Bytes of the frame as received, with changes by faults.
     pub bytes: Vec<u8>,
-    /// Extra delay in frame times.
+    /// Delay of the frame by faults, in multiples of the time that the longest message takes for a hop.
     pub late: u64,
 }
 
 impl Faults {
-    /// High rates of all four faults at once.
+    /// Probabilities of a bad link: 30 % lost, 15 % corrupted, 10 % duplicated and 10 % delayed.
     pub const BAD_DAY: Self = Self {
         loss: 0.3,
         corrupt: 0.15,
@@ -51,12 +51,12 @@ impl Faults {
         reorder: 0.1,
     };
 
-    /// Returns true if all probabilities are 0.
+    /// Returns true if the probabilities of all faults are 0.
     pub fn none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Draws the faults of `frame`. Returns no, one or two arrivals.
+    /// Draws the faults of a frame, counts them in `injected`, and returns its arrivals: none, one or two.
     pub fn inject(
         &self,
         frame: &[u8],
@@ -103,22 +103,27 @@ impl Faults {
     }
 }
 
-/// Burst state of all links; each direction of a link is independent.
+/// Model of bursts of losses (Gilbert-Elliott): each direction of a link is in a good or a bad state.
+///
+/// A bad one loses all frames, a good one none.
 #[derive(Debug)]
 pub struct Bursts {
-    /// Mean share of lost frames, equal to the share of time in the bad state.
+    /// Mean fraction of lost frames. It equals the fraction of frames that find the link in the bad state.
     share: f64,
-    /// Probability per frame of the transition from good to bad.
+    /// Probability that a link in the good state is in the bad state for the next frame.
     worsens: f64,
-    /// Probability per frame of the transition from bad to good: the inverse of the mean burst length.
+    /// Probability that a link in the bad state is in the good state for the next frame.
+    ///
+    /// It is the inverse of the mean length of a burst, frames.
     heals: f64,
-    /// True for a bad link, by sender and receiver.
+    /// State of each link by its sending and receiving node: true if it is bad.
     bad: HashMap<(usize, usize), bool>,
 }
 
 impl Bursts {
-    /// Creates the model: a `share` of lost frames, 0 to 0.9, and a mean burst `length`. The length is at least
-    /// [`Bursts::shortest`].
+    /// Creates the model for a mean fraction `share` of lost frames, 0 to 0.9.
+    ///
+    /// The mean length of a burst is `length` frames, at least [`Bursts::shortest`].
     pub fn new(share: f64, length: f64) -> Self {
         let heals = 1.0 / length.max(1.0);
         Self {
@@ -129,12 +134,14 @@ impl Bursts {
         }
     }
 
-    /// Returns the mean burst length of independent losses with probability `share`. The model's lower limit.
+    /// Returns the mean number of successive losses if each frame is lost with the probability `share`.
+    ///
+    /// This is the smallest length that the model can have.
     pub fn shortest(share: f64) -> f64 {
         1.0 / (1.0 - share)
     }
 
-    /// Returns true if the link's next frame is lost.
+    /// Returns true if the next frame from node `from` to node `to` is lost.
     pub fn loses(&mut self, from: usize, to: usize, rng: &mut ChaCha8Rng) -> bool {
         let share = self.share;
         let Some(bad) = self.bad.get_mut(&(from, to)) else {
@@ -151,18 +158,18 @@ impl Bursts {
 /// Period in which relay `by` does not receive relay `of`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct OneWayFailure {
-    /// The relay that does not receive, from 1.
+    /// Number of the relay that does not receive the other one, from 1.
     pub by: u16,
-    /// The relay that is not received, from 1.
+    /// Number of the relay that is not received, from 1.
     pub of: u16,
-    /// Start time.
+    /// Start of the one-way link failure.
     pub from: Instant,
-    /// End time; `None` if the failure is permanent.
+    /// End of the one-way link failure; `None` if it is permanent.
     pub until: Option<Instant>,
 }
 
 impl OneWayFailure {
-    /// Returns true if this failure keeps `by` from receiving `of` at `now`.
+    /// Returns true if this failure keeps relay `by` from receiving relay `of` at the time `now`.
     pub fn applies(&self, by: u16, of: u16, now: Instant) -> bool {
         (self.by, self.of) == (by, of)
             && now >= self.from
@@ -170,17 +177,17 @@ impl OneWayFailure {
     }
 }
 
-/// Parameters of a link.
+/// Data rate and latency of a serial link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LinkSpec {
-    /// Bits per second, at least 300; a byte takes ten bits.
+    /// Data rate of the link, bit/s, at least 300. A byte takes ten bits.
     pub baud: u32,
-    /// Delay from the last bit sent to the last bit received.
+    /// Time from the sending of a bit to its arrival.
     pub latency: Duration,
 }
 
 impl Default for LinkSpec {
-    /// Returns 115 200 baud and a latency of 2 ms, as of a telemetry radio at short range.
+    /// Returns a link of 115 200 baud and 2 ms latency, as of a telemetry radio at short range.
     fn default() -> Self {
         Self {
             baud: 115_200,
@@ -190,27 +197,27 @@ impl Default for LinkSpec {
 }
 
 impl LinkSpec {
-    /// Returns the transmission time of `bytes` bytes.
+    /// Returns the time that the link needs to send `bytes` bytes, without its latency.
     pub fn line_time(&self, bytes: usize) -> Duration {
         let bits = 10_000_000_u64.saturating_mul(bytes as u64);
         Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
     }
 
-    /// Returns the longest time of a sweep message per hop, with 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain, with 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let frame = self.line_time(MAX_SWEEP).as_micros();
         Duration::from_micros(frame + self.latency.as_micros() + 1_000)
     }
 }
 
-/// Serial line with the time until which it is busy.
+/// Serial line that sends one frame after the other. It knows until when it is busy.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
     free: Instant,
 }
 
 impl Line {
-    /// Sends `bytes` bytes once the line is free. Returns the arrival time.
+    /// Sends a frame of `bytes` bytes as soon as the line is free. Returns the time of its arrival.
     pub fn send(&mut self, now: Instant, bytes: usize, spec: &LinkSpec) -> Instant {
         self.free = self.free.max(now) + spec.line_time(bytes);
         self.free + spec.latency

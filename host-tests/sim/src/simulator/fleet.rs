@@ -13,28 +13,34 @@ use super::drones::{Body, Point, placement, point, sum};
 /// Takeover of a drone by its pilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Takeover {
-    /// Relay number of the drone, from 1.
+    /// Number of the relay whose drone is taken over, from 1.
     pub relay: u16,
-    /// Start time.
+    /// Start of the takeover.
     pub from: Instant,
-    /// End time, if any: the pilot then hands the drone over once it hovers without traffic.
+    /// End of the takeover; `None` if it is permanent.
+    ///
+    /// The pilot then hands the drone over as soon as it hovers and no other drone moves near it.
     pub until: Option<Instant>,
-    /// Position to which the pilot flies, m along the run's line, to its right and up. `None` to climb in place.
+    /// Position to which the pilot flies the drone: along the run's line, to its right and up, m.
+    ///
+    /// `None` to climb in place.
     pub to: Option<Point>,
 }
 
-/// Parameters of all drones of a run.
+/// Parameters of all drones with autopilots in a run.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FleetSpec {
-    /// Line on earth along which they fly.
+    /// Geographic line from Tx to Rx along which the drones fly.
     pub axis: Axis,
-    /// Position of each drone's first hand-over, m along the line, to its right and up; it takes off below.
+    /// Position at which each pilot first hands the drone over: along the line, to its right and up, m.
+    ///
+    /// The drone takes off from the ground below.
     pub start: Vec<Point>,
-    /// Takeovers by pilots.
+    /// Takeovers of drones by their pilots.
     pub takeovers: Vec<Takeover>,
-    /// Restarts of autopilots in the air: relay number from 1, and time.
+    /// Restarts of autopilots in flight: the relay's number, from 1, and the time.
     pub restarts: Vec<(u16, Instant)>,
-    /// Standard deviation of the gusts, m/s.
+    /// Standard deviation of the gusts that move the drones, m/s per axis.
     pub gust_mps: f64,
     /// Bound on each drone's constant position error per axis, m.
     pub bias_m: f64,
@@ -43,7 +49,7 @@ pub struct FleetSpec {
 }
 
 impl FleetSpec {
-    /// Returns PX4 and ArduCopter for alternate drones.
+    /// Returns the autopilot of drone `index` (from 0): PX4 and ArduCopter in turn.
     const fn kind(index: usize) -> Kind {
         if index.is_multiple_of(2) {
             Kind::Px4
@@ -53,7 +59,9 @@ impl FleetSpec {
     }
 }
 
-/// Returns a line of the given length eastward from 47.4 N, 8.54 E, for scenarios without sites. `None` for an invalid length.
+/// Returns an arbitrary geographic line of `distance_m` metres, for scenarios without sites.
+///
+/// It leads eastward from 47.4 N, 8.54 E. `None` for a length that no line may have.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
     const TX: [f64; 2] = [47.4, 8.54];
     let tx = Geodetic::from_degrees(TX[0], TX[1], 420.0)?;
@@ -69,30 +77,34 @@ pub fn somewhere(distance_m: f64) -> Option<Axis> {
     line(east_deg)
 }
 
-/// First random-number stream of the drones, one per drone.
+/// Random-number stream of the first drone; each further drone has the next stream.
 const DRONES: u64 = 1_000;
 
-/// Speed and climb rate, m/s, and acceleration, m/s².
+/// Largest speed of a drone between positions, m/s.
+///
+/// [`CLIMB_MPS`] is its speed at take-off and landing, m/s, and [`ACCELERATION_MPS2`] its acceleration, m/s².
 const SPEED_MPS: f64 = 10.0;
 const CLIMB_MPS: f64 = 2.0;
 const ACCELERATION_MPS2: f64 = 3.0;
 
-/// Target timeout after which a PX4 leaves OFFBOARD and hovers (COM_OBL_RC_ACT 5).
+/// Time without a position target after which a PX4 leaves OFFBOARD and hovers (`COM_OBL_RC_ACT` 5).
 const LOST: Duration = Duration::from_millis(1_000);
 
-/// Time of streamed targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
+/// Time with a stream of position targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
 const RESUMES: Duration = Duration::from_millis(1_200);
 
-/// Duration of an autopilot's restart.
+/// Time that the restart of an autopilot takes. It is silent meanwhile.
 const AWAY: Duration = Duration::from_millis(3_000);
 
-/// Time within which the link learns of a new mode or state, reported once a second.
+/// Time within which a relay learns of a new flight mode or state of its autopilot.
+///
+/// The autopilot reports both once a second.
 const TOLD_WITHIN: Duration = Duration::from_millis(1_500);
 
-/// Climb of a pilot who takes over, away from the chain, m.
+/// Height that a pilot climbs after taking a drone over, to leave the chain, m.
 const ASIDE_M: f64 = 15.0;
 
-/// Values of `MAV_LANDED_STATE`.
+/// Value of MAVLink's `MAV_LANDED_STATE` for a drone on the ground. The other states follow.
 const ON_GROUND: u8 = 1;
 const IN_AIR: u8 = 2;
 const TAKING_OFF: u8 = 3;
@@ -105,13 +117,13 @@ struct Rate {
     due: Instant,
 }
 
-/// Drone, its autopilot, and the relay's link to it.
+/// Simulated drone with its autopilot and pilot, and the MAVLink connection of its relay.
 #[derive(Debug)]
 pub(super) struct Vehicle {
     kind: Kind,
     spec: FleetSpec,
     pub(super) link: Autopilot,
-    /// Sites of the relay's mission if they differ from the run's line.
+    /// Geographic positions of Tx and Rx in the relay's mission; `None` if no upload has moved them.
     pub(super) sites: Option<Sites>,
     pilot: Pilot,
     body: Body,
@@ -120,28 +132,28 @@ pub(super) struct Vehicle {
     armed: bool,
     landed: u8,
     mode: Mode,
-    /// Current target of the autopilot: where it hovers or flies to.
+    /// Position to which the autopilot flies the drone, and where it then hovers, m.
     goal: Point,
-    /// Height of the first hand-over, m.
+    /// Height at which the pilot first hands the drone over, m.
     climbs_to_m: f64,
-    /// True while the pilot sees no other drone near.
+    /// True while the pilot sees no other drone moving near this one.
     pub(super) is_clear: bool,
     told_at: Option<Instant>,
-    /// True while a PX4 is in its failsafe; it resumes OFFBOARD when targets are streamed again.
+    /// True while a PX4 is in its failsafe. It resumes OFFBOARD once it receives a stream of targets again.
     is_failing: bool,
     streamed_since: Instant,
     began: Instant,
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Grace period in which the link may not know yet that it must not send targets.
+    /// Time until which the relay may not know yet that it must send no position targets.
     unknown_until: Instant,
     pub(super) strays: u64,
     rng: ChaCha8Rng,
 }
 
 impl Vehicle {
-    /// Drone `index` (from 0) on the ground.
+    /// Creates drone `index` (from 0) on the ground, with errors and gusts drawn from `seed`.
     pub(super) fn new(spec: &FleetSpec, index: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(DRONES + u64::try_from(index).unwrap_or(0));
@@ -176,7 +188,7 @@ impl Vehicle {
         }
     }
 
-    /// Returns the initial message rates: heartbeats only.
+    /// Returns the rates at which an autopilot sends messages after its start: heartbeats only.
     fn rates(now: Instant) -> [Rate; 4] {
         let often = Some(Duration::from_millis(1_000));
         [
@@ -192,13 +204,13 @@ impl Vehicle {
         })
     }
 
-    /// Returns the line of the relay's placements.
+    /// Returns the geographic line to which the relay's positions relate. An upload may have moved it.
     fn line(&self) -> Axis {
         let moved = self.sites.and_then(|sites| Axis::between(sites).ok());
         moved.unwrap_or(self.spec.axis)
     }
 
-    /// Returns the drone's position along its relay's line.
+    /// Returns the true position of the drone relative to the line of its relay's mission, m.
     pub(super) fn along(&self) -> Point {
         if self.sites.is_none() {
             return self.body.at;
@@ -208,7 +220,9 @@ impl Vehicle {
         along.map_or([f64::NAN; 3], point)
     }
 
-    /// Converts a placement of the relay to the run's line.
+    /// Converts a position of the relay to the line of the run, m; `None` if it is too far from it.
+    ///
+    /// The lines differ if an upload has moved Tx or Rx.
     pub(super) fn there(&self, place: Placement) -> Option<Point> {
         let on_earth = self.line().point(place)?;
         self.spec.axis.place(on_earth).map(point)
@@ -218,7 +232,7 @@ impl Vehicle {
         self.body.at
     }
 
-    /// Returns true while the drone moves at more than 0.5 m/s along an axis.
+    /// Returns true while the drone moves at more than 0.5 m/s along any axis.
     pub(super) fn moves(&self) -> bool {
         self.body.velocity_mps.iter().any(|v| v.abs() > 0.5)
     }
@@ -227,17 +241,19 @@ impl Vehicle {
         self.landed != ON_GROUND
     }
 
-    /// Returns true while the pilot lets the relay control the drone.
+    /// Returns true unless the pilot has taken the drone over.
     pub(super) fn is_lent(&self, now: Instant) -> bool {
         !self.pilot.has_sticks(now)
     }
 
-    /// Returns true if the drone is in the air and neither taking off, landing nor flown by its pilot.
+    /// Returns true if the autopilot or the relay controls the drone in flight.
+    ///
+    /// False on the ground, during take-off and landing, and while the pilot controls it.
     pub(super) fn is_in_its_hands(&self, now: Instant) -> bool {
         self.landed == IN_AIR && self.mode != Mode::Sticks && self.is_lent(now)
     }
 
-    /// Restarts the autopilot; it is silent for [`AWAY`].
+    /// Restarts the autopilot in flight. It is silent for the time [`AWAY`].
     pub(super) fn restart(&mut self, now: Instant) {
         self.away_until = Some(now + AWAY);
         self.mode = Mode::Hold;
@@ -250,7 +266,7 @@ impl Vehicle {
         self.pilot.has_seen_a_restart(now);
     }
 
-    /// Reboots the relay's link, which loses its state.
+    /// Restarts the relay's side of the MAVLink connection, as after a reboot of the relay. Its state is lost.
     pub(super) fn boot(&mut self, now: Instant) {
         self.link = Autopilot::new(self.spec.axis, Pace::default(), now);
         self.sites = None;
@@ -266,7 +282,7 @@ impl Vehicle {
         }
     }
 
-    /// Advances by `step_s` seconds to `now` and delivers the due messages to the relay's link.
+    /// Moves the drone for `step_s` seconds, up to `now`, and sends due MAVLink messages to its relay.
     pub(super) fn go_on(&mut self, now: Instant, step_s: f64) {
         self.choose(now);
         self.fly(step_s);
@@ -294,7 +310,9 @@ impl Vehicle {
         }
     }
 
-    /// Updates the mode and, on a change, starts the grace period of the link.
+    /// Updates the flight mode and state by what the pilot and the autopilot decide.
+    ///
+    /// After a change the relay gets some time to learn of it, in which it may still send targets.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);
@@ -303,7 +321,10 @@ impl Vehicle {
         }
     }
 
-    /// Returns true if targets are allowed now: a PX4 in flight accepts them in any mode.
+    /// Returns true if the relay may send position targets now.
+    ///
+    /// A drone in flight or landing accepts them, a PX4 in any mode, and an ArduCopter only while the relay controls
+    /// it.
     fn may_be_told(&self) -> bool {
         match self.landed {
             IN_AIR | LANDING => self.kind == Kind::Px4 || self.mode == Mode::Companion,
@@ -387,7 +408,7 @@ impl Vehicle {
         }
     }
 
-    /// Returns the drone's own position estimate: the true position plus the bias.
+    /// Returns the position that the drone believes to have, m: the true position plus a constant bias.
     fn taken(&self) -> Point {
         sum(self.body.at, self.bias)
     }
@@ -432,7 +453,7 @@ impl Vehicle {
         }
     }
 
-    /// Handles a MAVLink frame from the relay's link.
+    /// Handles a MAVLink frame from the relay: a requested message rate, a position target or TIMESYNC.
     pub(super) fn hear(&mut self, now: Instant, frame: &[u8]) {
         if self.away_until.is_some() {
             return;
@@ -464,29 +485,31 @@ impl Vehicle {
     }
 }
 
-/// Take-off time of the first drone, and interval between drones.
+/// Time when the first drone takes off, s. Each further drone takes off [`NEXT_MS`] after the one before.
 const FIRST_S: u64 = 5;
 const NEXT_MS: u64 = 500;
 
-/// Delay of the hand-over after the climb, and after a restart of the autopilot.
+/// Delay from the end of the climb to the pilot's hand-over, s, and before a further attempt.
+///
+/// [`RECOVERS_S`] is the delay after a restart of the autopilot or of the relay, s.
 const LOOKS_S: u64 = 2;
 const RECOVERS_S: u64 = 10;
 
-/// Flight mode.
+/// Flight mode of a drone: who controls it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Mode {
-    /// Pilot control.
+    /// The pilot controls the drone.
     Sticks,
-    /// Hover, controlled by the autopilot alone.
+    /// The autopilot alone controls the drone: it hovers.
     Hold,
-    /// Control by the relay's setpoint.
+    /// The relay controls the drone by its setpoints.
     Companion,
 }
 
 #[derive(Clone, Debug)]
 struct Pilot {
     arms_at: Instant,
-    /// Time of the next hand-over, once known.
+    /// Time when the pilot next hands the drone over to the relay; `None` if none is planned.
     hands_over_at: Option<Instant>,
     takeovers: Vec<Takeover>,
 }
@@ -506,19 +529,21 @@ impl Pilot {
         now >= self.arms_at
     }
 
-    /// Ends the drone's initial climb. The pilot then hands control to the relay.
+    /// Handles the end of the drone's first climb: the pilot plans to hand the drone over to the relay.
     fn is_up(&mut self, now: Instant) {
         // Keep a later hand-over time: the autopilot may have restarted during the climb.
         let looked = now + Duration::from_millis(1_000 * LOOKS_S);
         self.hands_over_at = self.hands_over_at.max(Some(looked));
     }
 
-    /// Handles a restart of the autopilot.
+    /// Handles a restart of the autopilot or the relay, or a failsafe: the pilot hands over again later.
     fn has_seen_a_restart(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * RECOVERS_S));
     }
 
-    /// Returns the mode that the pilot selects now, if any. `may_hand_over` is false while the drone moves or traffic is near.
+    /// Returns the flight mode that the pilot selects now; `None` to leave it as it is.
+    ///
+    /// `may_hand_over` is false while the drone moves, or another drone moves near it.
     fn chooses(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
         if self.has_sticks(now) {
             // Schedule a hand-over after the takeover.
@@ -532,13 +557,13 @@ impl Pilot {
         None
     }
 
-    /// Returns the position to which the pilot flies the drone during a takeover, if any.
+    /// Returns the position to which the pilot flies the drone during a takeover, m; `None` for none.
     fn flies_to(&self, now: Instant) -> Option<Point> {
         let during = |it: &&Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
         self.takeovers.iter().find(during)?.to
     }
 
-    /// Schedules another attempt after the autopilot rejected the mode.
+    /// Plans another hand-over after the autopilot has rejected the flight mode.
     fn tries_again(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * LOOKS_S));
     }
@@ -549,20 +574,20 @@ impl Pilot {
     }
 }
 
-/// MAVLink system ID.
+/// MAVLink system ID of the simulated autopilots.
 const SYSTEM: u8 = 1;
 
-/// Message sent by the autopilot.
+/// MAVLink message that the simulated autopilot sends.
 #[derive(Clone, Copy, Debug)]
 enum SensorReading {
     Heartbeat {
         autopilot: u8,
         armed: bool,
         custom_mode: u32,
-        /// True for `MAV_STATE` 5 (critical): failsafe.
+        /// True if the autopilot reports `MAV_STATE` 5 (critical), which it does in its failsafe.
         is_critical: bool,
     },
-    /// Reply to a TIMESYNC request.
+    /// Reply to a TIMESYNC request of the relay.
     Sync {
         asked: u64,
     },
@@ -637,18 +662,18 @@ fn framed(id: u32, payload: &[u8], sequence: u8) -> Vec<u8> {
     frame
 }
 
-/// Message received by the autopilot.
+/// MAVLink message that the simulated autopilot receives from the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Heard {
-    /// Message interval request, µs.
+    /// Request to send the message with this `id` every `interval_us` microseconds.
     Interval { id: u32, interval_us: u64 },
-    /// Position target.
+    /// Position to which the autopilot is to fly.
     Target(Geodetic),
-    /// TIMESYNC request; the value is returned.
+    /// TIMESYNC request, with the time stamp that the reply repeats.
     Sync(u64),
 }
 
-/// Decodes a received frame; `None` for messages that the autopilot ignores.
+/// Decodes a MAVLink frame from the relay; `None` for messages that the simulated autopilot ignores.
 fn heard(frame: &[u8]) -> Option<Heard> {
     let end = frame.len().checked_sub(CHECKSUM)?;
     let header = frame.first_chunk::<HEADER>()?;

@@ -12,39 +12,39 @@ use uav_relay::{Duration, Instant};
 
 use super::faults::LinkSpec;
 
-/// Event of a node's radio.
+/// Event of a node's radio on the channel, with the node's index from 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum AirEvent {
-    /// End of the back-off: the radio senses the channel.
+    /// The random wait (back-off) ends, and the radio senses whether the channel is free.
     Sense(usize),
-    /// Start of a transmission.
+    /// The radio begins to send a frame.
     Begin(usize),
-    /// End of a transmission.
+    /// The radio ends the frame that it sends.
     End(usize),
 }
 
-/// Scheduled events and their times.
+/// Future events of radios, with the times at which the caller must pass them to [`Medium::happen`].
 pub type Agenda = Vec<(Instant, AirEvent)>;
 
-/// Completed transmission.
+/// Frame whose transmission has ended, with its receivers.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Sent {
-    /// Sending node.
+    /// Index of the node that sent the frame, from 0.
     pub from: usize,
-    /// Bytes of the frame.
+    /// Bytes of the frame that was sent.
     pub frame: Vec<u8>,
     /// Nodes that received the frame intact.
     pub heard_by: Vec<usize>,
-    /// Number of nodes in range that did not receive it.
+    /// Number of nodes in range that lost the frame in a collision, or because they were sending.
     pub missed: usize,
 }
 
-/// Reception of a frame at one node.
+/// State of the reception of a frame at one node in range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Reception {
     Clean,
     Collided,
-    /// Lost because the node itself was sending.
+    /// The frame is lost at this node, because its own radio was sending.
     Unheard,
 }
 
@@ -56,23 +56,25 @@ struct OnAir {
     hearers: Vec<(usize, Reception)>,
 }
 
-/// Channel with a radio for every node.
+/// Half-duplex radio channel with a radio for every node.
 #[derive(Debug)]
 pub struct Medium {
     access: Access,
     link: LinkSpec,
     radios: Vec<Radio>,
     on_air: Vec<OnAir>,
-    /// Separate generator, so that back-offs do not change other draws.
+    /// Random-number generator of the back-offs alone, so that they do not change other random draws.
     rng: ChaCha8Rng,
     counts: AirCounts,
 }
 
-/// Random-number stream of the back-offs.
+/// Random-number stream of the radios' back-offs.
 const BACKOFFS: u64 = 3;
 
 impl Medium {
-    /// Free channel with the data rate of `link` and `nodes` radios. [`Access::Ideal`] is treated as ALOHA.
+    /// Creates a free channel with the data rate of `link` and `nodes` radios.
+    ///
+    /// [`Access::Ideal`] is treated as ALOHA.
     pub fn new(access: Access, link: LinkSpec, nodes: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(BACKOFFS);
@@ -86,17 +88,17 @@ impl Medium {
         }
     }
 
-    /// Returns the counters.
+    /// Returns the counters of the channel.
     pub fn counts(&self) -> AirCounts {
         self.counts
     }
 
-    /// Returns the time on the air of a frame of `bytes` bytes.
+    /// Returns the time that a frame of `bytes` bytes occupies the channel, with its preamble.
     pub fn air_time(&self, bytes: usize) -> Duration {
         self.link.line_time(HEADER + bytes)
     }
 
-    /// Queues a frame at the radio of `node`. Returns false if the queue is full.
+    /// Queues a frame at the radio of `node` (from 0). Returns false, and drops the frame, if the queue is full.
     pub fn offer(&mut self, now: Instant, node: usize, frame: &[u8], agenda: &mut Agenda) -> bool {
         let Some(radio) = self.radios.get_mut(node) else {
             return false;
@@ -112,7 +114,9 @@ impl Medium {
         true
     }
 
-    /// Processes a due event. Returns the frame whose transmission it ends; `hearers` returns the nodes in range of a sender.
+    /// Processes an event that is due. Returns the frame, if the event ends one.
+    ///
+    /// `hearers` returns the nodes in range of a sending node.
     pub fn happen(
         &mut self,
         now: Instant,
@@ -128,7 +132,7 @@ impl Medium {
         None
     }
 
-    /// Switches off the radio of `node`: its queue is lost, and its current transmission is cut short.
+    /// Switches off the radio of `node` (from 0). Its queue is lost, and nobody receives a frame that it was sending.
     pub fn switch_off(&mut self, node: usize) {
         if let Some(radio) = self.radios.get_mut(node) {
             radio.queue.clear();
@@ -143,7 +147,7 @@ impl Medium {
         }
     }
 
-    /// Starts the next frame of `node`, if any.
+    /// Makes the radio of `node` prepare to send the next frame of its queue, if any.
     fn next(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let Some(radio) = self.radios.get_mut(node) else {
             return;
@@ -159,7 +163,7 @@ impl Medium {
         }
     }
 
-    /// Waits a random number of slots below 2^`exponent`.
+    /// Starts the random wait of a radio before it senses the channel: fewer than 2^`exponent` slots.
     fn back_off(&mut self, now: Instant, node: usize, exponent: u32, agenda: &mut Agenda) {
         let slots = self.rng.random_range(0..1_u32 << exponent);
         let until = now + self.link.line_time(SLOT).times(slots);
@@ -186,7 +190,7 @@ impl Medium {
         }
     }
 
-    /// Turns from receiving to sending; frames that the node was receiving are lost there.
+    /// Starts the turnaround of a radio from receiving to sending. Frames that it was receiving are lost there.
     fn turn(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let until = now + self.link.line_time(TURNAROUND);
         if let Some(radio) = self.radios.get_mut(node) {
@@ -264,12 +268,12 @@ impl Medium {
 }
 
 impl OnAir {
-    /// Returns true if `node` is in range and the frame has not ended. A frame ending now does not interfere.
+    /// Returns true if the frame is on the air and `node` is in range. A frame that ends now does not interfere.
     fn is_heard(&self, node: usize, now: Instant) -> bool {
         self.ends > now && self.hearers.iter().any(|(by, _)| *by == node)
     }
 
-    /// Marks the frame as lost at `node`, unless it already was.
+    /// Marks the frame as lost at `node`, for the reason `how`, unless it has ended or was lost before.
     fn spoil(&mut self, node: usize, now: Instant, how: Reception) {
         if self.ends <= now {
             return;
@@ -287,84 +291,91 @@ impl OnAir {
 // Values of IEEE 802.15.4-2006 at 250 kbit/s (unslotted CSMA-CA, 6.4 and 7.5.1.4) in bytes, so that they scale with the data
 // rate: a symbol is half a byte.
 
-/// Access method of a shared channel.
+/// Access method of a radio channel that all nodes share.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Access {
-    /// Separate line per sender: no collisions.
+    /// Separate line for every sender, so that frames do not collide.
     #[default]
     Ideal,
-    /// Half-duplex channel; a radio sends at once unless it is already sending.
+    /// Half-duplex channel without sensing. A radio sends at once unless it is already sending.
     Aloha,
-    /// Half-duplex channel; a radio waits a random time and sends if the channel is free.
+    /// Half-duplex channel with sensing. A radio waits a random time, and then sends if the channel is free.
     Csma,
 }
 
-/// Bytes sent before a frame: preamble, start of frame, length (SHR and PHR).
+/// Number of bytes sent before a frame: preamble, start of frame and length (SHR and PHR).
 pub const HEADER: usize = 6;
 
-/// Turnaround from receiving to sending, in bytes: `aTurnaroundTime`, 12 symbols. The radio neither sends nor receives meanwhile.
+/// Time in which a radio turns from receiving to sending, in bytes: `aTurnaroundTime`, 12 symbols.
+///
+/// It neither sends nor receives meanwhile.
 pub const TURNAROUND: usize = 6;
 
-/// Overhead of a frame on the air, bytes.
+/// Time on the air that a frame takes in addition to its bytes, as a number of bytes.
 pub const OVERHEAD: usize = HEADER + TURNAROUND;
 
-/// Length of a back-off slot, bytes: `aUnitBackoffPeriod`, 20 symbols. It is longer than the turnaround, so that later slots sense
-/// the sender.
+/// Unit of the random wait before sending, in bytes: `aUnitBackoffPeriod`, 20 symbols.
+///
+/// It is longer than the turnaround, so a radio that senses in a later slot finds the sender.
 pub const SLOT: usize = 10;
 
-/// Initial back-off exponent, `macMinBE`: the first wait is 0 to 2^3 - 1 slots.
+/// Back-off exponent of a radio's first wait for a free channel, `macMinBE`: 0 to 2^3 - 1 slots.
 pub const LEAST_EXPONENT: u32 = 3;
 
-/// Largest back-off exponent, `macMaxBE`: each busy channel doubles the bound, up to 2^5 - 1 slots. Retries are unlimited.
+/// Largest back-off exponent, `macMaxBE`: a wait of at most 2^5 - 1 slots.
+///
+/// The exponent grows by 1 each time that the channel is busy. The number of retries is not limited.
 pub const MOST_EXPONENT: u32 = 5;
 
-/// Number of frames that a radio queues, including the frame in transmission. A full queue drops the newest frame, as modems do.
+/// Largest number of frames that a radio queues, including the one that it sends. A full queue drops new frames.
 pub const QUEUE: usize = 4;
 
-/// Counters of a channel.
+/// Counters of a half-duplex radio channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct AirCounts {
-    /// Frames sent.
+    /// Number of frames sent by all nodes.
     pub sent: u64,
-    /// Receptions lost because frames overlapped.
+    /// Number of receptions lost because frames overlapped.
     pub collided: u64,
-    /// Receptions lost because the receiving node was sending.
+    /// Number of receptions lost because the receiving node was sending.
     pub unheard: u64,
-    /// Back-offs because of a busy channel.
+    /// Number of times that a node found the channel busy and waited again.
     pub deferred: u64,
-    /// Frames dropped because the radio's queue was full.
+    /// Number of frames dropped because a radio's queue was full.
     pub dropped: u64,
-    /// Total time of all frames on the air, µs.
+    /// Total time of all frames on the channel, µs.
     pub air_time_us: u64,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum State {
-    /// Receiving, with an empty queue.
+    /// The radio can receive, and has nothing to send.
     #[default]
     Idle,
-    /// Receiving until the back-off ends; `exponent` is the back-off exponent.
+    /// The radio can receive, and waits until the time `until` before it senses the channel.
+    ///
+    /// `exponent` is the back-off exponent of this wait.
     Waiting { until: Instant, exponent: u32 },
-    /// Turnaround from receiving to sending.
+    /// The radio turns from receiving to sending until the time `until`.
     Turnaround { until: Instant },
-    /// Sending.
+    /// The radio sends a frame.
     Sending,
 }
 
 #[derive(Debug, Default)]
 struct Radio {
     state: State,
-    /// Queued frames, without the frame in transmission.
+    /// Frames that wait to be sent, without the frame that is being sent.
     queue: VecDeque<Vec<u8>>,
 }
 
 impl Radio {
-    /// Returns true while the radio cannot receive.
+    /// Returns true while the radio cannot receive, because it sends or turns to sending.
     fn is_deaf(&self) -> bool {
         matches!(self.state, State::Turnaround { .. } | State::Sending)
     }
 
-    /// Returns the number of queued frames, including the frame in transmission.
+    /// Returns the number of frames in the radio, including the one that it sends.
     fn held(&self) -> usize {
         self.queue.len() + usize::from(self.state == State::Sending)
     }

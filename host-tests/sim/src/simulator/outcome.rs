@@ -14,43 +14,43 @@ use super::route::Track;
 use super::true_interference::Stand;
 use super::watch::Seen;
 
-/// Kind of a log entry about a relay; "the other node" is [`Moment::other`].
+/// Kind of an event in the log of a run, about one relay. "Another node" is [`Moment::other`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TimelineEvent {
-    /// The relay went silent.
+    /// The relay was switched off: it neither sends nor receives.
     Silent,
     /// The relay was switched on again.
     Booted,
-    /// The relay lost its neighbour at that side.
+    /// The relay lost its neighbour at this side, toward Tx or toward Rx.
     Lost(Side),
-    /// The relay receives its lost neighbour, or a new neighbour, at this side.
+    /// The relay receives a new or a lost neighbour at this side, toward Tx or toward Rx.
     Found(Side),
-    /// The relay accepted a new view.
+    /// The relay accepted a new view: a new membership of the chain.
     ViewAccepted {
-        /// Number of the view.
+        /// Number of the accepted view.
         view: u32,
-        /// Index of the relay in the view, from 1 at Tx.
+        /// Index of the relay in the accepted view, from 1 next to Tx.
         index: u16,
-        /// Number of relays in the view.
+        /// Number of relays in the accepted view.
         relays: u16,
-        /// Version of the mission.
+        /// Version of the relay's mission.
         version: u16,
     },
-    /// The relay's part of the chain has no quorum.
+    /// The relay found that too few relays reach each other for a quorum, so no view can form.
     NoQuorum,
-    /// The relay's lease expired.
+    /// The relay's lease expired: it may no longer rely on the last agreement.
     LeaseLapsed,
     /// Another node reports that it does not receive the relay.
     NotHeard,
-    /// Another node has a different mission.
+    /// The relay found that another node has a different mission.
     MissionMismatch,
-    /// Another node signs with a different key.
+    /// The relay found that another node signs its frames with a different key.
     KeyMismatch,
-    /// Another node's epoch went back.
+    /// The relay found that another node's epoch, a counter of its starts, went back.
     EpochWentBack,
     /// Two nodes use the index [`Moment::other`], which is this relay's or a neighbour's.
     DuplicateIndex,
-    /// The relay accepted its position in an agreement.
+    /// The relay accepted its position in an agreement of the chain.
     Converged,
     /// The leader found that the chain can meet no target SIR.
     Infeasible,
@@ -68,171 +68,187 @@ pub enum TimelineEvent {
     Uploaded(u16),
     /// The relay adopted the mission of this version, together with all members of its view.
     Adopted(u16),
-    /// The relay's setpoint controls its drone from now on.
+    /// The relay's setpoint controls its drone from now on: the pilot has handed the drone over.
     Engaged,
     /// The relay's setpoint no longer controls its drone: the pilot, or the autopilot alone, flies it.
     Released,
-    /// The position of the relay's drone is unknown.
+    /// The autopilot no longer reports the position of the relay's drone.
     Blind,
     /// The autopilot of the relay's drone was restarted.
     Restarted,
     /// The relay's estimate of the interference changed.
     NewEstimate,
-    /// The measurements do not fit a single interferer.
+    /// The relay found that the measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The measurements of another node contradict the measurements of all other nodes.
+    /// The relay found that another node's measurements contradict those of all other nodes.
     SensorOff,
 }
 
-/// Log entry of a run.
+/// Entry in the log of a run: an event at one node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moment {
-    /// Time of the entry.
+    /// Time of the event.
     pub at: Instant,
-    /// Relay number, from 1.
+    /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     pub relay: u16,
-    /// Kind of the entry.
+    /// Kind of the event.
     pub what: TimelineEvent,
-    /// Node that the entry is about, from 1: a lost or found neighbour, a relay that is not received, ...
+    /// Other node that the event concerns, such as a lost neighbour, by number from 1.
     pub other: Option<u16>,
-    /// Target SIR of the relay's position, linear.
+    /// Linear target SIR of the relay's position at this time; `None` without a target.
     pub target: Option<f32>,
-    /// Number of sweeps that the relay has begun until this time.
+    /// Number of passes and view proposals that the relay has begun until this time.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     pub sweeps: u32,
 }
 
-/// Reason for the end of a run.
+/// Reason for the end of a simulated run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Ending {
-    /// Every relay holds its position for the same target.
+    /// Every relay of the chain holds a position for the same target SIR.
     Settled,
-    /// The leader found that no target can be met.
+    /// The leader found that the chain can meet no target SIR.
     Infeasible,
-    /// Relays went silent, and all their neighbours have noticed.
+    /// Relays on separate links went silent, and all their neighbours have noticed.
     Broken,
-    /// Each part of the chain lacks a quorum.
+    /// Every group of relays that receive each other is too small for a quorum.
     NoQuorum,
-    /// The planned end ([`Setup::soak`](super::setup::Setup::soak), or of the measurements) was reached.
+    /// The planned end of the run or of its measurements was reached. See [`Setup::soak`](super::setup::Setup::soak).
     Soaked,
-    /// The deadline or the event limit was reached.
+    /// The deadline of the run, or the limit on its number of events, was reached.
     #[default]
     OutOfTime,
 }
 
-/// Final state of a relay.
+/// State of a relay at the end of a run.
 #[derive(Clone, Debug)]
 pub struct RelayEnd {
-    /// Setpoint, if any.
+    /// Setpoint of the relay; `None` if it never had one.
     pub setpoint: Option<Placement>,
-    /// Target SIR of that setpoint, linear.
+    /// Linear target SIR for which the setpoint was agreed on; `None` without a target.
     pub target: Option<f32>,
-    /// Upper bound on the SIR of any chain, linear, at the leader.
+    /// Upper bound on the linear SIR that any chain reaches at these altitudes; only at the leader.
     pub bound: Option<f32>,
-    /// Profile of the relay.
+    /// Altitude and power of the relay.
     pub profile: Profile,
-    /// Counters of the relay.
+    /// Counters of the relay since its last start.
     pub stats: Stats,
-    /// Time of its failure; `None` if it is on.
+    /// Time when the relay was switched off; `None` if it is on.
     pub killed: Option<Instant>,
-    /// Index of the relay in its view, from 1 at Tx.
+    /// Index of the relay in its view (membership of the chain), from 1 next to Tx.
     pub index: u16,
-    /// Number of relays in the view.
+    /// Number of relays in the relay's view (membership of the chain).
     pub relays: u16,
-    /// Number of the view.
+    /// Number of the view (membership of the chain) that the relay has accepted.
     pub view: u32,
-    /// Version of its mission.
+    /// Version of the relay's mission; 0 for the loaded one.
     pub version: u16,
     /// Interference estimate of the relay.
     pub believed: NumberedEstimate,
-    /// Sites of the relay's mission; `None` for those loaded before take-off.
+    /// Geographic positions of Tx and Rx in the relay's mission; `None` if no upload changed those loaded.
     pub sites: Option<Sites>,
-    /// Observed state.
+    /// State of the relay as the statistics of the run use it.
     pub seen: Seen,
 }
 
-/// Statistics over the whole run.
+/// Availability of the chain over a whole run.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Watched {
-    /// Time of the first agreement: all relays of a view hold their positions.
+    /// Time when all relays of a view first held agreed positions; `None` if they never did.
     pub first_agreement: Option<Instant>,
-    /// Share of the time after the first agreement in which a longest possible chain held its optimum.
+    /// Fraction, 0 to 1, of the time since the first agreement in which the chain was as good as possible.
+    ///
+    /// The longest possible chain of the living relays then held the positions that it has without faults. `None`
+    /// unless the run is judged.
     pub availability: Option<f64>,
-    /// Longest time after the first agreement without a longest possible chain at its optimum.
+    /// Longest time since the first agreement in which the chain was not as good as possible.
+    ///
+    /// `None` unless the run is judged.
     pub longest_wrong: Option<Duration>,
-    /// Largest number of groups that held separate agreements at the same time.
+    /// Largest number of groups of relays that held separate agreements at the same time.
     pub most_flying: usize,
-    /// Smallest distance of two relays, m.
+    /// Smallest distance of two relays during the run, m: of drones if simulated, else of setpoints.
     pub least_separation_m: Option<f64>,
 }
 
-/// Outcome of a run.
+/// Outcome of a simulated run.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     /// Reason for the end of the run.
     pub ending: Ending,
-    /// Final states of the relays, from relay 1.
+    /// State of each relay at the end, from relay 1.
     pub relays: Vec<RelayEnd>,
-    /// SIR of the chain before the first and after each round of Algorithm 2, linear.
+    /// Linear SIR of the chain before the first round of Algorithm 2, and after each round.
     pub rounds: Vec<f32>,
-    /// Forward passes along the chain.
+    /// Number of passes (messages forwarded along the whole chain) and view proposals that relays began.
     pub sweeps: u32,
-    /// Frames sent on all links.
+    /// Number of frames sent on all links.
     pub messages: u64,
-    /// Bytes sent on all links.
+    /// Number of bytes sent on all links.
     pub bytes: u64,
-    /// End time of the run.
+    /// Virtual time when the run ended.
     pub ended: Instant,
-    /// Injected faults.
+    /// Counts of the frame faults that the links caused.
     pub injected: Injected,
-    /// Classification of the attacker's frames.
+    /// Counts of the attacker's frames by how relays classified them.
     pub struck: Struck,
-    /// Neighbours missing at the end: observer's index (from 1) and side, with the time of the loss.
+    /// Neighbours that relays report as lost at the end, with the time of the report.
+    ///
+    /// The key is the reporting relay's number from 1, and the side of the lost neighbour.
     pub noticed: BTreeMap<(u16, Side), Instant>,
     /// Log of the run.
     pub moments: Vec<Moment>,
-    /// Closest approach of two drones, if their flight was simulated.
+    /// Closest approach of two flying drones; `None` if no flight was simulated.
     pub nearest: Option<Nearest>,
-    /// Closest approach of two drones with autopilots, neither in its pilot's hands.
+    /// Closest approach of two drones with autopilots while no pilot controls either of them.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest separation margin, m, of two drones that no pilot flies; infinite if there were none.
+    /// Smallest value, m, of the distance of two drones less the distance that they have to keep.
     ///
-    /// The margin is the distance less the smaller of the required separation and the distance at their last hand-over.
+    /// Pairs with a drone in a pilot's hands do not count. A pair has to keep the mission's separation, or its
+    /// distance at the last hand-over if that is smaller. Infinite if there was no such pair.
     pub margin_m: f64,
-    /// Closest approach with that margin.
+    /// The two drones, their distance and the time at which `margin_m` was reached.
     pub margin_at: Option<Nearest>,
-    /// Targets that an autopilot received well after it reported a state in which none may be sent. Nonzero is a bug.
+    /// Number of position targets that autopilots received in a state that forbids them.
+    ///
+    /// Targets up to 1.5 s after the change of the state do not count. Nonzero is a bug.
     pub stray_targets: u64,
-    /// Final positions of the drones with autopilots along their relay's line; true if the relay flies it.
+    /// Final position of each drone with an autopilot, and true if the relay controls it.
+    ///
+    /// The position is relative to the line of the relay's mission, which an upload may move.
     pub fleet: Vec<(Point, bool)>,
-    /// Setpoints outside their limits. Nonzero is a bug.
+    /// Number of setpoints outside of the mission's limits. Nonzero is a bug.
     pub unsafe_setpoints: u64,
-    /// Counters of the shared channel.
+    /// Counters of the shared radio channel; all 0 without one.
     pub air: AirCounts,
-    /// Statistics over the whole run, for soaks and shared channels.
+    /// Availability of the chain; `None` unless the run has a fixed end or a shared channel.
     pub watched: Option<Watched>,
-    /// Snapshots of the positions at each measurement.
+    /// Snapshots of the relays' positions, one at each measurement of the interference.
     pub stands: Vec<Stand>,
-    /// Film of the run, if [`Setup::film`](super::setup::Setup::film) was set.
+    /// Record of the run for an animation, if [`Setup::film`](super::setup::Setup::film) was set.
     pub film: Option<Film>,
-    /// States of the relays for the traffic, if [`Setup::track`](super::setup::Setup::track) was set.
+    /// States of the relays over time, for the data traffic. `None` unless `Setup::track` was set.
     pub track: Option<Track>,
 }
 
 impl Outcome {
-    /// Returns the smallest distance of two drones, m; infinite if their flight was not simulated.
+    /// Returns the smallest distance of two drones during the run, m; infinite if no flight was simulated.
     pub fn nearest_m(&self) -> f64 {
         self.nearest
             .map_or(f64::INFINITY, |nearest| nearest.apart_m)
     }
 
-    /// Returns the bit patterns of the setpoints (x, y, altitude); `None` for a relay without one.
+    /// Returns the bit patterns of the setpoints (x, y, altitude), for the exact comparison of two runs.
+    ///
+    /// `None` for a relay without a setpoint.
     pub fn bits(&self) -> Vec<Option<[u32; 3]>> {
         let bits = |place: Placement| [place.x_m, place.y_m, place.altitude_m].map(f32::to_bits);
         let places = self.relays.iter().map(|relay| relay.setpoint);
         places.map(|place| place.map(bits)).collect()
     }
 
-    /// Returns the newest mission version that the ground has offered.
+    /// Returns the version of the newest mission that a ground station offered; `None` without uploads.
     pub fn offered(&self) -> Option<u16> {
         let versions = self.moments.iter().filter_map(|moment| match moment.what {
             TimelineEvent::Offered(version) => Some(version),
@@ -242,66 +258,66 @@ impl Outcome {
     }
 }
 
-/// Changed state of a relay.
+/// State of a relay after a change, for the animation of a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
-    /// Time of the change.
+    /// Time of the change of the relay's state.
     pub at: Instant,
-    /// Relay number, from 1.
+    /// Number of the relay whose state changed, from 1.
     pub relay: u16,
     /// True while the relay is switched on.
     pub is_on: bool,
-    /// Setpoint, if any; a relay that is switched off keeps its last one.
+    /// Setpoint of the relay; `None` before its first one. A relay that is switched off keeps its last one.
     pub place: Option<Placement>,
     /// Number of frames sent on all links until this time.
     pub messages: u64,
 }
 
-/// Transmission of a frame.
+/// Transmission of a frame, for the animation of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transmission {
-    /// Time of the transmission.
+    /// Time when the frame was sent.
     pub at: Instant,
-    /// Relay number, from 1.
+    /// Number of the sending relay, from 1.
     pub relay: u16,
-    /// Direction of the transmission; `None` on a shared channel.
+    /// Side to which the relay sends, toward Tx or toward Rx; `None` on a shared channel.
     pub to: Option<Side>,
 }
 
-/// Film of a whole run.
+/// Record of a whole run for an animation.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Film {
-    /// State changes, in order of time.
+    /// Changes of the relays' states, in order of time.
     pub shots: Vec<Shot>,
-    /// Transmissions, in order of time.
+    /// Transmitted frames, in order of time.
     pub sent: Vec<Transmission>,
 }
 
-/// Link of a frame.
+/// Link on which a frame was sent.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Link {
-    /// The shared channel.
+    /// Radio channel that all nodes share.
     Shared,
-    /// Link between this node and the next node toward Rx; Tx is node 0.
+    /// Link between the node with this number and the next one toward Rx. Tx is node 0.
     After(u16),
 }
 
-/// Transmitted frame.
+/// Frame that a node sent, for a capture file.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct OnAir {
-    /// Time of its last bit.
+    /// Time when the last bit of the frame was sent.
     pub at: Instant,
-    /// Order of transmission, for frames that end at the same time.
+    /// Number of the frame in the order of sending. It sorts frames that end at the same time.
     order: u64,
-    /// Link of the frame.
+    /// Link on which the frame was sent.
     pub link: Link,
-    /// Bytes as sent.
+    /// Bytes of the frame as sent, before faults change them.
     pub bytes: Vec<u8>,
-    /// Faults on the path; empty if all receivers got the frame intact and in time.
+    /// Description of the faults of the frame; empty if all receivers got it intact and in time.
     pub note: String,
 }
 
-/// Recorded frames that were not read yet.
+/// Sent frames that have been recorded and not yet taken.
 #[derive(Debug, Default)]
 pub struct Record {
     frames: BinaryHeap<Reverse<OnAir>>,
@@ -309,7 +325,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Adds a frame.
+    /// Adds a frame that ended at `at`, with a description of its faults.
     pub fn put(&mut self, at: Instant, link: Link, bytes: &[u8], note: String) {
         self.frames.push(Reverse(OnAir {
             at,
@@ -321,7 +337,7 @@ impl Record {
         self.order += 1;
     }
 
-    /// Removes and returns the frames that ended by `until`.
+    /// Removes and returns the frames that ended by `until`, in order of time.
     pub fn take(&mut self, until: Instant) -> Vec<OnAir> {
         let mut over = Vec::new();
         while let Some(Reverse(next)) = self.frames.peek()

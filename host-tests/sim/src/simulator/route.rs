@@ -28,43 +28,47 @@ use super::setup::Setup;
 use super::watch::Seen;
 use crate::report::hop_sirs;
 
-/// Time, ps.
+/// Virtual time or duration, picoseconds.
 pub type Ps = u64;
 
-/// Picoseconds of a microsecond.
+/// Number of picoseconds in a microsecond.
 const MICRO: Ps = 1_000_000;
 
-/// Picoseconds of a second.
+/// Number of picoseconds in a second.
 pub const SECOND: f64 = 1e12;
 
-/// Largest time of one packet on a hop, 1000 s in ps; a slower hop counts as dead.
+/// Longest time that a hop may need for one packet, 1000 s in ps. A slower hop counts as broken.
 const SLOWEST: f64 = 1e15;
 
-/// Movement of a drone that is recorded, m.
+/// Distance, m, that a drone has to move before its new position is recorded.
 const MOVED_M: f64 = 0.1;
 
-/// Largest distance of a drone from its agreed position that counts as there, m.
+/// Distance of a drone from its agreed position, m, below which it has arrived.
 const THERE_M: f64 = 5.0;
 
-/// Period in which moving interferers are taken as fixed, ps.
+/// Period for which the positions of moving interferers are taken as constant: 1 s in ps.
 const FIXED: Ps = 1_000_000 * MICRO;
 
-/// Returns the time of `instant`.
+/// Converts a virtual time to picoseconds since the start of the run.
 pub const fn ps(instant: Instant) -> Ps {
     instant.as_micros().saturating_mul(MICRO)
 }
 
-/// Parts of a relay's state that decide about the route.
+/// State of a relay that determines the route of the data and its rates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
-    /// State of the relay. Its place is the true position of the drone, and absent while the relay has no setpoint.
+    /// State of the relay, with the true position of its drone as `place`.
+    ///
+    /// The position is `None` while the relay has no setpoint.
     pub seen: Seen,
-    /// Agreed position.
+    /// Agreed position of the relay: x, y and altitude, m; `None` without an agreement.
     pub agreed: Option<Point>,
 }
 
 impl RelayState {
-    /// Returns true if the difference from `other` does not concern the route.
+    /// Returns true if both states are equal except for details that do not affect the route.
+    ///
+    /// Movements below [`MOVED_M`] and the lease do not affect it.
     fn is_like(&self, other: &Self) -> bool {
         let near = match (self.seen.place, other.seen.place) {
             (Some(one), Some(other)) => apart(one, other) < MOVED_M,
@@ -82,7 +86,7 @@ impl RelayState {
     }
 }
 
-/// Recorded states of all relays.
+/// States of all relays over a run, as needed for the data traffic.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Track {
     latest: BTreeMap<usize, RelayState>,
@@ -90,7 +94,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Records the state of `relay` (from 0) at `at` if it changed.
+    /// Records the state of relay `relay` (from 0) at the time `at`, if it differs from the last one.
     pub fn see(&mut self, at: Instant, relay: usize, state: RelayState) {
         let known = self.latest.get(&relay);
         if known.is_none_or(|known| !known.is_like(&state)) {
@@ -100,22 +104,24 @@ impl Track {
     }
 }
 
-/// Source of the true SIRs.
+/// Computes the true SIR of every hop, with the interference that is really present.
 #[derive(Debug)]
 pub struct TrueHops {
-    /// Relays and interferers at time 0, and the velocity of the latter, m/s. `None` in a field or after uploads.
+    /// Relays and interferers at time 0, and the interferers' velocity along and beside the line, m/s.
+    ///
+    /// `None` in a random field and in a run with uploads.
     scene: Option<(Scene, [f64; 2])>,
-    /// Missions by version, for runs without a scene.
+    /// Missions by version, for runs in which `scene` is `None`. Version 0 is the loaded one.
     missions: Vec<(u16, Mission)>,
-    /// Profiles of the relays, from relay 1.
+    /// Altitude and power of each relay, from relay 1.
     profiles: Vec<Profile>,
 }
 
 impl TrueHops {
-    /// Returns the true SIRs of a run of `setup`, whose relays fly `mission` at first.
+    /// Prepares the true SIRs of a run of `setup`, whose relays fly `mission` at first.
     ///
-    /// They are against all interferers of `scenario`, in motion if the relays measure them. In a field, and in a run with uploads,
-    /// they are those of the mission that the chain flies.
+    /// They are those with all interferers of `scenario`, which may move. In a random field, and in a run with
+    /// uploads, they are those of the mission that the chain flies.
     pub fn new(scenario: &Scenario, setup: &Setup, mission: &Mission) -> Self {
         let relays = mission.relays();
         let moved = setup.sky.as_ref().map_or([0.0; 2], |sky| sky.velocity_mps);
@@ -139,9 +145,10 @@ impl TrueHops {
         self.scene.as_ref().is_some_and(moves)
     }
 
-    /// Returns the SIR (linear) of each hop from Tx to Rx and, with `back`, of each hop on the way back.
+    /// Returns the linear SIR of each hop from Tx to Rx and, if `back` is true, of each hop from Rx to Tx.
     ///
-    /// The hops of a direction are in the order in which a packet passes them.
+    /// `relays` has the index, from 0, and the position of each relay in the chain. The hops of a direction are in
+    /// the order in which a packet passes them.
     fn sirs(&self, at: Ps, version: u16, relays: &[(usize, Point)], back: bool) -> Vec<Vec<f64>> {
         let Some((scene, [vx, vy])) = &self.scene else {
             let mut missions = self.missions.iter();
@@ -184,39 +191,39 @@ impl TrueHops {
     }
 }
 
-/// Recurring time of a hop.
+/// Time slots of a hop: one in each frame, a period in which every hop has its slot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Window {
-    /// Start of the first frame.
+    /// Start of the first frame, ps.
     anchor: Ps,
-    /// Length of a frame.
+    /// Duration of a frame, ps.
     frame: Ps,
-    /// Start of the slot in a frame.
+    /// Time from the start of a frame to the start of the slot, ps.
     opens: Ps,
-    /// Length of the slot, at least 1.
+    /// Duration of the slot, ps, at least 1.
     open_for: Ps,
 }
 
 impl Window {
-    /// Returns the end of the frame of `at`; `at` itself if a frame ends there.
+    /// Returns the end of the frame that contains `at`; `at` itself if a frame ends there.
     pub const fn frame_end(&self, at: Ps) -> Ps {
         let since = at.saturating_sub(self.anchor);
         self.anchor + since.div_ceil(self.frame) * self.frame
     }
 
-    /// Returns the time within slots from the first frame to `at`.
+    /// Returns the total duration of the slots, or parts of slots, from the first frame to `at`.
     fn elapsed(&self, at: Ps) -> Ps {
         let since = at.saturating_sub(self.anchor);
         let (frames, into) = (since / self.frame, since % self.frame);
         frames * self.open_for + into.saturating_sub(self.opens).min(self.open_for)
     }
 
-    /// Returns the time within slots from `from` to `until`.
+    /// Returns the total duration of the slots, or parts of slots, between `from` and `until`.
     pub fn between(&self, from: Ps, until: Ps) -> Ps {
         self.elapsed(until) - self.elapsed(from)
     }
 
-    /// Returns the time when a transmission that takes `duration`, above 0, and continues at `from`, ends.
+    /// Returns the end of a transmission that goes on at `from` and needs `duration` of slot time, above 0.
     pub fn ends(&self, from: Ps, duration: Ps) -> Ps {
         let due = u128::from(self.elapsed(from)) + u128::from(duration) - 1;
         let open_for = u128::from(self.open_for);
@@ -229,79 +236,85 @@ impl Window {
     }
 }
 
-/// Hop of a stage. Node 0 is Tx, and the node after the last relay is Rx.
+/// Hop of the route while nothing changes. Node 0 is Tx, and the node after the last relay is Rx.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hop {
-    /// Sending node.
+    /// Number of the node that sends.
     pub from: usize,
-    /// Receiving node.
+    /// Number of the node that receives.
     pub to: usize,
-    /// Time of one packet at the present data rate; above 0.
+    /// Time that one packet takes at the present data rate of the hop, ps, above 0.
     pub packet: Ps,
-    /// Slots of the hop.
+    /// Time slots in which the hop may send.
     pub window: Window,
 }
 
-/// State of the chain that a [`Period`] has.
+/// State of the chain with respect to the data traffic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ChainState {
-    /// The relays of the view are at the positions of one agreement.
+    /// The relays of the view (membership of the chain) are all at the positions of one agreement.
     Agreed,
-    /// The relays can send, but an agreement is pending, or drones are on their way.
+    /// The relays can all send, but they have not agreed on positions yet, or drones are on their way.
     Pending,
-    /// A relay of the view is silent, has no position, or has not accepted the view.
+    /// A relay of the view (membership of the chain) cannot send.
+    ///
+    /// It is silent, has no position, or has not accepted the view.
     Broken,
 }
 
-/// Time in which the view, the state of the chain and the promised rate do not change.
+/// Period in which the view, the state of the chain and the promised data rates do not change.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Period {
-    /// Start.
+    /// Start of the period, ps. It ends where the next one starts.
     pub from: Ps,
-    /// Number of relays of the view.
+    /// Number of relays in the view (membership of the chain).
     pub relays: u16,
-    /// Number of the view.
+    /// Number of the view (membership of the chain).
     pub view: u32,
-    /// State of the chain.
+    /// State of the chain in this period.
     pub state: ChainState,
-    /// Data rates at the agreed positions by the planner's formula, bit/s: to Rx, back. Empty without an agreement.
+    /// Data rates at the agreed positions by the planner's formula, bit/s: to Rx, then back to Tx.
+    ///
+    /// Empty without an agreement; the second is absent if data goes only to Rx.
     pub promised_bps: Vec<f64>,
 }
 
-/// Time in which no hop changes.
+/// Period in which no hop of the route changes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Stage {
-    /// Start.
+    /// Start of this stage of the route, ps.
     pub from: Ps,
-    /// Number of its period.
+    /// Index in [`Route::periods`] of the period in which this stage is.
     pub period: usize,
-    /// True for each relay that is switched on, from relay 1.
+    /// State of each relay, from relay 1: true if it is switched on.
     pub on: Vec<bool>,
-    /// Hops that are not dead, for each direction.
+    /// Hops that can carry data, for each direction: to Rx, then back to Tx.
     pub hops: Vec<Vec<Hop>>,
 }
 
-/// Route from the first agreement on.
+/// Route of the data through the chain over time, from the first agreement on.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Route {
-    /// Stages in order of time; at least one.
+    /// Stages, in which no hop changes, in order of time; at least one.
     pub stages: Vec<Stage>,
-    /// Periods in order of time; at least one.
+    /// Periods, in which view and state do not change, in order of time; at least one.
     pub periods: Vec<Period>,
-    /// Data rates promised at the first agreement, bit/s: to Rx, back.
+    /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
     pub promised_bps: Vec<f64>,
 }
 
-/// Relays of the present view.
+/// Relays of the view (membership of the chain) that carries the data at present.
 struct Members {
     view: ViewId,
     version: u16,
-    /// Number (from 0) and state of each relay by its index in the view; `None` if it is missing.
+    /// Number (from 0) and state of each relay in the view, in the order of the indices in it.
+    ///
+    /// `None` for a relay that is off or has not accepted the view.
     relays: Vec<Option<(usize, RelayState)>>,
 }
 
 impl Members {
-    /// Returns the view that most relays have accepted, the newest of several.
+    /// Returns the relays of the view that most living relays have accepted; of several the newest.
     fn of(states: &BTreeMap<usize, RelayState>) -> Option<Self> {
         let on = || states.iter().filter(|(_, state)| state.seen.is_on);
         let mut counts: BTreeMap<(ViewId, u16), usize> = BTreeMap::new();
@@ -332,7 +345,9 @@ impl Members {
         Some(members)
     }
 
-    /// Returns the present positions, with a stand-in for those that are missing; their hops are dead.
+    /// Returns the number (from 0) and the present position of each relay in the view.
+    ///
+    /// A relay without a position gets a substitute. The hops at such a relay carry no data anyway.
     fn places(&self) -> Vec<(usize, Point)> {
         let place = |(index, member): (usize, &Option<(usize, RelayState)>)| {
             let known = member.and_then(|(relay, state)| Some((relay, state.seen.place?)));
@@ -341,7 +356,7 @@ impl Members {
         self.relays.iter().enumerate().map(place).collect()
     }
 
-    /// Returns the nodes from Tx to Rx, whose number is `rx`; `None` for a relay that cannot send.
+    /// Returns the node numbers from Tx, 0, to Rx, `rx`. `None` for a relay that cannot send.
     fn nodes(&self, rx: usize) -> Vec<Option<usize>> {
         let alive = self.relays.iter().map(|member| {
             let (relay, state) = (*member)?;
@@ -354,9 +369,9 @@ impl Members {
             .collect()
     }
 
-    /// Returns the agreed positions if all relays hold those of one agreement, for one target SIR.
+    /// Returns the agreed positions; `None` unless all relays hold positions for the same target SIR.
     ///
-    /// Positions from which relays measure an unknown interferer have no target.
+    /// Positions from which relays measure an unknown interferer have no target, and do not count.
     fn agreed(&self) -> Option<Vec<(usize, Point)>> {
         let target = |state: &RelayState| state.seen.target.map(f32::to_bits);
         let (_, first) = self.relays.first().copied().flatten()?;
@@ -369,14 +384,14 @@ impl Members {
         held.collect()
     }
 
-    /// Returns true if all drones are at the agreed positions.
+    /// Returns true if every drone is at its agreed position.
     fn are_there(&self, agreed: &[(usize, Point)]) -> bool {
         let mut pairs = self.places().into_iter().zip(agreed);
         pairs.all(|((_, at), (_, goal))| apart(at, *goal) < THERE_M)
     }
 }
 
-/// Slots of all hops for each direction, set at an agreement or for a new view.
+/// Time slots of all hops, for each direction. They are set at an agreement and for a new view.
 struct Layout {
     view: ViewId,
     agreed: Option<Vec<(usize, Point)>>,
@@ -384,19 +399,19 @@ struct Layout {
     windows: Vec<Vec<Window>>,
 }
 
-/// Data link of a route.
+/// Parameters of the data link over which the packets go.
 #[derive(Clone, PartialEq, Debug)]
 pub struct DataLink {
-    /// Access, spectral efficiency and bandwidth.
+    /// Medium access, spectral efficiency and bandwidth.
     pub radio: Radio,
     /// Size of a packet, bits, above 0.
     pub packet_bits: f64,
-    /// True if data goes both ways.
+    /// True if data goes from Tx to Rx and from Rx to Tx; false if only to Rx.
     pub both: bool,
 }
 
 impl DataLink {
-    /// Returns the time of one packet on a hop; `None` if that carries nothing.
+    /// Returns the time of one packet on a hop of this data rate; `None` if the hop carries no data.
     fn packet(&self, rate_bps: f64) -> Option<Ps> {
         let time = self.packet_bits / rate_bps * SECOND;
         #[expect(
@@ -407,14 +422,14 @@ impl DataLink {
         (time <= SLOWEST).then(|| (time.ceil() as Ps).max(1))
     }
 
-    /// Returns the data rates promised by these SIRs (linear), bit/s, one for each direction.
+    /// Returns the planner's data rate, bit/s, of each direction, from the linear SIRs of its hops.
     fn promised_bps(&self, sirs: &[Vec<f64>]) -> Vec<f64> {
         let directions = sirs.len().max(1) as f64;
         let rate = |sirs: &Vec<f64>| self.radio.chain_bps(sirs) / directions;
         sirs.iter().map(rate).collect()
     }
 
-    /// Returns the slots from `anchor` on for hops with these SIRs (linear).
+    /// Returns the time slots of each direction's hops, from `anchor` on, for the linear SIRs of the hops.
     fn windows(&self, anchor: Ps, sirs: &[Vec<f64>]) -> Vec<Vec<Window>> {
         let packets: Vec<Vec<Option<Ps>>> = sirs
             .iter()
@@ -516,7 +531,7 @@ pub fn route(
 }
 
 impl Route {
-    /// Adds `stage` with the hops of `members`, unless there was no agreement yet.
+    /// Adds `stage` with the hops between `members`, unless the relays have not agreed on positions yet.
     fn add(
         &mut self,
         mut stage: Stage,
@@ -618,7 +633,7 @@ mod tests {
         open_for: 7,
     };
 
-    /// Counts the time within slots one by one.
+    /// Counts the picoseconds within slots one by one, for comparison.
     fn counted(from: u64, until: u64) -> u64 {
         let is_open = |at: &u64| (10..17).contains(&((at - 100) % 30));
         (from..until).filter(is_open).count() as u64

@@ -14,118 +14,126 @@ use super::medium;
 use super::medium::Access;
 use super::true_interference::TrueInterference;
 
-/// Period in which relays 1 to `after` and the others do not receive each other.
+/// Period in which relays 1 to `after` and the other relays do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Partition {
-    /// Last relay of the first part, from 1.
+    /// Number of the last relay before the gap, from 1.
     pub after: u16,
-    /// Start time.
+    /// Start of the partition.
     pub from: Instant,
-    /// End time; `None` if the partition is permanent.
+    /// End of the partition; `None` if it is permanent.
     pub until: Option<Instant>,
 }
 
 impl Partition {
-    /// Returns true if relays `one` and `other` (from 1) are on different sides at `now`.
+    /// Returns true if the partition separates the relays `one` and `other` (from 1) at the time `now`.
     pub fn parts(&self, one: u16, other: u16, now: Instant) -> bool {
         let during = now >= self.from && self.until.is_none_or(|until| now < until);
         during && (one <= self.after) != (other <= self.after)
     }
 }
 
-/// Mission upload during the run.
+/// Upload of a mission by a ground station during a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct UploadSpec {
-    /// Sending end: upstream for the transmitter, downstream for the receiver.
+    /// End of the chain that uploads: upstream for the transmitter Tx, downstream for the receiver Rx.
     pub end: Side,
-    /// Start time.
+    /// Start of the upload.
     pub at: Instant,
-    /// Uploaded mission.
+    /// Mission that is uploaded.
     pub upload: Upload,
 }
 
-/// Capacity and sharing of a link or channel.
+/// Data rate and number of users of a link or a radio channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Channel {
-    /// Bits per second.
+    /// Data rate of the link or the channel, bit/s.
     pub baud: u32,
-    /// Largest number of relays within range at one point, including the relay itself. 1 for separate lines.
+    /// Largest number of relays that receive each other at one point, including the relay itself.
+    ///
+    /// It is 1 for separate lines.
     pub in_range: usize,
-    /// Overhead of a frame, bytes.
+    /// Time on the air that a frame takes in addition to its bytes, as a number of bytes.
     pub overhead: usize,
 }
 
-/// Random-number stream of the keys.
+/// Random-number stream from which the network key is drawn.
 const KEYS: u64 = 1;
 
-/// Setup of a run.
+/// Setup of a simulated run: mission, links, faults, events and records.
 #[derive(Clone, Debug)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is an option of its own"
 )]
 pub struct Setup {
-    /// Mission of every relay.
+    /// Mission that every relay has loaded at the start.
     pub mission: Mission,
-    /// Individual profiles, by index from 1.
+    /// Altitude and power of relays that differ from the mission's common ones, by number from 1.
     pub profiles: Vec<(u16, Profile)>,
-    /// Relays that keep their altitude when altitudes are planned.
+    /// Numbers, from 1, of relays that keep their altitude when methods choose altitudes.
     pub held: Vec<u16>,
-    /// Settings of every relay. `hop_time`, `hold_altitude`, `profile` and, with `auth`, the key and the epoch are filled in.
+    /// Settings of every relay. The simulator sets `hop_time`, `hold_altitude` and `profile` for each relay.
+    ///
+    /// With `auth` it sets the key and the epoch, too.
     pub settings: Settings,
-    /// Parameters of the links.
+    /// Data rate and latency of the links.
     pub link: LinkSpec,
-    /// Frame faults.
+    /// Probabilities of frame faults on all links.
     pub faults: Faults,
-    /// Relays that go silent: index from 1 and time.
+    /// Relays that are switched off: number from 1 and time.
     pub kills: Vec<(u16, Instant)>,
-    /// Relays that reboot: index from 1 and time. They keep only persisted state: uploads and the acceptor record.
+    /// Relays that reboot: number from 1 and time.
+    ///
+    /// A relay keeps only what it has stored: an uploaded mission, and its record of votes on views.
     pub boots: Vec<(u16, Instant)>,
-    /// Partitions of the chain.
+    /// Partitions: periods in which two parts of the chain do not receive each other.
     pub partitions: Vec<Partition>,
-    /// True to sign frames, with a key drawn from the seed and an epoch that counts a relay's starts.
+    /// True if relays sign frames, with a key drawn from the seed. The epoch counts the starts of a relay.
     pub auth: bool,
-    /// Mission uploads during the run; none take place without `auth`.
+    /// Uploads of missions during the run. Without `auth` none takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
-    /// Relays that do not persist uploads across a reboot: index from 1.
+    /// Numbers, from 1, of relays that lose an uploaded mission at a reboot.
     pub forgetful: Vec<u16>,
-    /// Attack on the chain, if any.
+    /// Attack on the chain; `None` without an attacker.
     pub attack: Option<Attack>,
-    /// Flight of simple drones, if simulated.
+    /// Flight of simple drones without autopilots; `None` if it is not simulated.
     pub flight: Option<FlightSpec>,
-    /// Flight of drones with autopilots; replaces `flight`.
+    /// Flight of drones with simulated autopilots, in place of `flight`; `None` if it is not simulated.
     pub fleet: Option<FleetSpec>,
-    /// Radio range in relays, on a shared channel.
+    /// Radio range on a shared channel, in relays: the largest difference of two relays' numbers.
     pub radio_reach: usize,
-    /// Channel access of the radios, on a shared channel.
+    /// Access method of the radios on a shared channel.
     pub access: Access,
-    /// Mean burst of losses, frames. 1 if independent, else at least [`Bursts::shortest`](super::faults::Bursts::shortest).
+    /// Mean number of frames that a burst of losses lasts; 1 for independent losses.
+    ///
+    /// Otherwise it is at least [`Bursts::shortest`](super::faults::Bursts::shortest).
     pub burst: f64,
-    /// Failures of single link directions.
+    /// One-way link failures: periods in which one relay does not receive another one.
     pub deaf: Vec<OneWayFailure>,
-    /// Interference that the relays measure, if they have to find it.
+    /// True interferers, which relays measure and have to locate; `None` if relays do not measure them.
     pub sky: Option<TrueInterference>,
-    /// Fixed end of the run; the chain is judged all the time.
+    /// Fixed end of the run; its availability is then measured. `None` to end the run when the chain settles.
     pub soak: Option<Instant>,
-    /// Time from which frames are no longer lost or damaged.
+    /// Time from which links cause no more faults; `None` if they do to the end.
     pub faults_end: Option<Instant>,
-    /// True to record frames for [`Chain::frames`](super::chain::Chain::frames).
+    /// True to record all frames, for [`Chain::frames`](super::chain::Chain::frames).
     pub record: bool,
-    /// True to record [`Outcome::film`](super::outcome::Outcome::film).
+    /// True to record the run for an animation, as [`Outcome::film`](super::outcome::Outcome::film).
     pub film: bool,
-    /// True to record [`Outcome::track`](super::outcome::Outcome::track).
+    /// True to record the relays' states for data traffic. See [`Outcome::track`](super::outcome::Outcome::track).
     pub track: bool,
-    /// Seed of every random draw.
+    /// Seed of all random draws of the run.
     pub seed: u64,
-    /// Latest end of the run.
+    /// Virtual time at which the run ends at the latest.
     pub deadline: Instant,
 }
 
 impl Setup {
-    /// Default radio range in relays, on a shared channel.
+    /// Default of [`Self::radio_reach`]: a relay receives up to four relays on each side.
     pub const RADIO_REACH: usize = 4;
 
-    /// Fault-free run of `mission` with default settings, default links and seed 1.
+    /// Creates the setup of a fault-free run of `mission`, with default settings, default links and seed 1.
     pub fn new(mission: Mission) -> Self {
         Self {
             mission,
@@ -158,12 +166,12 @@ impl Setup {
         }
     }
 
-    /// Creates the setup of a run on one ideal channel without collisions ([`Access::Ideal`]).
+    /// Creates the setup of a run with a shared radio channel without collisions ([`Access::Ideal`]).
     pub fn on_shared_channel(mission: Mission) -> Self {
         Self::on_air(mission, Access::Ideal)
     }
 
-    /// Creates the setup of a run on one shared channel with the given access method.
+    /// Creates the setup of a run with a shared radio channel and this access method.
     pub fn on_air(mission: Mission, access: Access) -> Self {
         let mut setup = Self::new(mission);
         setup.settings.wiring = Wiring::Shared;
@@ -171,14 +179,14 @@ impl Setup {
         setup
     }
 
-    /// Runs until `until` and judges the chain all the time.
+    /// Changes the setup so that the run ends at `until` and its availability is measured.
     pub fn soaked(mut self, until: Instant) -> Self {
         self.soak = Some(until);
         self.deadline = until;
         self
     }
 
-    /// Returns the channel parameters from which timings are derived.
+    /// Returns the data rate and the number of users of the links or the channel.
     pub fn channel(&self) -> Channel {
         let near = match self.settings.wiring {
             Wiring::Pair => 1,
@@ -198,7 +206,9 @@ impl Setup {
         }
     }
 
-    /// Returns the load of the shared channel; `None` if senders do not interfere with each other.
+    /// Returns the number of relays that share the channel at one point, and the overhead of a frame.
+    ///
+    /// `None` if senders do not interfere with each other: on separate lines and on an ideal channel.
     pub fn load(&self) -> Option<ChannelLoad> {
         let shared = self.settings.wiring == Wiring::Shared && self.access != Access::Ideal;
         let Channel {
@@ -210,7 +220,7 @@ impl Setup {
         })
     }
 
-    /// Returns the longest time of a sweep message per hop, with 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain, with 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let latency = Duration::from_micros(self.link.latency.as_micros() + 1_000);
         self.load().map_or(self.link.hop_time(), |load| {
@@ -218,7 +228,7 @@ impl Setup {
         })
     }
 
-    /// Returns the key and the epoch of a relay at its `start`th start, from 1; `None` without `auth`.
+    /// Returns the network key and the epoch of a relay at its `start`-th start. `None` without `auth`.
     pub fn proof(&self, start: u32) -> Option<Auth> {
         self.secret().map(|secret| Auth {
             key: Key::new(secret),
@@ -226,7 +236,7 @@ impl Setup {
         })
     }
 
-    /// Returns the key's bytes; `None` without `auth`.
+    /// Returns the bytes of the network key, drawn from the seed; `None` without `auth`.
     pub fn secret(&self) -> Option<[u8; 32]> {
         // Separate generator, so that signing does not change the run's other draws.
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);

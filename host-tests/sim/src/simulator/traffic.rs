@@ -24,33 +24,37 @@ use std::fmt;
 use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
-/// Packets that are offered after the last event of a run, and further packets for each hop.
+/// Number of packets that are sent after the end of a run, so that the rates are meaningful.
+///
+/// [`AFTER_A_HOP`] is the number of further packets for each hop.
 const AFTER: usize = 1_000;
 const AFTER_A_HOP: usize = 30;
 
-/// Largest number of transmissions, over all hops.
+/// Largest number of packet transmissions, over all hops, that is simulated.
 pub const MOST_SENT: f64 = 1e8;
 
-/// Latest end of the traffic, s.
+/// Latest end of the simulated traffic, s of virtual time.
 pub const LATEST_S: f64 = 1e6;
 
-/// Traffic of a run.
+/// Parameters of the data traffic of a run.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TrafficSpec {
-    /// Data link, size of a packet and directions.
+    /// Data link, size of the packets, and directions.
     pub link: DataLink,
-    /// Largest number of packets in a queue, at least 1.
+    /// Largest number of packets in the queue of a node, at least 1.
     pub queue_packets: usize,
-    /// Offered data rate, bit/s, to Rx and back; the promised one if absent.
+    /// Offered data rates, bit/s: to Rx, then back to Tx.
+    ///
+    /// `None` to offer the rates that the planner's formula gives at the first agreement.
     pub offered_bps: Option<[f64; 2]>,
 }
 
-/// Traffic that is too much to simulate.
+/// Error: the simulation of the requested traffic would take too long.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum TrafficError {
-    /// Number of transmissions.
+    /// The number of packet transmissions, this value, is too large.
     TooMany(f64),
-    /// End of the traffic, s.
+    /// The end of the traffic, this value in s of virtual time, is too late.
     TooLong(f64),
 }
 
@@ -72,78 +76,78 @@ impl fmt::Display for TrafficError {
 
 impl std::error::Error for TrafficError {}
 
-/// Counts of packets.
+/// Numbers of packets by what became of them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Packets {
-    /// Packets of the source.
+    /// Number of packets that the source created.
     pub offered: u64,
-    /// Packets that arrived at their end of the chain.
+    /// Number of packets that arrived at the other end of the chain.
     pub delivered: u64,
-    /// Packets dropped by full queues.
+    /// Number of packets that were dropped because a queue was full.
     pub dropped: u64,
-    /// Packets in the queues of relays that went silent.
+    /// Number of packets that were lost in the queues of relays that went silent.
     pub lost: u64,
 }
 
-/// Delivered packets of a period.
+/// Packets of a period and the delays of the delivered ones.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Delivery {
-    /// Counts of the period.
+    /// Numbers of packets in the period.
     pub packets: Packets,
-    /// Delays from source to end, ascending once the traffic has ended.
+    /// Delays of the delivered packets from end to end, ps; sorted once the traffic has ended.
     pub delays: Vec<Ps>,
 }
 
-/// Queue length of a node.
+/// Statistics of the queue of a node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct QueueLength {
-    /// Node: 0 is Tx, then the relays; the last one is Rx.
+    /// Number of the node: 0 is Tx, then the relays follow, the last one is Rx.
     pub node: usize,
-    /// Mean over the time of the traffic, packets.
+    /// Mean length of the queue over the time of the traffic, packets.
     pub mean: f64,
-    /// Largest number of packets.
+    /// Largest length of the queue, packets.
     pub most: usize,
 }
 
-/// Traffic in one direction.
+/// Data traffic of a run in one direction.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flow {
-    /// End of the traffic in this direction.
+    /// End of the traffic in this direction, ps of virtual time.
     pub until: Ps,
-    /// Promised data rate at the first agreement, bit/s.
+    /// Data rate at the positions of the first agreement by the planner's formula, bit/s.
     pub promised_bps: f64,
-    /// Offered data rate, bit/s.
+    /// Data rate of the packets that the source created, bit/s.
     pub offered_bps: f64,
-    /// Delivered data rate over the whole time, bit/s.
+    /// Data rate of the packets that arrived, over the whole time of the traffic, bit/s.
     pub delivered_bps: f64,
-    /// Counts over the whole time.
+    /// Numbers of packets over the whole time of the traffic.
     pub packets: Packets,
-    /// Packets in queues at the end.
+    /// Number of packets that are still in queues at the end of the traffic.
     pub queued: u64,
-    /// Delays of all delivered packets, ascending.
+    /// Delays of all delivered packets from end to end, ps, in ascending order.
     pub delays: Vec<Ps>,
-    /// Queue of every node that sends.
+    /// Queue statistics of every node that sends.
     pub queues: Vec<QueueLength>,
-    /// Delivery in each period of the traffic.
+    /// Packets and delays in each period of [`Traffic::periods`].
     pub periods: Vec<Delivery>,
 }
 
-/// Traffic over the whole chain.
+/// Data traffic of a run in all its directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Traffic {
-    /// Start: the first agreement.
+    /// Start of the traffic, which is the first agreement, ps of virtual time.
     pub from: Ps,
-    /// Latest end of a direction.
+    /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
-    /// Periods.
+    /// Periods in which the view, the state of the chain and the promised data rates do not change.
     pub periods: Vec<Period>,
-    /// Way to Rx and, if data goes both ways, way back.
+    /// Traffic to Rx and, if data goes both ways, traffic back to Tx.
     pub flows: Vec<Flow>,
 }
 
-/// Returns the delay that a fraction of `delays` does not exceed, s; `None` without packets.
+/// Returns the delay, s, that the given fraction of packets does not exceed; `None` without packets.
 ///
-/// `delays` are ascending.
+/// `delays` are in ps, in ascending order.
 pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
     #[expect(
         clippy::cast_possible_truncation,
@@ -155,13 +159,13 @@ pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
     delay.map(|delay| *delay as f64 / SECOND)
 }
 
-/// Sends packets through the chain of a run from its first agreement on; `None` if there was none.
+/// Simulates packets through the chain of a run from its first agreement on; `None` if there was none.
 ///
-/// `outcome` has the recorded states of `relays` relays. A run that ends by itself goes on in its final state, in each direction for
-/// 1000 packets and 30 more for each hop.
+/// `outcome` has the recorded states of `relays` relays. After a run that ends by itself, the traffic goes on in the
+/// final state: in each direction for 1000 packets, and 30 more for each hop.
 ///
 /// # Errors
-/// [`TrafficError`].
+/// [`TrafficError`] if the traffic is too much to simulate.
 pub fn traffic(
     spec: &TrafficSpec,
     true_hops: &TrueHops,
@@ -237,33 +241,35 @@ fn time(seconds: f64) -> Ps {
     (seconds * SECOND) as Ps
 }
 
-/// Queue of a node.
+/// Packet queue of a node, with the state of the packet that it sends.
 #[derive(Clone, Debug, Default)]
 struct Queue {
-    /// Creation times of the packets.
+    /// Time of creation, ps, of each packet in the queue, the oldest first.
     packets: VecDeque<Ps>,
-    /// Hop on which the node sends.
+    /// Hop on which the node sends; `None` while it cannot send.
     hop: Option<Hop>,
-    /// Rest of the first packet's transmission at `since`; 0 before its start.
+    /// Slot time, ps, that the first packet still needs at the time `since`; 0 before it is sent.
     rest: Ps,
     since: Ps,
-    /// Number of the valid end of a transmission; others are ignored.
+    /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
     number: u32,
-    /// Sum of the queue length over time, packets times ps, until `counted`.
+    /// Sum of the queue's length over time until `counted`, packets times ps. It gives the mean length.
     sum: u128,
     counted: Ps,
     most: usize,
 }
 
 impl Queue {
-    /// Adds the time since the last change to the mean.
+    /// Adds the queue's length since the last call to its statistics. Must precede each change of the length.
     fn count(&mut self, now: Ps) {
         self.sum += self.packets.len() as u128 * u128::from(now.saturating_sub(self.counted));
         self.counted = now;
         self.most = self.most.max(self.packets.len());
     }
 
-    /// Begins or continues the transmission of the first packet and returns its end.
+    /// Begins or continues the transmission of the first packet and returns its end, ps.
+    ///
+    /// `None` if the queue is empty or the node cannot send.
     fn send(&mut self, now: Ps) -> Option<Ps> {
         self.number += 1;
         let hop = self.hop.filter(|_| !self.packets.is_empty())?;
@@ -274,7 +280,9 @@ impl Queue {
         Some(hop.window.ends(now, self.rest))
     }
 
-    /// Takes the hop that is valid from `now` on.
+    /// Replaces the hop on which the node sends, from `now` on.
+    ///
+    /// To the same receiver the rest of the first packet is sent at the new rate. To another one it is sent anew.
     fn change(&mut self, hop: Option<Hop>, now: Ps) {
         self.rest = match (self.hop, hop) {
             (Some(old), Some(new)) if old.to == new.to && self.rest > 0 => {
@@ -290,17 +298,19 @@ impl Queue {
     }
 }
 
-/// End of a transmission; of several at the same time the one nearest to the end of the chain is first.
+/// End of a transmission in the queue of events: time, order, node, and number of the transmission.
+///
+/// If several end at the same time, the one nearest to the end of the chain is first.
 type End = Reverse<(Ps, usize, usize, u32)>;
 
-/// Simulation of one direction.
+/// Simulation of the traffic in one direction, while it runs.
 struct Running<'a> {
     spec: &'a TrafficSpec,
     direction: usize,
-    /// Queues of Tx, the relays and Rx.
+    /// Queues of all nodes: Tx, the relays and Rx.
     queues: Vec<Queue>,
     ends: BinaryHeap<End>,
-    /// Time between two packets of the source; `None` if it has none.
+    /// Time between two packets of the source, ps; `None` if it creates none.
     interval: Option<Ps>,
     next: Ps,
     period: usize,
@@ -331,7 +341,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Returns the nodes at which packets begin and end.
+    /// Returns the number of the node that creates the packets, and of the node to which they go.
     fn ends_of_chain(&self) -> [usize; 2] {
         let rx = self.queues.len() - 1;
         if self.direction == 0 {
@@ -352,7 +362,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Changes the hops to those of `stage`.
+    /// Replaces the hops of all nodes by those of `stage`. The queues of relays that are off are lost.
     fn enter(&mut self, stage: &Stage) {
         self.period = stage.period;
         let mut hops: Vec<Option<Hop>> = vec![None; self.queues.len()];
@@ -381,7 +391,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Processes all events before `until`.
+    /// Processes the packets that are created or arrive until `until`.
     fn pass(&mut self, until: Ps) {
         loop {
             let end = self.ends.peek().map_or(Ps::MAX, |Reverse((at, ..))| *at);
@@ -402,7 +412,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Moves the first packet of `node` to the receiver, if its transmission is the valid one.
+    /// Moves the first packet of `node` to its receiver, unless transmission `number` is out of date.
     fn arrive(&mut self, at: Ps, node: usize, number: u32) {
         let Some(queue) = self.queues.get_mut(node) else {
             return;
@@ -427,7 +437,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Adds a packet to the queue of `node`, or drops it.
+    /// Adds a packet, created at `created`, to the queue of `node`. If the queue is full, drops it.
     fn put(&mut self, node: usize, now: Ps, created: Ps) {
         let Some(queue) = self.queues.get_mut(node) else {
             return;
@@ -444,7 +454,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Schedules the end of the present transmission of `node`.
+    /// Lets `node` send the first packet of its queue, if any, and schedules the end of that transmission.
     fn send(&mut self, node: usize, now: Ps) {
         let order = if self.direction == 0 {
             self.queues.len() - node

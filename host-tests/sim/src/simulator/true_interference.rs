@@ -7,61 +7,67 @@ use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{Duration, Instant, Placement, Sample};
 use uav_relay_scenario::scene::{Place, Scene};
 
-/// Interferers and measurements.
+/// True interferers of a run, and parameters of the measurements by which relays locate them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueInterference {
-    /// True interferers at time 0.
+    /// Relays, channel and true interferers, with the interferers' positions at time 0.
     pub scene: Scene,
-    /// Common velocity of the interferers, m/s along the line and to its right.
+    /// Velocity of all interferers: along the line from Tx to Rx and to its right, m/s.
     pub velocity_mps: [f64; 2],
-    /// Independent samples per measurement.
+    /// Number of independent power samples that a relay averages for a measurement.
     pub samples: u32,
-    /// Standard deviation of the shadowing at a position, dB.
+    /// Standard deviation, dB, of the shadowing: a random loss that depends on the position.
     pub shadow_db: f64,
     /// Time between two measurements of a relay.
     pub period: Duration,
-    /// True to measure only once at each position.
+    /// True if a relay measures only once at each of its positions.
     pub once: bool,
-    /// Samples that replace all measurements, handed over at the first one: relay index from 1, sample.
+    /// Given samples that replace all measurements: the relay's number from 1, and the sample.
+    ///
+    /// Relays get them at the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
-    /// Broken receivers.
+    /// Measuring receivers that report wrong powers.
     pub broken: Vec<Broken>,
-    /// Start and end of the measurements at the transmitter and the receiver.
+    /// Start and end of the period in which Tx and Rx measure the interference, too.
     pub ends_during: [Instant; 2],
-    /// True if both ends measure, too. With keys they send the result by radio; without, the last relay has a wire to the
-    /// receiver.
+    /// True if Tx and Rx measure the interference, too.
+    ///
+    /// With a network key they send the results by radio. Without one, only the measurement at Rx arrives, by a wire
+    /// to the last relay.
     pub ends: bool,
-    /// End of the run.
+    /// Time of the last measurement, which ends the run.
     pub until: Instant,
-    /// Seed of the shadowing.
+    /// Seed of the shadowing at each position.
     pub seed: u64,
 }
 
-/// Broken receiver that reports wrong powers.
+/// Measuring receiver that reports wrong powers from some time on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Broken {
-    /// Node number: relay index from 1, 0 for the transmitter, N + 1 for the receiver.
+    /// Number of the node with the wrong receiver: a relay from 1, 0 for Tx, N + 1 for Rx.
     pub node: u16,
-    /// Kind of the error.
+    /// Power that the receiver reports instead of the true one.
     pub says: SensorReading,
-    /// Start of the error.
+    /// Time from which the reported powers are wrong.
     pub since: Instant,
 }
 
-/// Error of a broken receiver.
+/// Power that a broken receiver reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SensorReading {
-    /// Factor on the true power.
+    /// The true interference times this factor.
     Times(f64),
-    /// Constant power, W.
+    /// A constant power, W, whatever the true interference.
     Always(f64),
 }
 
-/// Size of a cell with common shadowing, m.
+/// Edge of the cubes in which space is divided, m. All positions in a cube have the same shadowing.
 const SHADOW_M: f64 = 5.0;
 
 impl TrueInterference {
-    /// Measurements of 1000 samples once a second, without shadowing, for ten minutes.
+    /// Creates measurements of 1000 samples once a second for ten minutes, without shadowing.
+    ///
+    /// The interferers of `scene` do not move.
     pub const fn of(scene: Scene) -> Self {
         Self {
             scene,
@@ -79,7 +85,7 @@ impl TrueInterference {
         }
     }
 
-    /// Returns the scene with the interferers' positions at `now`.
+    /// Returns the scene with the interferers' positions at the virtual time `now`.
     pub fn scene_at(&self, now: Instant) -> Scene {
         let seconds = now.as_micros() as f64 * 1e-6;
         let mut scene = self.scene.clone();
@@ -91,7 +97,7 @@ impl TrueInterference {
         scene
     }
 
-    /// Draws the power that relay `index` (from 1) measures at `at`, W.
+    /// Draws the power, W, that relay `index` (from 1) measures at the position `at`, with shadowing.
     pub(super) fn heard_w(
         &self,
         scene: &Scene,
@@ -104,7 +110,9 @@ impl TrueInterference {
         self.said_w(scene, index, now, true_w, rng)
     }
 
-    /// Draws the power that `node` reports for a true interference of `true_w`, W.
+    /// Draws the power, W, that `node` reports if the true interference is `true_w`, W.
+    ///
+    /// It includes the noise, the random error of the mean of the samples, and the error of a broken receiver.
     fn said_w(
         &self,
         scene: &Scene,
@@ -142,13 +150,13 @@ impl TrueInterference {
         self.ends && now >= from && now < until
     }
 
-    /// Draws the mean of `samples` exponential variables with mean 1.
+    /// Draws the factor of a measurement's error: the mean of `samples` exponential variables of mean 1.
     fn mean(&self, rng: &mut impl Rng) -> f64 {
         let samples = f64::from(self.samples);
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
     }
 
-    /// Returns the standard normal shadowing value of the cell of `at`.
+    /// Returns the shadowing at `at` in standard deviations. It is equal in a whole cell of [`SHADOW_M`].
     #[expect(clippy::cast_possible_truncation, reason = "a number of a cell")]
     fn shadow(&self, at: Place) -> f64 {
         use rand::SeedableRng as _;
@@ -164,24 +172,26 @@ fn decibel(db: f64) -> f64 {
     libm::pow(10.0, db / 10.0)
 }
 
-/// Snapshot of the relays at a measurement.
+/// Snapshot of the relays' positions and estimate at the time of a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stand {
     /// Time of the snapshot.
     pub at: Instant,
-    /// Indices of the living relays, from 1.
+    /// Numbers of the relays that are on, from 1.
     pub nodes: Vec<u16>,
-    /// Position of each living relay that has one. Its drone's, or its setpoint if drones are not simulated.
+    /// Position of each relay that is on and has one: that of its drone, or its setpoint without drones.
     pub places: Vec<Placement>,
-    /// Setpoints; `None` unless every relay has one.
+    /// Setpoints of all relays; `None` unless every relay has one.
     pub goals: Option<Vec<Placement>>,
-    /// Interference estimate of relay 1.
+    /// Estimate of the interference by relay 1.
     pub believed: NumberedEstimate,
-    /// Number of agreements on new positions until this time.
+    /// Number of times that the relays have agreed on new positions until this time.
     pub agreements: u32,
 }
 
-/// Draws an interference power, W: `i_max_w` times a Beta variable. NaN if a shape parameter is not above 0.
+/// Draws an interference power, W: `i_max_w` times a variable with a Beta distribution.
+///
+/// NaN if a shape parameter, `alpha` or `beta`, is not above 0.
 #[expect(clippy::cast_possible_truncation, reason = "samples on board are f32")]
 pub fn beta_w(rng: &mut impl Rng, alpha: f64, beta: f64, i_max_w: f32) -> f32 {
     let part = Beta::new(alpha, beta).map_or(f64::NAN, |shape| shape.sample(rng));

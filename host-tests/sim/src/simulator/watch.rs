@@ -10,12 +10,12 @@ pub use super::outcome::Watched;
 use super::outcome::{Ending, Outcome};
 use super::setup::Setup;
 
-/// Running statistics.
+/// Statistics of a run while it goes on: availability, simultaneous groups, smallest distance.
 #[derive(Debug)]
 pub struct Watch {
     pub(super) seen: Vec<Seen>,
     pub(super) optima: Optima,
-    /// Last setpoint of each relay.
+    /// Last setpoint of each relay, from relay 1; `None` before its first one. Relays that are off keep theirs.
     stood: Vec<Option<Point>>,
     until: Instant,
     first: Option<Instant>,
@@ -28,7 +28,9 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Starts with the given states; `run` computes the reference positions.
+    /// Starts the statistics with the states `seen` of the relays.
+    ///
+    /// `run` simulates a chain without faults, to compute the positions with which this chain is compared.
     pub fn new(seen: Vec<Seen>, run: Run) -> Self {
         Self {
             stood: vec![None; seen.len()],
@@ -45,7 +47,7 @@ impl Watch {
         }
     }
 
-    /// Advances the time to `now` with unchanged states.
+    /// Counts the time since the last call, with unchanged states, as available or as outage.
     pub fn go_on(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
@@ -61,7 +63,7 @@ impl Watch {
         }
     }
 
-    /// Updates the state of relay `at` (from 0). Returns true if it changed.
+    /// Replaces the state of relay `at` (from 0) and updates the smallest distance. Returns true on a change.
     pub fn see(&mut self, at: usize, seen: Seen) -> bool {
         let Some(known) = self.seen.get_mut(at) else {
             return false;
@@ -91,7 +93,7 @@ impl Watch {
         }
     }
 
-    /// Evaluates the states after all changes at `now`.
+    /// Updates the number of groups and the first agreement, after all changes of states at `now`.
     pub fn take_in(&mut self, now: Instant) {
         self.most_flying = self.most_flying.max(groups(&self.seen));
         if self.first.is_none() && has_agreed(&self.seen) {
@@ -99,7 +101,9 @@ impl Watch {
         }
     }
 
-    /// Sets if the chain is at its optimum from now on.
+    /// Sets whether the chain counts as available from now on.
+    ///
+    /// It does while the longest possible chain of the living relays holds the positions that it has without faults.
     pub fn judge(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);
@@ -107,7 +111,10 @@ impl Watch {
         self.is_right = is_right;
     }
 
-    /// Returns the statistics up to `now`; `flown_m` is the smallest distance of simulated drones.
+    /// Returns the statistics up to `now`.
+    ///
+    /// The availability is `None` unless `is_judged`. `flown_m` is the smallest distance of simulated drones, m,
+    /// which replaces that of setpoints.
     pub fn end(mut self, now: Instant, is_judged: bool, flown_m: Option<f64>) -> Watched {
         self.go_on(now);
         let share = self.first.map_or(0.0, |first| {
@@ -123,31 +130,31 @@ impl Watch {
     }
 }
 
-/// Observed state of a relay.
+/// State of a relay as the statistics of a run use it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Seen {
     /// True if the relay is switched on.
     pub is_on: bool,
-    /// Phase of the relay.
+    /// Phase of the relay's protocol, such as planning or holding a position.
     pub phase: Phase,
-    /// Current view.
+    /// View of the relay: the membership of the chain that it has accepted.
     pub view: ViewId,
-    /// True while the relay's lease is valid by its own clock.
+    /// True while the relay may rely on the last agreement: its lease is valid by its own clock.
     pub leased: bool,
-    /// Number of relays in the view.
+    /// Number of relays in the relay's view (membership of the chain).
     pub relays: u16,
-    /// Index of the relay in the view, from 1.
+    /// Index of the relay in its view (membership of the chain), from 1 next to Tx.
     pub index: u16,
-    /// Version of its mission.
+    /// Version of the relay's mission; 0 for the loaded one.
     pub version: u16,
-    /// Target SIR of its position, linear.
+    /// Linear target SIR of the relay's position; `None` without a target.
     pub target: Option<f32>,
-    /// Setpoint: x, y and altitude, m.
+    /// Setpoint of the relay: x, y and altitude, m; `None` without one.
     pub place: Option<Point>,
 }
 
 impl Seen {
-    /// Captures the state of `relay`.
+    /// Reads the state of `relay`; `is_on` is false if the relay is switched off.
     pub fn of(relay: &Relay, is_on: bool) -> Self {
         Self {
             is_on,
@@ -166,16 +173,16 @@ impl Seen {
         (self.view, self.relays)
     }
 
-    /// Returns true if the relay is on, holds a lease and has a setpoint.
+    /// Returns true if the relay can control a drone: it is on, holds a lease and has a setpoint.
     fn flies(&self) -> bool {
         self.is_on && self.leased && self.place.is_some()
     }
 }
 
-/// Returns the number of groups that each hold an agreement of their own.
+/// Returns the number of groups of relays that each hold an agreement of their own.
 ///
-/// A group consists of the relays of one view with valid leases. Relays of one view that claim the same index belong to different
-/// groups. Relays separated by a partition that still hold their common agreement are one group.
+/// A group consists of the relays of one view with valid leases. Relays of one view that claim the same index belong
+/// to different groups. Relays separated by a partition that still hold their common agreement are one group.
 pub fn groups(seen: &[Seen]) -> usize {
     let mut views: BTreeMap<(ViewId, u16), BTreeMap<u16, usize>> = BTreeMap::new();
     for one in seen.iter().filter(|one| one.flies()) {
@@ -186,7 +193,7 @@ pub fn groups(seen: &[Seen]) -> usize {
     claims.sum()
 }
 
-/// Returns true if all relays of some view hold their positions for the same target.
+/// Returns true if in some view all relays hold their positions for the same target SIR.
 pub fn has_agreed(seen: &[Seen]) -> bool {
     seen.iter().filter(|one| one.is_on).any(|one| {
         let same = |other: &&Seen| {
@@ -199,13 +206,13 @@ pub fn has_agreed(seen: &[Seen]) -> bool {
     })
 }
 
-/// Largest number of chains returned; sparse links can allow far more.
+/// Largest number of chains that [`longest`] returns. Sparse links allow far more, which would take too long.
 const MOST: usize = 1_000;
 
-/// Returns the length of the longest chains, and those chains whose members all satisfy `with`.
+/// Returns the largest number of relays that can form a chain, and the chains of that many relays.
 ///
-/// `on` lists the relays in ascending order, from 0; `links` returns true for two linked relays, the lower one first. At most
-/// 1000 chains are returned.
+/// `on` lists the usable relays in ascending order, from 0. `links` returns true for two linked relays, the lower one
+/// first. Only chains whose members all satisfy `with` are returned, at most 1000.
 pub fn longest(
     on: &[usize],
     links: impl Fn(usize, usize) -> bool,
@@ -309,16 +316,16 @@ mod tests {
     }
 }
 
-/// Largest distance of positions that count as equal, m.
+/// Largest distance of two positions that count as equal, m.
 const SAME_M: f64 = 1e-3;
 
-/// Positions of a chain; `None` if it did not settle.
+/// Positions of a chain's relays, in order from Tx; `None` if the chain did not settle.
 pub type Places = Option<Vec<Point>>;
 
-/// Function that runs a chain to its end; `None` if a relay rejects its settings.
+/// Function that runs a simulated chain to its end; `None` if a relay rejects its settings.
 pub type Run = fn(Setup) -> Option<Outcome>;
 
-/// Cache of reference positions, by the members of the chain and the version of the mission.
+/// Cache of the positions in which chains settle without faults, by relays and mission version.
 #[derive(Debug)]
 pub struct Optima {
     run: Run,
@@ -326,7 +333,7 @@ pub struct Optima {
 }
 
 impl Optima {
-    /// Empty cache; `run` computes missing entries.
+    /// Creates an empty cache. `run` simulates a chain without faults to compute missing positions.
     pub fn new(run: Run) -> Self {
         Self {
             run,
@@ -334,7 +341,9 @@ impl Optima {
         }
     }
 
-    /// Returns true if `places` are the reference positions of relays `nodes` (from 1) and this mission.
+    /// Returns true if `places` are the positions in which relays `nodes` (from 1) settle without faults.
+    ///
+    /// `version` is the version of their mission. False if a position is missing.
     pub fn is_met(
         &mut self,
         setup: &Setup,
@@ -357,7 +366,9 @@ impl Optima {
     }
 }
 
-/// Returns a fault-free setup with only `nodes` and the mission of `version`. `None` if the mission or the count is invalid.
+/// Returns the setup of a fault-free run of only the relays `nodes`, with the mission of `version`.
+///
+/// `None` if the mission is invalid or does not allow that number of relays.
 pub fn alone(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
     let uploaded = setup
         .uploads
@@ -386,13 +397,13 @@ pub fn alone(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
     Some(clean)
 }
 
-/// Returns the final positions of a settled run.
+/// Returns the final positions of a run, relay 1 first; `None` unless the run settled.
 pub fn places_of(outcome: &Outcome) -> Places {
     let places = outcome.relays.iter().map(|relay| relay.setpoint.map(point));
     (outcome.ending == Ending::Settled).then(|| places.collect())?
 }
 
-/// Returns the positions in which a chain of only `nodes` settles without faults.
+/// Returns the positions in which a chain of only the relays `nodes` (from 1) settles without faults.
 pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {
     places_of(&run(alone(setup, nodes, version)?).ok()?)
 }

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-/// Style sheet with a single sans-serif family, so that no font has to be embedded.
+/// Style sheet of the pictures. It names only usual sans-serif fonts, so that no font has to be embedded.
 const STYLE: &str = "\
 text{font-family:Helvetica,Arial,'DejaVu Sans',sans-serif;font-size:10px;fill:#222;text-anchor:middle}\
 .title{font-size:13px;font-weight:bold}.subtitle{font-size:12px}.axis{font-size:11px}\
@@ -15,7 +15,7 @@ line,path{fill:none;stroke:#222;stroke-width:1px}\
 .beside{fill:#fff;stroke:#cc79a7;stroke-width:2px}\
 .before{fill:#fff;stroke:#cc79a7;stroke-width:.8px;stroke-dasharray:2 1.5}.faint{fill:#888}";
 
-/// Point in picture units; y points downward.
+/// Point (x, y) in picture units; y points downward.
 pub(super) type Point = (f64, f64);
 
 pub(super) struct Canvas {
@@ -32,7 +32,7 @@ impl Canvas {
         canvas
     }
 
-    /// Writes the title, the style sheet and the white background.
+    /// Writes the document's title for screen readers, `words`, the style sheet and the white background.
     pub(super) fn describe(&mut self, words: &str) {
         let words = escape(words);
         self.put(format_args!(
@@ -55,7 +55,7 @@ impl Canvas {
         ));
     }
 
-    /// Draws a line with its own colour and width, optionally dashed, with a tooltip.
+    /// Draws the line of a hop between two points, with its colour and width and a tooltip `tip`.
     pub(super) fn hop(
         &mut self,
         [(x1, y1), (x2, y2)]: [Point; 2],
@@ -80,7 +80,7 @@ impl Canvas {
         ));
     }
 
-    /// Draws a sample of a hop's line in the legend.
+    /// Draws a sample of a hop's line for the legend, from (`x`, `y`) to the right.
     pub(super) fn swatch(&mut self, (x, y): Point, length: f64, (colour, width): (&str, f64)) {
         let [x, y, end, width] = [x, y, x + length, width].map(short);
         self.put(format_args!(
@@ -101,7 +101,9 @@ impl Canvas {
         ));
     }
 
-    /// Draws a relay with a tooltip. Only relays are circles, so tests can count them.
+    /// Draws a relay as a circle with a tooltip. No other shape is a circle, so that tests can count relays.
+    ///
+    /// `rim` is the width of the outline.
     pub(super) fn relay(
         &mut self,
         (x, y): Point,
@@ -117,7 +119,7 @@ impl Canvas {
         ));
     }
 
-    /// Draws a relay symbol for the legend, as a path instead of a circle.
+    /// Draws the symbol of a relay, or a dot, as a path. It is no circle, because tests count circles as relays.
     pub(super) fn disc(&mut self, (x, y): Point, radius: f64, class: &str) {
         let [x, y, r] = [x - radius, y, radius].map(short);
         let turn = short(2.0 * radius);
@@ -134,7 +136,7 @@ impl Canvas {
         ));
     }
 
-    /// Writes a symbol with a subscript and further text.
+    /// Writes a text that begins with a symbol and its subscript, `index`.
     pub(super) fn subscripted(
         &mut self,
         (x, y): Point,
@@ -149,7 +151,7 @@ impl Canvas {
         ));
     }
 
-    /// Writes text that reads upward.
+    /// Writes text that is rotated to read from bottom to top.
     pub(super) fn upward(&mut self, (x, y): Point, class: &str, words: &str) {
         let [x, y] = [x, y].map(short);
         let words = escape(words);
@@ -164,7 +166,7 @@ impl Canvas {
     }
 }
 
-/// Returns the path data of a closed polygon.
+/// Returns the data of an SVG path: the closed polygon through `points`.
 fn outline(points: &[Point]) -> String {
     let mut data = String::new();
     for (index, (x, y)) in points.iter().enumerate() {
@@ -174,7 +176,7 @@ fn outline(points: &[Point]) -> String {
     data + "Z"
 }
 
-/// Rounds a coordinate to hundredths; non-finite values become 0.
+/// Rounds a coordinate to two decimals. Values that are not finite become 0.
 fn short(value: f64) -> f64 {
     let hundredths = (100.0 * value).round();
     // The addition turns -0 into 0.
@@ -185,7 +187,7 @@ fn short(value: f64) -> f64 {
     }
 }
 
-/// Escapes text for XML; characters that XML 1.0 excludes are replaced.
+/// Escapes text for XML. Control characters and others that XML 1.0 excludes are replaced by U+FFFD.
 fn escape(words: &str) -> String {
     let mut out = String::with_capacity(words.len());
     for c in words.chars() {
@@ -201,14 +203,16 @@ fn escape(words: &str) -> String {
     out
 }
 
-/// Linear map from a quantity to a picture coordinate.
+/// Linear map from a quantity, such as a distance in metres, to a coordinate of the picture.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     from: (f64, f64),
     to: (f64, f64),
 }
 
-/// Scales of a plot: along the line, and the height or, in the top view, the lateral offset.
+/// Scales of a plot's two axes.
+///
+/// `x` is along the line from Tx to Rx. `h` is the height or, in the view from above, the lateral offset.
 pub(super) struct Frame {
     pub(super) x: Scale,
     pub(super) h: Scale,
@@ -219,18 +223,18 @@ impl Scale {
         Self { from, to }
     }
 
-    /// Returns the coordinate of a quantity, limited to the scale's ends.
+    /// Returns the picture coordinate of a quantity; that of the scale's end for a quantity beyond it.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = ((value - self.from.0) / (self.from.1 - self.from.0)).clamp(0.0, 1.0);
         self.to.0 + share * (self.to.1 - self.to.0)
     }
 
-    /// Returns true if a quantity is on the scale.
+    /// Returns true if a quantity is within the range of the scale.
     pub(super) fn holds(&self, value: f64) -> bool {
         (self.from.0..=self.from.1).contains(&value)
     }
 
-    /// Returns about `most` round ticks and their number of decimals.
+    /// Returns at most about `most` round values for the ticks of an axis, and their number of decimals.
     fn ticks(&self, most: f64) -> (Vec<f64>, usize) {
         let step = round_step((self.from.1 - self.from.0) / most);
         let first = (self.from.0 / step).ceil();
@@ -254,7 +258,7 @@ impl Frame {
     }
 }
 
-/// Returns the smallest of 1, 2 and 5 times a power of ten that is at least `least`.
+/// Returns the smallest value of at least `least` that is 1, 2 or 5 times a power of ten.
 pub(super) fn round_step(least: f64) -> f64 {
     let power = 10.0_f64.powf(least.log10().floor());
     let steps = [1.0, 2.0, 5.0].map(|digit| digit * power);
@@ -265,7 +269,7 @@ pub(super) fn round_step(least: f64) -> f64 {
         .unwrap_or(10.0 * power)
 }
 
-/// Draws the grid and the axes; `upright` is the name of the vertical axis.
+/// Draws the grid, the axes and their ticks. `upright` is the name of the vertical axis.
 pub(super) fn draw_axes(canvas: &mut Canvas, frame: &Frame, upright: &str) {
     let (left, right) = frame.x.to;
     let (low, high) = frame.h.to;
@@ -289,7 +293,7 @@ pub(super) fn draw_axes(canvas: &mut Canvas, frame: &Frame, upright: &str) {
     canvas.upward((14.0, f64::midpoint(top, bottom)), "axis", upright);
 }
 
-/// Half of the assumed line width.
+/// Half of the width that lines are assumed to have, when labels must not touch them.
 const HALF_LINE: f64 = 1.6;
 
 #[derive(Clone, Copy)]
@@ -298,7 +302,7 @@ pub(super) struct Area {
     high: Point,
 }
 
-/// Occupied areas and lines of the plot.
+/// Areas and lines of a plot that are occupied, so that labels do not overlap them.
 pub(super) struct Labels {
     plot: Area,
     taken: Vec<Area>,
@@ -327,7 +331,7 @@ impl Area {
             && self.high.1 <= other.high.1
     }
 
-    /// Returns true if a line crosses the area (clipping at each edge).
+    /// Returns true if the line between two points crosses the area, by clipping it at each edge.
     fn crossed(&self, [from, to]: &[Point; 2]) -> bool {
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         let sides = [
@@ -352,7 +356,7 @@ impl Area {
 }
 
 impl Labels {
-    /// Empty plot with these corners.
+    /// Creates an empty plot between two corners, in which labels may be placed.
     pub(super) const fn inside(low: Point, high: Point) -> Self {
         Self {
             plot: Area { low, high },
@@ -366,17 +370,17 @@ impl Labels {
         self.taken.push(area);
     }
 
-    /// Marks a line as occupied.
+    /// Marks a line as occupied, so that no label is placed on it.
     pub(super) fn take_line(&mut self, line: [Point; 2]) {
         self.lines.push(line);
     }
 
-    /// Returns true if a line crosses no occupied area.
+    /// Returns true if the line between two points crosses no occupied area.
     pub(super) fn clear(&self, line: &[Point; 2]) -> bool {
         !self.taken.iter().any(|area| area.crossed(line))
     }
 
-    /// Occupies the area if it is inside the plot and free. Returns true on success.
+    /// Marks the area as occupied if it is inside the plot and free. Returns true if it was.
     pub(super) fn try_take(&mut self, area: Area) -> bool {
         let free = area.inside(&self.plot)
             && !self.taken.iter().any(|other| area.meets(other))
@@ -388,7 +392,9 @@ impl Labels {
     }
 }
 
-/// Estimates the width of a text from a wide sans-serif font's average. Rather too wide than too narrow.
+/// Estimates the width of a text in picture units, for the font size `size`. Rather too wide than too narrow.
+///
+/// It takes the mean width of a character in a wide sans-serif font.
 pub(super) fn width(words: &str, size: f64) -> f64 {
     words.chars().count() as f64 * 0.62 * size
 }

@@ -16,9 +16,10 @@ use picture::{
 pub use picture::{OtherInterferers, Picture, Room, room};
 use sources::{diamond, has_beside};
 
-/// Draws the chain as an SVG document.
+/// Draws the chain as an SVG document: from the side and, if useful, from above.
 ///
-/// Overlapping numbers are omitted; every hop and relay has its number in a tooltip. The work is at most quadratic in N.
+/// Numbers that would overlap are omitted, but every hop and relay has a tooltip. The work is at most quadratic in
+/// the number of relays.
 #[must_use]
 pub fn draw(picture: &Picture) -> String {
     let frame = frame(picture);
@@ -45,7 +46,7 @@ pub fn draw(picture: &Picture) -> String {
     canvas.finish()
 }
 
-/// Returns the scales of the axes. x includes the chain and all near interferers; h starts at the ground.
+/// Returns the scales of the side view. The scale x has the chain and all near interferers; h begins at the ground.
 fn frame(picture: &Picture) -> Frame {
     let distance = length(picture);
     let (mut low, mut high, mut top) = (0.0_f64, distance, 0.0_f64);
@@ -69,7 +70,7 @@ fn frame(picture: &Picture) -> Frame {
     }
 }
 
-/// Returns the text of the title, also used by screen readers.
+/// Returns a summary of the picture for its title, which screen readers read: method, relays and SIR.
 fn summary(picture: &Picture) -> String {
     let sir = worst(picture).map_or_else(|| "unknown".to_owned(), both_units);
     format!(
@@ -79,7 +80,7 @@ fn summary(picture: &Picture) -> String {
     )
 }
 
-/// Formats the number of relays; with the remaining ones if some have left the chain.
+/// Formats the number of relays: "N = 8", or "6 of 8" if some have left the chain.
 fn count(picture: &Picture) -> String {
     let all = picture.nodes.len();
     if picture.left_out.is_empty() {
@@ -120,19 +121,25 @@ fn title(canvas: &mut Canvas, picture: &Picture) {
     );
 }
 
-/// Edges of the plot, below the axis of the side view.
+/// Upper edge of the view from above, in picture units. It lies below the axis of the side view.
+///
+/// [`PLOT_BOTTOM`] is its lower edge.
 const PLOT_TOP: f64 = BOTTOM + 52.0;
 const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
 const SIZE: f64 = 10.0;
 
-/// Limit of the plot for interferers, in half-widths of the room; farther ones are arrows at its edge.
+/// Largest lateral offset of an interferer in the view from above, relative to the relays' limit.
+///
+/// An interferer farther away is an arrow at the edge.
 const FARTHEST: f64 = 2.0;
 
-/// Distance beside the line that is shown toward interferers beyond the limit, in lengths of the line.
+/// Lateral extent of the view from above toward an interferer too far away, in distances from Tx to Rx.
+///
+/// It applies if relays must stay on the line.
 const TOWARD_FAR: f64 = 0.4;
 
-/// Draws the top view; `side` provides the scale along the line.
+/// Draws the view from above. `side` has the scale along the line; `room` has the relays' lateral offsets.
 fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &Room) {
     let xs = picture.nodes.iter().map(|(x, _)| *x);
     let ys = room.y_m.iter().copied().chain(std::iter::repeat(f64::NAN));
@@ -171,7 +178,9 @@ fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &Room)
     label(canvas, &mut labels, edges);
 }
 
-/// Returns the vertical scale for the room, all relays, and the interferers within the limit.
+/// Returns the vertical scale of the view from above.
+///
+/// It includes the relays, the lateral limits for them, and the interferers that are not too far away.
 fn upright(seen: &Picture, room: &Room) -> Scale {
     let (mut low, mut high) = (room.least_m.min(0.0), room.most_m.max(0.0));
     let reach = if room.is_line() {
@@ -207,7 +216,9 @@ fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, distance: f64) 
     }
 }
 
-/// Labels the dashed edges at a free position near either end.
+/// Labels the dashed lateral limits of the relays near the left or right end, if there is free space.
+///
+/// `left` and `right` are the vertical coordinates of the two limits.
 fn label(canvas: &mut Canvas, labels: &mut Labels, [left, right]: [f64; 2]) {
     let words = "edges of the room for relays";
     let size = (width(words, SIZE) + 4.0, SIZE + 1.0);
@@ -250,19 +261,19 @@ fn draw_legend(canvas: &mut Canvas, picture: &Picture) {
 
 const STRIP: f64 = 84.0;
 
-/// Distance from the picture's bottom to the event line.
+/// Distance of the line with the events from the bottom of the legend, in picture units.
 const LINE: f64 = 48.0;
 
-/// Distance of the first and the last event from the edges.
+/// Distance of the first and the last event from the picture's left and right edge, in picture units.
 const MARGIN: f64 = 52.0;
 
-/// Largest number of events shown.
+/// Largest number of events in a picture. The middle ones of more are merged.
 const MOST: usize = 8;
 
-/// Largest number of characters per event.
+/// Largest number of characters in the text of an event. Longer texts are cut.
 const LONGEST: usize = 18;
 
-/// Returns the strip's height; 0 without events.
+/// Returns the height of the strip with the events, in picture units; 0 without events.
 fn events_height(picture: &Picture) -> f64 {
     if picture.events.is_empty() {
         0.0
@@ -295,7 +306,7 @@ fn draw_events(canvas: &mut Canvas, picture: &Picture) {
     }
 }
 
-/// Returns times and texts of the events; the middle ones are merged if there are too many.
+/// Returns the times and texts of the events as shown. If there are too many, the middle ones are merged.
 fn shown(events: &[(f64, String)]) -> Vec<(String, String)> {
     let mut shown: Vec<(String, String)> = events
         .iter()

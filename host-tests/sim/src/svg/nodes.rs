@@ -5,7 +5,7 @@ use super::picture::{Picture, decibels, is_gone, length, placed, worst};
 
 const SIZE: f64 = 9.0;
 
-/// Draws Tx and Rx on the ground with their names outside the chain.
+/// Draws Tx and Rx on the ground, with their names to the left of Tx and to the right of Rx.
 pub(super) fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, distance: f64) {
     for (name, x, side) in [("Tx", 0.0, -1.0), ("Rx", distance, 1.0)] {
         let (x, y) = frame.at((x, 0.0));
@@ -17,14 +17,16 @@ pub(super) fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, dist
     }
 }
 
-/// Returns the radius of a relay's circle, small enough to leave the hops visible.
+/// Returns the radius of the circles for relays, in picture units. It leaves the hops between them visible.
 pub(super) fn radius(picture: &Picture, frame: &Frame) -> f64 {
     let hops = picture.nodes.len() as f64 + 1.0;
     let spacing = (frame.x.at(length(picture)) - frame.x.at(0.0)) / hops;
     (0.22 * spacing).clamp(0.5, 4.0)
 }
 
-/// Draws the relays; `upright` is the name of the vertical axis.
+/// Draws the relays as circles, crossed out if they are lost.
+///
+/// `upright` is the name of the vertical axis, for the tooltips.
 pub(super) fn relays(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -64,7 +66,9 @@ pub(super) fn cross(canvas: &mut Canvas, (x, y): Point, arm: f64) {
     canvas.line((x - arm, y + arm), (x + arm, y - arm), "cross");
 }
 
-/// Numbers the relays. In a short chain all have a number, in a long one every fifth, tenth and so on, and the lost ones.
+/// Writes the numbers of the relays where there is free space.
+///
+/// In a short chain every relay gets a number. In a long one, every fifth, tenth and so on does, and the lost ones.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let radius = radius(picture, frame);
     let step = round_step((picture.nodes.len() as f64 / 12.0).max(1.0));
@@ -93,7 +97,9 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
     }
 }
 
-/// Hop classes: dB above the worst hop, colour (Okabe-Ito), width (for colourless prints), legend.
+/// Classes of hops by SIR: limit in dB above the worst hop, colour, line width, text in the legend.
+///
+/// The colours are those of Okabe and Ito. The worst class is wider, for prints without colour.
 pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
     (0.1, "#d55e00", 3.2, "< 0.1 dB"),
     (1.0, "#e69f00", 2.4, "< 1 dB"),
@@ -105,14 +111,18 @@ const UNKNOWN: (&str, f64) = ("#999999", 2.4);
 
 const SIR_SIZE: f64 = 10.0;
 
-/// Distance of an SIR label from its hop's line, larger than the radius of a relay's circle.
+/// Distance of the text with a hop's SIR from the line of the hop, in picture units.
+///
+/// It is larger than the radius of a relay's circle.
 const GAP: f64 = 4.6;
 
-/// Candidate positions of a number: share of the hop's length, and distance above (negative: below).
+/// Places along a hop at which its SIR may be written, as fractions of its length.
+///
+/// [`SIDES`] has the distances from the hop: positive above, negative below.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
-/// Largest number of hops whose SIR labels are all drawn. Pictures of longer chains omit some labels.
+/// Largest number of hops for which each SIR is written beside its hop. More are written in one row.
 const FEW: usize = 21;
 
 pub(super) struct Hop {
@@ -123,7 +133,7 @@ pub(super) struct Hop {
     silent: bool,
 }
 
-/// Returns the hops between the relays that have a position.
+/// Returns the hops of the chain with their lines and colours. Hops at relays without a position are left out.
 pub(super) fn hops(picture: &Picture, frame: &Frame) -> Vec<Hop> {
     let worst = worst(picture).and_then(decibels);
     let last = picture.nodes.len() + 1;
@@ -160,7 +170,7 @@ pub(super) fn hops(picture: &Picture, frame: &Frame) -> Vec<Hop> {
     hops
 }
 
-/// Draws the lines; the worst hops last, on top.
+/// Draws the lines of the hops, the worst hops last, so that they are on top.
 pub(super) fn draw_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     let mut order: Vec<&Hop> = hops.iter().collect();
     order.sort_by(|a, b| a.colour.1.total_cmp(&b.colour.1));
@@ -178,7 +188,9 @@ pub(super) fn draw_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) 
     }
 }
 
-/// Writes the SIRs for which there is room: the worst hop's first, then the two ends', then the others.
+/// Writes the SIRs of the hops where there is free space.
+///
+/// The worst hop comes first, then the first and the last hop, then the others.
 pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) {
     let last = hops.last().map_or(0, |hop| hop.number);
     let lowest = hops.iter().filter_map(|hop| hop.decibels).reduce(f64::min);
@@ -220,7 +232,9 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
     }
 }
 
-/// Returns candidate positions of a hop's number, the best first, each with its anchor on the hop.
+/// Returns positions at which a hop's SIR may be written, the best first, each with a point on the hop.
+///
+/// `width` and `height` are those of the text.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);
@@ -239,7 +253,9 @@ fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> V
     places
 }
 
-/// Draws a line from a number to its hop if the hop is much shorter than the number.
+/// Draws a line from a hop's SIR to the hop, if the hop is shorter than that text.
+///
+/// Without it, the reader could not tell to which hop the text belongs.
 fn leader(canvas: &mut Canvas, hop: &Hop, from: Point, to: Point, (width, height): Point) {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);

@@ -2,58 +2,60 @@
 
 use uav_relay::Mission;
 
-/// Size in picture units; at half a page width the smallest text is about 5 pt.
+/// Width of a picture, in picture units. At half a page width the smallest text is about 5 pt.
+///
+/// [`HEIGHT`] is the height of one without a view from above and without events.
 pub(super) const WIDTH: f64 = 480.0;
 pub(super) const HEIGHT: f64 = 330.0;
 
-/// Edges of the plot, inside the title, the vertical axis and the legend.
+/// Left edge of the side view, in picture units. All edges leave space for title, vertical axis and legend.
 pub(super) const LEFT: f64 = 54.0;
 pub(super) const RIGHT: f64 = WIDTH - 14.0;
 pub(super) const TOP: f64 = 46.0;
 pub(super) const BOTTOM: f64 = HEIGHT - 80.0;
 
-/// Additional height of a picture with a top view.
+/// Additional height of a picture with a view from above, in picture units.
 pub(super) const ABOVE: f64 = 232.0;
 
-/// Contents of a picture of N relays.
+/// Contents of a picture of a chain of N relays.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Picture {
-    /// Planning method, for the title; any text.
+    /// Name of the planning method, as text for the title.
     pub title_method: String,
     /// Distance from Tx to Rx, m, above 0.
     pub distance_m: f64,
-    /// Interferers: transmit power, W, position x and offset y on the ground, m.
+    /// Interferers: transmit power, W, and position x along the line and y to its right, m.
     pub interferers: Vec<(f64, f64, f64)>,
-    /// Former or estimated interferers, drawn faint if they are in the plot's range.
+    /// Earlier or estimated interferers, in the form of `interferers`. They are drawn faintly.
     pub others: Vec<(f64, f64, f64)>,
-    /// Meaning of the interferers in `others`: the previous mission, or the estimate.
+    /// Kind of the interferers in `others`: those of the mission before an upload, or the estimated one.
     pub others_are: OtherInterferers,
-    /// Relays from Tx to Rx: x and altitude, m; non-finite positions are omitted.
+    /// Relays from Tx to Rx: x along the line and altitude, m. A position that is not finite is not drawn.
     pub nodes: Vec<(f64, f64)>,
-    /// Room beside the line; adds a top view.
+    /// Lateral limits and offsets of the relays. If given, the picture has a view from above.
     pub room: Option<Room>,
-    /// Linear SIR of every hop from Tx to Rx; values that are not finite and positive are drawn grey.
+    /// Linear SIR of every hop from Tx to Rx. A hop is grey if its value is not finite and positive.
     pub hop_sir: Vec<f64>,
-    /// Silent relays, each 1 to N: crossed out, with dashed hops.
+    /// Numbers, 1 to N, of silent relays. They are crossed out, and their hops are dashed.
     pub lost: Vec<usize>,
-    /// Relays outside the chain, each 1 to N: crossed out, without hops.
+    /// Numbers, 1 to N, of relays that are not in the chain. They are crossed out, and have no hops.
     pub left_out: Vec<usize>,
-    /// Events in order: time, s, and a short description.
+    /// Events of the run in order of time: the time, s, and a short description.
     pub events: Vec<(f64, String)>,
 }
 
-/// Kind of interferers that are not actually present.
+/// Kind of interferers in a picture that are not really there now.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum OtherInterferers {
-    /// Interferers of the previous mission.
+    /// Interferers of the mission that was flown before an upload.
     #[default]
     Before,
-    /// Interferer estimated by the relays.
+    /// Interferer that the relays have estimated from measurements.
     NewEstimate,
 }
 
 impl OtherInterferers {
-    /// Returns the label of the marker.
+    /// Returns the label of the interferer's symbol.
     pub(super) const fn word(self) -> &'static str {
         match self {
             Self::Before => "before",
@@ -61,7 +63,7 @@ impl OtherInterferers {
         }
     }
 
-    /// Returns the tooltip of the marker.
+    /// Returns the beginning of the tooltip of the interferer's symbol.
     pub(super) const fn tip(self) -> &'static str {
         match self {
             Self::Before => "interferer of the previous mission",
@@ -70,27 +72,30 @@ impl OtherInterferers {
     }
 }
 
-/// Permitted range beside the line, and the relays' y, m, positive to the right of x in the top view.
+/// Lateral limits of the relays and their lateral offsets, for the view from above.
+///
+/// Offsets are in m, positive to the right of the line from Tx to Rx.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Room {
-    /// Left edge, m, 0 or less.
+    /// Lateral limit of the relays to the left of the line, m, 0 or less.
     pub least_m: f64,
-    /// Right edge, m, 0 or more.
+    /// Lateral limit of the relays to the right of the line, m, 0 or more.
     pub most_m: f64,
     /// Lateral offset y of each relay, from Tx to Rx, m.
     pub y_m: Vec<f64>,
 }
 
 impl Room {
-    /// Returns true if relays must stay on the line; the top view then only shows the interferers.
+    /// Returns true if relays must stay on the line. The view from above then shows only the interferers.
     pub(super) const fn is_line(&self) -> bool {
         self.least_m == 0.0 && self.most_m == 0.0
     }
 }
 
-/// Returns the room beside the line in `mission` with relays at `y_m`.
+/// Returns the contents of a view from above; `None` if it would show nothing beside the line.
 ///
-/// `None` if there is none and no near interferer is beside the line: then a top view would add nothing.
+/// They are the lateral limits in `mission` and the relays' lateral offsets `y_m`, m. `None` if relays must stay on
+/// the line and no near interferer is beside it.
 pub fn room(
     mission: &Mission,
     y_m: impl IntoIterator<Item = f64>,
@@ -107,7 +112,7 @@ pub fn room(
     })
 }
 
-/// Returns the bottom of the legend.
+/// Returns the coordinate of the lower edge of the legend, in picture units.
 pub(super) fn bottom(picture: &Picture) -> f64 {
     if picture.room.is_some() {
         HEIGHT + ABOVE
@@ -116,7 +121,7 @@ pub(super) fn bottom(picture: &Picture) -> f64 {
     }
 }
 
-/// Returns the distance from Tx to Rx; 1 m if it is not finite and positive, to keep a width.
+/// Returns the distance from Tx to Rx, m; 1 m if it is not finite and positive and cannot be drawn.
 pub(super) fn length(picture: &Picture) -> f64 {
     let distance = picture.distance_m;
     if distance.is_finite() && distance > 0.0 {
@@ -126,7 +131,7 @@ pub(super) fn length(picture: &Picture) -> f64 {
     }
 }
 
-/// Returns the relays that have a position, with their numbers.
+/// Returns the number, from 1, and the position, m, of each relay whose position is finite.
 pub(super) fn placed(picture: &Picture) -> impl Iterator<Item = (usize, (f64, f64))> {
     let nodes = picture.nodes.iter().copied();
     (1..)
@@ -134,7 +139,7 @@ pub(super) fn placed(picture: &Picture) -> impl Iterator<Item = (usize, (f64, f6
         .filter(|(_, (x, h))| x.is_finite() && h.is_finite())
 }
 
-/// Converts an SIR to dB; `None` unless it is finite and positive.
+/// Converts a linear SIR to dB; `None` unless it is finite and positive.
 pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
@@ -148,12 +153,14 @@ pub(super) fn worst(picture: &Picture) -> Option<f64> {
     sirs.reduce(f64::min)
 }
 
-/// Returns true if the relay is silent or outside the chain.
+/// Returns true if the relay with this number, from 1, is silent or not in the chain.
 pub(super) fn is_gone(picture: &Picture, number: usize) -> bool {
     picture.lost.contains(&number) || picture.left_out.contains(&number)
 }
 
-/// Returns true if `x` is at most a fifth of the distance beyond the chain. The x axis then includes it.
+/// Returns true if `x` is between Tx and Rx, or beyond by at most a fifth of their distance, in m.
+///
+/// The x axis then includes it.
 pub(super) fn near(x: f64, distance: f64) -> bool {
     x >= -0.2 * distance && x <= 1.2 * distance
 }

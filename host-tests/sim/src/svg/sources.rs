@@ -3,20 +3,20 @@
 use super::canvas::{Area, Canvas, Frame, Labels, Point, width};
 use super::picture::{LEFT, OtherInterferers, Picture, RIGHT, TOP, length, near};
 
-/// Font size and line spacing of the labels.
+/// Font size of the labels of interferers, in picture units. [`LINE`] is the distance between their lines of text.
 const SIZE: f64 = 10.0;
 const LINE: f64 = 12.0;
 
-/// Largest number of markers with individual labels; more get a common one.
+/// Largest number of interferers that have a label each. More have one label together.
 const CROWD: usize = 8;
 
-/// Largest number of lines about far interferers.
+/// Largest number of lines of text about interferers beyond the plot.
 const FAR_LINES: usize = 4;
 
-/// Interferer: power, W, and x and y, m.
+/// Interferer: transmit power, W, and position x along the line and y to its right, m.
 type Source = (f64, f64, f64);
 
-/// Splits interferers into a list within the plot's range and a list beyond it.
+/// Splits interferers into those within the plot and those beyond it. Values that are not finite are left out.
 fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
     let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
     all.iter()
@@ -25,13 +25,13 @@ fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
         .partition(|(_, x, _)| near(*x, distance))
 }
 
-/// Returns the height above the chain reserved for text about far interferers.
+/// Returns the height of the text about interferers beyond the plot, in picture units.
 pub(super) fn headroom(picture: &Picture) -> f64 {
     let (_, far) = sorted(&picture.interferers, length(picture));
     far.len().min(FAR_LINES) as f64 * LINE
 }
 
-/// Draws the markers of near interferers, and arrows with text for far ones.
+/// Draws interferers in the side view: symbols on the ground or, beyond the plot, arrows with a text.
 pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (inside, far) = sorted(&picture.interferers, length(picture));
     beyond(canvas, labels, &far);
@@ -49,14 +49,16 @@ pub(super) fn diamond((x, y): Point) -> [Point; 4] {
     [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
 }
 
-/// Returns an arrow at an edge of the top view. It points down at the bottom edge `y`, and up at the top edge.
+/// Returns an arrow for an interferer beyond the view from above.
+///
+/// `down` is true at its lower edge, where the arrow points down, and false at the upper edge.
 fn arrow((x, y): Point, down: bool) -> [Point; 3] {
     let inward = if down { -1.0 } else { 1.0 };
     let (tip, back) = (y + 2.0 * inward, y + 10.0 * inward);
     [(x, tip), (x - 4.5, back), (x + 4.5, back)]
 }
 
-/// Returns true if the side view has a marker of an interferer beside the line.
+/// Returns true if the side view has the symbol of an interferer that is beside the line.
 pub(super) fn has_beside(picture: &Picture) -> bool {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     inside.iter().any(|(_, _, y)| *y != 0.0)
@@ -66,7 +68,9 @@ fn whole((power, x, y): Source) -> String {
     format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
 }
 
-/// Returns the former or estimated interferers to draw: those not hidden by a present interferer.
+/// Returns the earlier or estimated interferers to draw, each with its x in picture units.
+///
+/// An earlier interferer is left out if the symbol of a present one would cover it.
 fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     let (before, _) = sorted(&picture.others, length(picture));
@@ -105,7 +109,7 @@ pub(super) fn label_others(
     }
 }
 
-/// Labels the interferers on the ground, after all other objects on the ground.
+/// Labels the interferers in the side view. Other labels near the ground must be placed before.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (mut inside, _) = sorted(&picture.interferers, length(picture));
     let ground = frame.h.at(0.0);
@@ -160,10 +164,12 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
     }
 }
 
-/// Markers in the top view: position, label and style.
+/// Symbols of interferers in the view from above: position, label, and style of the label.
 pub(super) type Seen = Vec<(Point, String, &'static str)>;
 
-/// Draws the markers of the top view; those outside the range are arrows at the plot's edge.
+/// Draws the interferers in the view from above and returns their labels.
+///
+/// Interferers beyond the vertical range are arrows at the edge.
 pub(super) fn from_above(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -197,7 +203,7 @@ pub(super) fn from_above(
     seen
 }
 
-/// Labels the markers of the top view where there is room.
+/// Writes the labels of the interferers in the view from above, where there is free space.
 pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &Seen) {
     for ((x, y), words, class) in seen {
         let wide = width(words, SIZE) + 4.0;
@@ -215,7 +221,10 @@ pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &
     }
 }
 
-/// Writes two lines above a marker, as low as possible, with a connecting line if they are apart.
+/// Writes two lines of text above an interferer's symbol, as low as possible.
+///
+/// If the text is far above the symbol, a line connects them. `lean` is the direction, -1 to 1, in which to move the
+/// text if it is crowded.
 fn words(
     canvas: &mut Canvas,
     labels: &mut Labels,
@@ -260,7 +269,7 @@ fn words(
     }
 }
 
-/// Writes a line for each far interferer at the top of the plot, with an arrow toward it.
+/// Writes a line of text for each interferer beyond the plot, with an arrow toward it.
 fn beyond(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
     let shown = if far.len() > FAR_LINES {
         FAR_LINES - 1
@@ -299,7 +308,7 @@ fn beyond(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
     }
 }
 
-/// Formats a quantity with about four digits and without trailing zeros.
+/// Formats a quantity with about four digits, without zeros at the end.
 fn plain(value: f64) -> String {
     let size = value.abs();
     if size > 0.0 && !(1e-2..1e6).contains(&size) {

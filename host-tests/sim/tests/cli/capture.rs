@@ -47,7 +47,7 @@ fn read(file: &Path) -> Vec<Frame> {
     frames
 }
 
-/// Runs with `arguments` and a capture. Returns the report and the frames.
+/// Runs `cargo chain` with `arguments` and a capture file. Returns its report and the captured frames.
 fn captured(arguments: &str) -> (serde_json::Value, Vec<Frame>) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("air.pcapng");
@@ -143,7 +143,9 @@ fn a_capture_that_cannot_be_written_is_refused_before_the_run() {
     }
 }
 
-/// Decodes the capture in Wireshark with the repository's dissector. Fails without `tshark`, with installation instructions.
+/// Checks that Wireshark decodes a capture with the repository's dissector.
+///
+/// Without `tshark` the test fails and prints how to install it.
 #[test]
 fn tshark_names_every_frame_of_a_capture() {
     let folder = tempfile::tempdir().unwrap();

@@ -106,7 +106,7 @@ fn of_two_parts_the_larger_goes_on_until_they_meet_again() {
     assert_eq!(healed["sir"], json("")["sir"]);
 }
 
-/// Quorum of one: of two relays, only the leader may go on alone.
+/// Checks that of two relays only the leader, relay 1, may go on alone: the other has no quorum.
 #[test]
 fn too_few_hold_their_places_and_the_status_is_1() {
     let output = chain("--json --uavs 2 --kill 1@20");
@@ -144,7 +144,7 @@ fn with_tags_an_attacker_changes_nothing() {
     }
 }
 
-/// Relays without tags accept an attacker's frames, and the report shows the consequences.
+/// Checks that relays that do not sign frames accept an attacker's, and that the report shows the harm.
 #[test]
 fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
     let attacked = "--uavs 4 --forge 1000 --replay 100 --no-auth --json";
@@ -219,7 +219,9 @@ fn what_the_channel_cannot_carry_is_refused_before_flight() {
     assert!(json("--baud 9600 --wires")["sir"].as_f64().unwrap() > 1.0);
 }
 
-/// Checks fifty relays in one range: the refusal states what would fit. Its slower probing does fit.
+/// Checks the refusal of a channel that is too slow for fifty relays in range of each other.
+///
+/// It names settings that would do, and the slower probing that it names does.
 #[test]
 fn fifty_relays_on_a_slow_channel_are_refused_with_the_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
@@ -318,7 +320,7 @@ fn what_is_heard_comes_from_an_interferer() {
     assert!(json(&options)["sir"].is_number());
 }
 
-/// Checks the strip of events of relays that spread evenly at first. They have agreed on no SIR then.
+/// Checks that the picture shows no SIR for relays that spread evenly, before they know the interferer.
 #[test]
 fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
     let folder = tempfile::tempdir().unwrap();
@@ -332,7 +334,7 @@ fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
     assert!(!svg.contains("SIR 0.000"), "{svg}");
 }
 
-/// Checks that SIR and optimum of a report are computed for the remaining relays only.
+/// Checks that the true and the optimum SIR of a report are those of the remaining relays.
 #[test]
 fn a_lost_relay_does_not_count() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";

@@ -35,7 +35,7 @@ fn json(arguments: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Returns the exit status and the single line on standard error.
+/// Returns the exit status of `cargo chain` with `arguments`, and its only line on standard error.
 fn refusal(arguments: &str) -> (i32, String) {
     let output = chain(arguments);
     let text = String::from_utf8(output.stderr).unwrap();
@@ -102,7 +102,7 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
     assert_eq!(table.lines().count(), 1 + 8 + 1 + 2, "{table}");
 }
 
-/// Checks the y column of the table, and `altitude` as an alias of `joint`.
+/// Checks that the table has a y column if relays may leave the line. `altitude` is an alias of `joint`.
 #[test]
 fn the_table_has_y_where_there_is_room_beside_the_line() {
     let side = example("side.toml");
@@ -125,7 +125,9 @@ fn the_same_seed_prints_the_same_bytes() {
     assert!(report["faults"]["lost"].as_u64().unwrap() > 0);
 }
 
-/// Returns each of `cases` with its error line; `EXAMPLES` stands for the folder of the examples.
+/// Returns each command line of `cases` with its error line, and checks that its exit status is 2.
+///
+/// `EXAMPLES` stands for the folder of the examples.
 fn refusals(cases: &[&str]) -> String {
     let examples = example("");
     let mut all = String::new();
@@ -311,7 +313,7 @@ fn an_option_that_would_be_ignored_is_refused() {
     insta::assert_snapshot!(refusals(IGNORED));
 }
 
-/// Checks the same options where they have an effect.
+/// Checks that options are accepted where they have an effect. They are refused where they have none.
 #[test]
 fn an_option_that_is_of_use_is_taken() {
     for arguments in [
@@ -327,7 +329,7 @@ fn an_option_that_is_of_use_is_taken() {
     }
 }
 
-/// Errors name keys of a scenario only if the user gave one.
+/// Checks that an error names keys of the scenario file if the user gave such a file.
 #[test]
 fn who_has_a_scenario_is_told_its_keys() {
     let output = chain(&format!(
@@ -341,7 +343,7 @@ fn who_has_a_scenario_is_told_its_keys() {
     assert_eq!(most["uavs"], 250);
 }
 
-/// Checks that the report of an adopted mission never says that the mission was not adopted.
+/// Checks that a report never says that an upload was not adopted if relays have adopted it.
 #[test]
 fn what_was_adopted_is_not_denied() {
     for (arguments, is_denied) in [
@@ -359,7 +361,7 @@ fn what_was_adopted_is_not_denied() {
     }
 }
 
-/// A closed output pipe causes no panic (exit status 101).
+/// Checks that a closed output pipe changes no exit status and causes no panic.
 #[test]
 fn whoever_does_not_listen_changes_no_status() {
     let several = example("multi_interferer.toml");
@@ -411,7 +413,7 @@ fn root() -> &'static Path {
         .unwrap()
 }
 
-/// A build without output for a minute looks like a hang.
+/// Checks that no alias of cargo hides its progress. A build without output for a minute looks like a hang.
 #[test]
 fn no_command_hides_cargos_progress() {
     let text = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap();
@@ -429,7 +431,7 @@ fn no_command_hides_cargos_progress() {
     }
 }
 
-/// Returns the CPU time of the ended child processes, s, in user and in system mode.
+/// Returns the CPU time, s, in user and in system mode, of all child processes that have ended.
 fn cpu_of_children() -> [f64; 2] {
     let text = std::fs::read_to_string("/proc/self/stat").unwrap();
     let (_, after) = text.rsplit_once(')').unwrap();

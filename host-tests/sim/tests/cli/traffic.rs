@@ -4,19 +4,19 @@ use serde_json::Value;
 
 use super::{chain, example, json, refusals};
 
-/// Largest share of a promised rate that is delivered, with rounding.
+/// Largest ratio of the delivered to the promised data rate. It allows for rounding.
 const MOST: f64 = 1.0 + 1e-5;
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value}"))
 }
 
-/// Returns the traffic of a run with a bandwidth of 10 MHz.
+/// Returns the JSON report of a run of `cargo chain` with data traffic and a bandwidth of 10 MHz.
 fn sent(arguments: &str) -> Value {
     json(&format!("--traffic --bandwidth-hz 1e7 {arguments}"))
 }
 
-/// Checks that each offered packet is delivered, dropped, lost or in a queue.
+/// Checks that every offered packet of a report was delivered, dropped or lost, or is in a queue.
 fn assert_complete(report: &Value) {
     for flow in report["traffic"]["flows"].as_array().unwrap() {
         let of = |key: &str| flow[key].as_u64().unwrap();
@@ -33,7 +33,7 @@ fn the_report_of_the_traffic_in_words() {
     insta::assert_snapshot!(text);
 }
 
-/// Compares with the formula, written anew.
+/// Checks the promised and the delivered data rate against the formula, which the test computes itself.
 #[test]
 fn the_promised_rate_is_delivered() {
     for (more, slots) in [("", 9.0), ("--offer-bps 1e9", 9.0)] {
@@ -60,7 +60,10 @@ fn the_promised_rate_is_delivered() {
     );
 }
 
-/// The hops have the same SIR: fitted slots are equal slots, and channels carry nine times as much.
+/// Checks the data rates with equal slots, fitted slots, and a frequency for each hop.
+///
+/// All nine hops have the same SIR, so fitted slots are equal slots, and separate frequencies carry nine times as
+/// much.
 #[test]
 fn access_of_the_scenario_decides() {
     let folder = tempfile::tempdir().unwrap();
@@ -133,7 +136,10 @@ fn no_data_passes_below_the_first_step() {
     }
 }
 
-/// Drones that move, an interferer that moves, several interferers, a field, an upload.
+/// Checks that data is delivered in all kinds of runs.
+///
+/// Drones or the interferer move; the interference is from several interferers or a random field; a mission is
+/// uploaded.
 #[test]
 fn every_kind_of_run_carries_traffic() {
     let several = example("multi_interferer.toml");

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::{chain, example, json, refusals};
 
-/// Runs the default scenario with the interferer at x = 800 m, y = -300 m from the start.
+/// Returns the report of a run in which the interferer is at x = 800 m, y = -300 m from the start.
 fn from_the_start(folder: &tempfile::TempDir, more: &str) -> Value {
     let file = folder.path().join("moved.toml");
     let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 800\ny_m = -300\n";
@@ -33,7 +33,9 @@ fn whats(report: &Value, what: &str) -> usize {
     moments.filter(|moment| moment["what"] == what).count()
 }
 
-/// Covers wires and radio, both ends, and good and bad links.
+/// Checks that a chain ends at the same positions with an uploaded as with a loaded mission.
+///
+/// Covers wires and radio, uploads from Tx and from Rx, and good and bad links.
 #[test]
 fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -118,7 +120,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
     }
 }
 
-/// Versions are numbered by time, not by the order of the options.
+/// Checks that versions of uploads are numbered by time, not by the order of the options.
 #[test]
 fn of_two_uploads_the_later_one_is_flown() {
     let folder = tempfile::tempdir().unwrap();
@@ -133,7 +135,7 @@ fn of_two_uploads_the_later_one_is_flown() {
     assert_eq!(versions, [1, 2]);
 }
 
-/// Checks that an upload of every parameter gives the same result as a scenario file with these values.
+/// Checks that an upload of all parameters has the same result as a scenario file with these values.
 #[test]
 fn every_key_is_that_of_a_scenario_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -153,7 +155,7 @@ fn every_key_is_that_of_a_scenario_file() {
     assert_eq!(report["relays"][0]["h_m"].as_f64(), Some(60.0));
 }
 
-/// Checks that a rebooted relay gets the uploaded mission from its own storage or its neighbours.
+/// Checks that a rebooted relay gets an uploaded mission from its own storage or from its neighbours.
 #[test]
 fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     let folder = tempfile::tempdir().unwrap();
@@ -175,7 +177,9 @@ fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     }
 }
 
-/// Checks that the other relays fly an uploaded mission, if one is lost before, during or after it.
+/// Checks that the remaining relays fly an uploaded mission, whenever a relay is lost.
+///
+/// It is lost before, during or after the upload.
 #[test]
 fn the_relays_that_are_left_fly_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -262,7 +266,7 @@ fn wrong_uploads_are_named_with_what_is_allowed() {
     ]));
 }
 
-/// The drones hover at their positions along the new line.
+/// Checks that drones fly to their positions on the new line if an upload moves the receiver.
 #[test]
 fn drones_fly_to_a_receiver_that_moves() {
     let site = example("site.toml");

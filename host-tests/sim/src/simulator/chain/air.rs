@@ -46,7 +46,9 @@ impl Chain {
         self.keep_frame(self.sent_at(arrives), link(index, port), frame, note);
     }
 
-    /// Records for the attacker a frame that reaches all its receivers.
+    /// Records a sent frame for the attacker, which can replay it after its arrival at `arrives`.
+    ///
+    /// `into` is the port at which receivers get the frame.
     pub(super) fn overhear(&mut self, frame: &[u8], into: Port, arrives: Instant) {
         if let Some(attacker) = &mut self.attacker {
             attacker.record(Recorded {
@@ -57,7 +59,9 @@ impl Chain {
         }
     }
 
-    /// Schedules the arrivals of a frame of node `from` at its receivers, with faults. Returns a description of the faults.
+    /// Queues the arrivals of a frame at its receivers and returns a description of its faults.
+    ///
+    /// The frame was sent by node `from`, and arrives at port `into`, at the time `arrives` unless a fault delays it.
     pub(super) fn send(
         &mut self,
         from: usize,
@@ -97,7 +101,7 @@ impl Chain {
         note
     }
 
-    /// Returns true if a burst of losses hits the frame.
+    /// Returns true if a burst of losses on the link from node `from` to `receiver` loses the next frame.
     fn loses(&mut self, from: usize, receiver: Receiver) -> bool {
         let to = match receiver {
             Receiver::Relay(at) => at,
@@ -109,7 +113,7 @@ impl Chain {
     }
 }
 
-/// Receiving node: a relay or a ground station, from 0.
+/// Receiver of a frame: the index, from 0, of a relay or of a ground station.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Receiver {
     Relay(usize),
@@ -117,7 +121,9 @@ pub(super) enum Receiver {
 }
 
 impl Chain {
-    /// Passes a frame to the node's radio. Returns false if there is no simulated channel.
+    /// Queues a frame at the radio of `node`. Returns false if the run simulates no half-duplex channel.
+    ///
+    /// `node` counts relays from 0, then ground stations.
     pub(super) fn broadcast(&mut self, node: usize, frame: &[u8]) -> bool {
         let Some(medium) = &mut self.medium else {
             return false;
@@ -150,7 +156,7 @@ impl Chain {
         }
     }
 
-    /// Returns the nodes in range of `node`.
+    /// Returns the nodes that receive `node` on the shared channel. Nodes are relays from 0, then ground stations.
     fn hearers(&self, node: usize) -> Vec<usize> {
         let relays = self.members.len();
         match node.checked_sub(relays) {
@@ -192,7 +198,9 @@ impl Chain {
 }
 
 impl Chain {
-    /// Removes and returns the frames sent by `until`, ordered by their end, if recording is on.
+    /// Removes and returns the recorded frames that ended by `until`, in order of time.
+    ///
+    /// Empty unless [`Setup::record`](crate::simulator::setup::Setup::record) was set.
     pub fn frames(&mut self, until: Instant) -> Vec<OnAir> {
         self.record
             .as_mut()
@@ -200,7 +208,7 @@ impl Chain {
             .unwrap_or_default()
     }
 
-    /// Returns the time of a frame's last bit from its arrival time.
+    /// Returns the time when the last bit of a frame was sent: its time of arrival less the latency.
     pub(super) fn sent_at(&self, arrives: Instant) -> Instant {
         let latency = self.setup.link.latency.as_micros();
         Instant::from_micros(arrives.as_micros().saturating_sub(latency))
@@ -212,7 +220,9 @@ impl Chain {
         }
     }
 
-    /// Appends to `note` the faults of `frame` on its path to `receiver`.
+    /// Appends to `note` the faults of a frame on the way to `receiver`: lost, twice, changed or late.
+    ///
+    /// `arrivals` are the arrivals of `frame` there, with faults.
     pub(super) fn remark(
         &self,
         note: &mut String,
@@ -252,7 +262,7 @@ impl Chain {
     }
 }
 
-/// Returns the link at `port` of relay `index` (from 0).
+/// Returns the link to which `port` of relay `index` (from 0) is connected.
 pub(super) fn link(index: usize, port: Port) -> Link {
     let number = u16::try_from(index).unwrap_or(u16::MAX);
     match port {
@@ -262,11 +272,11 @@ pub(super) fn link(index: usize, port: Port) -> Link {
     }
 }
 
-/// Largest difference of the numbers of two neighbours, whatever the radio range.
+/// Largest difference of two neighbours' numbers, even if the radio range is larger.
 const NEIGHBOUR: usize = 4;
 
 impl Chain {
-    /// Returns the range of a relay, in relays.
+    /// Returns the number of relays, on each side, that a relay's frames reach: 1 on separate links.
     pub(super) fn reach(&self) -> usize {
         match self.setup.settings.wiring {
             Wiring::Pair => 1,
@@ -274,7 +284,7 @@ impl Chain {
         }
     }
 
-    /// Returns true if a partition separates relays `one` and `other` (from 0) now.
+    /// Returns true if a partition separates the relays `one` and `other` (from 0) at present.
     pub(super) fn are_parted(&self, one: usize, other: usize) -> bool {
         let parts = &self.setup.partitions;
         parts
@@ -282,7 +292,9 @@ impl Chain {
             .any(|part| part.parts(number(one), number(other), self.now))
     }
 
-    /// Returns true if no failure keeps relay `by` from receiving relay `of` (from 0) now. Range is not checked.
+    /// Returns true unless a failure keeps relay `by` from receiving relay `of` (both from 0) at present.
+    ///
+    /// The radio range is not checked.
     pub(super) fn hears(&self, by: usize, of: usize) -> bool {
         let deaf = &self.setup.deaf;
         !self.are_parted(by, of)
@@ -291,13 +303,15 @@ impl Chain {
                 .any(|deaf| deaf.applies(number(by), number(of), self.now))
     }
 
-    /// Returns true if relays `one` and `other` (from 0) can be neighbours now: linked both ways and near.
+    /// Returns true if the relays `one` and `other` (from 0) can be neighbours at present.
+    ///
+    /// They must be near each other in the chain and receive each other.
     pub(super) fn are_linked(&self, one: usize, other: usize) -> bool {
         let most = self.reach().min(NEIGHBOUR);
         one.abs_diff(other) <= most && self.hears(one, other) && self.hears(other, one)
     }
 
-    /// Returns the relays that receive relay `index` (from 0) on a shared channel.
+    /// Returns the relays (from 0) that receive relay `index` on a shared channel at present.
     pub(super) fn in_range(&self, index: usize) -> Vec<usize> {
         let reach = self.setup.radio_reach;
         let until = self.members.len().min(index + reach + 1);
@@ -312,7 +326,7 @@ fn number(index: usize) -> u16 {
 }
 
 impl Chain {
-    /// Records the state of relay `index` (from 0) if it changed.
+    /// Records the state of relay `index` (from 0) for the animation, if it changed.
     pub(super) fn film(&mut self, index: usize) {
         let (Some(film), Some(member)) = (&mut self.outcome.film, self.members.get_mut(index))
         else {

@@ -9,23 +9,25 @@ use crate::simulator::drones::{Flight, Nearest, Point, apart, placement, point};
 use crate::simulator::fleet::Vehicle;
 use crate::simulator::outcome::TimelineEvent;
 
-/// Time step of the flight.
+/// Time step of the simulation of drones with autopilots.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Largest distance of a drone from its setpoint that counts as arrived, m.
+/// Distance of a drone from its agreed position below which it has arrived, m.
 const THERE_M: f64 = 1.0;
 
-/// Period of the simulated operator's checks for lost relays that have landed.
+/// Period in which the simulated operator looks for landed drones of lost relays.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
-/// Traffic margin, m: no hand-over while another drone moves within the separation plus this.
+/// Distance, m, in addition to the required separation, within which another moving drone is traffic.
+///
+/// A pilot hands no drone over while there is traffic.
 const TRAFFIC_M: f64 = 30.0;
 
-/// Delay until a pilot lands a drone whose relay is silent or that was taken over for good.
+/// Time after which a pilot lands a drone whose relay is off, or which the pilot took over for good.
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
-    /// Creates the drones, on the ground, if the run simulates drones.
+    /// Creates the setup's drones with autopilots, if any, on the ground, and starts their time steps.
     pub(super) fn line_up(&mut self) {
         if let Some(spec) = &self.setup.fleet {
             let all = 0..self.members.len();
@@ -62,7 +64,9 @@ impl Chain {
         self.queue.put(self.now + STEP, 0, QueuedEvent::Fly);
     }
 
-    /// Updates the smallest separation margin from all pairs of drones.
+    /// Updates the smallest separation margin of two drones, `margin_m` of the outcome.
+    ///
+    /// It checks all pairs of drones of which no pilot flies one.
     fn measure_pairs(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let count = self.fleet.len();
@@ -90,7 +94,7 @@ impl Chain {
         }
     }
 
-    /// Tells each pilot if another moving drone is near.
+    /// Sets for each drone whether its pilot sees traffic: another moving drone that is near.
     fn look_for_traffic(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let seen: Vec<(Point, bool)> = self
@@ -108,7 +112,9 @@ impl Chain {
         }
     }
 
-    /// Advances a drone and runs one iteration of its relay's firmware loop, unless the relay is silent.
+    /// Moves drone `index` (from 0) for one time step, and lets its relay and autopilot exchange messages.
+    ///
+    /// If the relay is off, the pilot lands the drone after a while.
     fn drive(&mut self, index: usize) {
         let now = self.now;
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
@@ -154,9 +160,10 @@ impl Chain {
         }
     }
 
-    /// Simulates an operator: clears the keep-away zones of silent relays whose drones have landed.
+    /// Simulates an operator who confirms to relays that the drones of lost neighbours have landed.
     ///
-    /// A zone stays while the next flying drone is in its pilot's hands, or was until recently.
+    /// Relays then no longer keep away from these drones. The operator waits while the next flying drone is in its
+    /// pilot's hands, or was until recently.
     fn look_around(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_lent_long(index) {
@@ -190,7 +197,7 @@ impl Chain {
         }
     }
 
-    /// Returns true if the relay has controlled its drone for at least [`LANDS_AFTER`].
+    /// Returns true if relay `index` (from 0) has controlled its drone for at least [`LANDS_AFTER`].
     fn is_lent_long(&self, index: usize) -> bool {
         let Some(member) = self
             .members
@@ -214,7 +221,9 @@ impl Chain {
         }
     }
 
-    /// Returns true if every drone under the control of a living relay hovers at its agreed position.
+    /// Returns true if every drone that a living relay should control hovers at its agreed position.
+    ///
+    /// Drones in their pilots' hands do not count.
     pub(super) fn all_hover(&self) -> bool {
         let lent = self.members.iter().zip(&self.fleet);
         lent.filter(|(member, vehicle)| member.killed.is_none() && vehicle.is_lent(self.now))
@@ -228,7 +237,7 @@ impl Chain {
 }
 
 impl Chain {
-    /// Creates the drones, if any, and starts their time steps.
+    /// Creates the drones of the setup, simple or with autopilots, if any, and starts their time steps.
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));
@@ -237,7 +246,7 @@ impl Chain {
         self.line_up();
     }
 
-    /// Advances all drones by one time step; those with living relays report their positions.
+    /// Moves all simple drones for one time step. Those of living relays report their positions to them.
     pub(super) fn fly(&mut self) {
         let now = self.now;
         let Some(mut flight) = self.flight.take() else {
@@ -273,7 +282,7 @@ impl Chain {
         self.flight = Some(flight);
     }
 
-    /// Updates the closest approach.
+    /// Records `nearest`, two drones and their distance, if it is the closest approach of the run so far.
     pub(super) fn keep(&mut self, nearest: Option<Nearest>) {
         let known = self.outcome.nearest;
         if nearest.is_some_and(|it| known.is_none_or(|known| it.apart_m < known.apart_m)) {
@@ -281,7 +290,9 @@ impl Chain {
         }
     }
 
-    /// Returns true if every drone with a living relay is at its agreed position, by its own estimate.
+    /// Returns true if every simple drone with a living relay is at its agreed position, as it believes.
+    ///
+    /// True without simple drones.
     pub(super) fn has_arrived(&self) -> bool {
         let Some(flight) = &self.flight else {
             return true;

@@ -37,7 +37,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Handles bytes received by station `at`.
+    /// Passes received bytes to the ground station `at` (from 0) and sends its replies.
     pub(super) fn hear(&mut self, at: usize, bytes: &[u8]) {
         if let Some(station) = self.stations.get_mut(at) {
             station.ground.handle_bytes(bytes);
@@ -45,7 +45,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Handles the timer of station `at`.
+    /// Handles an expired timer of the ground station `at` (from 0) and sends its frames.
     pub(super) fn ask(&mut self, at: usize) {
         let now = self.now;
         if let Some(station) = self.stations.get_mut(at)
@@ -57,7 +57,7 @@ impl Chain {
         self.drain_station(at);
     }
 
-    /// Measures the interference at every station and sends the results.
+    /// Measures the interference at the ground stations at Tx and Rx. They send the results to the relays.
     pub(super) fn measure_at_ends(&mut self, sky: &TrueInterference, scene: &Scene) {
         for at in 0..self.stations.len() {
             if let Some(station) = self.stations.get_mut(at) {
@@ -121,7 +121,9 @@ impl Chain {
         }
     }
 
-    /// Returns true if station `at` receives what relay `index` (from 0) sends through `port`.
+    /// Returns true if the ground station `at` receives frames that relay `index` sends through `port`.
+    ///
+    /// Both count from 0.
     pub(super) fn reaches_ground(&self, index: usize, port: Port, at: usize) -> bool {
         let Some(station) = self.stations.get(at) else {
             return false;
@@ -151,7 +153,7 @@ impl Chain {
     }
 }
 
-/// Ground station: the transmitter or the receiver.
+/// Ground station at one end of the chain, Tx or Rx. It uploads missions and measures interference.
 #[derive(Debug)]
 pub(super) struct Station {
     pub(super) end: Side,
@@ -161,7 +163,7 @@ pub(super) struct Station {
 }
 
 impl Station {
-    /// Returns true during an upload.
+    /// Returns true while the station uploads a mission.
     pub(super) fn is_busy(&self) -> bool {
         matches!(
             self.ground.progress(),
@@ -170,7 +172,7 @@ impl Station {
     }
 }
 
-/// Creates the stations that upload or measure; none without keys.
+/// Creates the ground stations that upload or measure. There are none without keys: they sign all frames.
 pub(super) fn stations(setup: &Setup) -> Vec<Station> {
     let Some(proof) = setup.proof(1) else {
         return Vec::new();
@@ -192,7 +194,7 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
 }
 
 impl Chain {
-    /// Returns the position of the drone of relay `index` (from 0); `None` if drones are not simulated.
+    /// Returns the position of the drone of relay `index` (from 0), m; `None` if no drones are simulated.
     pub(super) fn drone(&self, index: usize) -> Option<Point> {
         let flight = self.flight.as_ref();
         flight
@@ -201,7 +203,7 @@ impl Chain {
             .or_else(|| self.fleet.get(index).map(Vehicle::at))
     }
 
-    /// Measures at every living relay and takes a snapshot of the positions.
+    /// Lets every living relay measure the interference at its position, and records all positions.
     pub(super) fn measure_all(&mut self) {
         let Some(sky) = self.setup.sky.clone() else {
             return;
@@ -288,11 +290,11 @@ impl Chain {
     }
 }
 
-/// Retry delay of an attacker that has no recorded frame yet.
+/// Delay after which an attacker that has no frame to replay yet tries again.
 const WAIT: Duration = Duration::from_millis(10);
 
 impl Chain {
-    /// Creates the attacker of the setup and schedules its frames.
+    /// Creates the attacker of the setup, if any, and queues the times of its frames.
     pub(super) fn expect_an_attack(&mut self) {
         let Some(attack) = self.setup.attack else {
             return;
@@ -305,7 +307,7 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// Sends one frame of the attacker to a living relay, or retries later if there is nothing to replay.
+    /// Sends one frame of the attacker to a living relay. Without a frame to replay, it tries again later.
     pub(super) fn strike(&mut self, kind: AttackKind) {
         let now = self.now;
         let Some(mut attacker) = self.attacker.take() else {
@@ -340,7 +342,9 @@ impl Chain {
         self.attacker = Some(attacker);
     }
 
-    /// Returns a random relay and a possible neighbour or ground station as the sender.
+    /// Draws the destination and the claimed sender of a forged frame.
+    ///
+    /// The destination is a relay, the sender a relay or ground station that may be its neighbour.
     fn way(&self, attacker: &mut Attacker) -> Way {
         let relays = self.setup.mission.relays();
         let reach = match self.setup.settings.wiring {
@@ -368,7 +372,9 @@ impl Chain {
         }
     }
 
-    /// Returns the index (from 0) of relay `to` (from 1). If that one is not alive, it is a random living relay.
+    /// Returns the index (from 0) of the relay that an attacker's frame for relay `to` (from 1) reaches.
+    ///
+    /// If that relay is not alive, or `to` is `None`, it is a random living relay. `None` if no relay is alive.
     fn reached(&self, to: Option<u16>, attacker: &mut Attacker) -> Option<usize> {
         let living = |member: &Member| member.killed.is_none();
         let meant = to.and_then(|to| usize::from(to).checked_sub(1));
@@ -382,7 +388,7 @@ impl Chain {
         })
     }
 
-    /// Delivers the frame and records how the relay classified it.
+    /// Passes a frame of the attacker to relay `index` (from 0) and counts how the relay classified it.
     fn hit(&mut self, index: usize, kind: AttackKind, port: Port, bytes: &[u8]) {
         let Some(member) = self.members.get_mut(index) else {
             return;

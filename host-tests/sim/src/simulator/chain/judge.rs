@@ -11,13 +11,13 @@ use crate::simulator::outcome::{Ending, Moment, TimelineEvent};
 use crate::simulator::route::RelayState;
 use crate::simulator::watch::{Run, Seen, Watch, longest};
 
-/// Relays that an event may have changed.
+/// Relays whose state an event may have changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Touched {
     Nobody,
-    /// Index of a single relay, from 0.
+    /// A single relay with this index, from 0.
     One(usize),
-    /// Change that may affect any relay, or the connectivity.
+    /// Any relay, or the links between relays.
     All,
 }
 
@@ -32,13 +32,13 @@ impl Touched {
 }
 
 impl Chain {
-    /// Starts the statistics; `run` computes the reference positions.
+    /// Starts the statistics of the run. `run` simulates a chain without faults, to judge this chain.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(seen).collect();
         self.watch = Some(Watch::new(seen, run));
     }
 
-    /// Updates the statistics after an event.
+    /// Updates the run's records and statistics after an event that may have changed the relays `touched`.
     pub(super) fn look(&mut self, touched: Touched) {
         if touched == Touched::Nobody {
             return;
@@ -51,7 +51,7 @@ impl Chain {
         self.watch = Some(watch);
     }
 
-    /// Records the states of relays for the traffic.
+    /// Records changed states of the relays `touched`, for the data traffic.
     fn track(&mut self, touched: Touched) {
         let Some(mut track) = self.outcome.track.take() else {
             return;
@@ -73,7 +73,7 @@ impl Chain {
         self.outcome.track = Some(track);
     }
 
-    /// Returns the relays that an event has touched, from 0.
+    /// Returns the indices, from 0, of the relays that an event may have changed.
     fn range(&self, touched: Touched) -> Range<usize> {
         match touched {
             Touched::One(index) => index..index + 1,
@@ -99,9 +99,9 @@ impl Chain {
         }
     }
 
-    /// Returns true if at least one of the longest possible chains of the living relays holds its optimum.
+    /// Returns true if one of the longest possible chains of the living relays holds its best positions.
     ///
-    /// If all of these lack a quorum, no relay may hold a position, which counts as wrong.
+    /// If all of these lack a quorum, no relay may hold a position, and the result is false.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
@@ -185,7 +185,7 @@ impl Chain {
         (settled && others).then_some(Ending::Settled)
     }
 
-    /// Ends a soak at its planned time if the next event is later.
+    /// Ends a run that has a fixed end (`soak` of the setup) if the next event, at `next`, is later.
     pub(super) fn end_soak(&mut self, next: Instant) {
         if let Some(until) = self.setup.soak
             && next > until
@@ -195,7 +195,9 @@ impl Chain {
         }
     }
 
-    /// Returns the living relays, grouped into parts that can receive each other.
+    /// Groups the living relays into parts of the chain, in order from Tx.
+    ///
+    /// A part ends at a partition, and before a gap that is wider than the radio range.
     fn parts(&self) -> Vec<Vec<&Member>> {
         let mut parts: Vec<Vec<&Member>> = Vec::new();
         let mut last: Option<usize> = None;
@@ -218,7 +220,7 @@ impl Chain {
         parts
     }
 
-    /// Returns true if every living neighbour of a silent relay has reported the loss.
+    /// Returns true if every living neighbour of a silent relay has reported its loss.
     fn all_noticed(&self) -> bool {
         let noticed = |by: usize, side| {
             let Some(member) = self.members.get(by) else {
@@ -240,14 +242,16 @@ impl Chain {
     }
 }
 
-/// Returns true if the members' indices and number of relays match `part`.
+/// Returns true if `part` has all relays of one view, in the order of their indices in it.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
     })
 }
 
-/// Returns true if no part has a quorum, the relays know it, and all know their present neighbours.
+/// Returns true if all parts of the chain are too small for a quorum, and their relays know it.
+///
+/// Each relay must know its present neighbours, and one of each part must have reported the missing quorum.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));
@@ -266,7 +270,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all relays of `part` have positions agreed on for the same target.
+/// Returns true if all relays of `part` hold positions that were agreed on for the same target SIR.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()
@@ -278,7 +282,9 @@ fn holds(part: &[&Member]) -> bool {
 }
 
 impl Chain {
-    /// Checks the current setpoint and the rounds of relay `index` (from 0).
+    /// Checks that the setpoint of relay `index` (from 0) is within its limits, and counts violations.
+    ///
+    /// It also records the SIR after each round of Algorithm 2.
     pub(super) fn check(&mut self, index: usize) {
         let Some(member) = self.members.get_mut(index) else {
             return;
@@ -364,7 +370,7 @@ impl Chain {
 }
 
 impl Chain {
-    /// Handles all events of relay `index` (from 0) and logs them.
+    /// Takes all pending events from relay `index` (from 0) and logs them.
     pub(super) fn listen(&mut self, index: usize) {
         while let Some(member) = self.members.get_mut(index)
             && let Some(event) = member.relay.poll_event()
@@ -420,7 +426,7 @@ impl Chain {
         }
     }
 
-    /// Adds a log entry about relay `index` (from 0).
+    /// Adds an entry about relay `index` (from 0) to the log of the run. `other` is the other node that it concerns.
     pub(super) fn tell(&mut self, index: usize, what: TimelineEvent, other: Option<u16>) {
         let Some(member) = self.members.get(index) else {
             return;
@@ -435,7 +441,7 @@ impl Chain {
         });
     }
 
-    /// Logs the partitions and one-way failures that begin or end now.
+    /// Logs the partitions and one-way link failures that begin or end at the present time.
     pub(super) fn tell_of_partitions(&mut self) {
         for deaf in self.setup.deaf.clone() {
             let by = usize::from(deaf.by).saturating_sub(1);
@@ -466,7 +472,9 @@ impl Chain {
 }
 
 impl Member {
-    /// Returns the number of sweeps that this relay has begun over all its starts.
+    /// Returns the number of passes and view proposals that this relay has begun, before reboots, too.
+    ///
+    /// A pass is a message that relays forward along the whole chain.
     fn begun(&self) -> u32 {
         self.swept + self.relay.stats().passes_begun
     }
