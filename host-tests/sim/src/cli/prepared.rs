@@ -182,7 +182,9 @@ impl<'a> Prepared<'a> {
         let setup = &self.setup;
         let flown = report::flown(setup, outcome);
         let mut report = ChainReport::new(&self.method, &flown, outcome, options.seed);
-        report.channel = (setup.settings.wiring == Wiring::Shared).then_some("shared");
+        let is_shared = setup.settings.wiring == Wiring::Shared;
+        report.channel = is_shared.then_some("shared");
+        report.reach = is_shared.then_some(setup.radio_reach);
         report.air = AirReport::of(setup, outcome);
         report.listened = listened;
         let planned = options.hostile.uploads.are_planned();

@@ -100,6 +100,9 @@ pub struct ChainReport {
     /// `shared` if all relays share one radio channel; absent for separate links between neighbours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
+    /// Number of relays on each side that receive a relay's frames; absent for separate links between neighbours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reach: Option<usize>,
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
@@ -256,11 +259,11 @@ impl ChainReport {
             );
         }
         text += &self.flown_text();
-        if self.channel.is_some() {
+        if let Some(reach) = self.reach {
+            let relays = if reach == 1 { "relay" } else { "relays" };
             _ = writeln!(
                 text,
-                "one radio channel, received by relays up to {} places away",
-                Setup::RADIO_REACH
+                "one radio channel, received by {reach} {relays} on each side"
             );
         }
         match self.promised {

@@ -187,6 +187,23 @@ fn a_shared_channel_is_csma_unless_said_otherwise() {
 }
 
 #[test]
+fn the_report_has_the_reach_of_the_shared_channel() {
+    for (extra, reach) in [
+        ("--wires", None),
+        ("--shared", Some(4)),
+        ("--air csma --reach 2", Some(2)),
+    ] {
+        let options = format!("--uavs 4 --loss 0.2 {extra}");
+        assert_eq!(json(&options)["reach"].as_u64(), reach, "{extra}");
+        let line = "one radio channel, received by";
+        let expected = reach.map(|reach| format!("{line} {reach} relays on each side"));
+        let text = String::from_utf8(chain(&options).stdout).unwrap();
+        let printed = text.lines().find(|printed| printed.starts_with(line));
+        assert_eq!(printed, expected.as_deref(), "{extra}");
+    }
+}
+
+#[test]
 fn a_slow_link_takes_longer() {
     let took = |baud| {
         json(&format!("--baud {baud}"))["virtual_s"]
