@@ -6,57 +6,60 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the step, in the order in which they are tried.
+/// Fractions of the relays' computed steps that an ascent tries, in this order.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// Initial trust region, relative to a relay's distance from the interferer, and in ln gamma.
+/// Initial trust region: limit of a relay's step, as a fraction of its distance from the interferer. It also limits
+/// the change of ln gamma, the logarithm of the target SIR.
 const TRUST: f32 = 0.5;
 
-/// Trust region below which a step does not predict the result of the ascent.
+/// Trust region below which the result of an ascent is not predicted from its next step.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust region below which the ascent ends.
+/// Trust region below which the ascent ends, as a fraction like [`TRUST`].
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum slope of the slack by ln gamma, in units of D. Hops of a total length D lose half of it per e-fold of the target.
+/// Minimum fall of the slack per unit of ln gamma (target SIR), in units of the distance D. Hops of a total length D
+/// lose half of it when the target rises by a factor of e.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// Initial distance of the target above the ceiling for a repeated probe, in ln gamma.
+/// First increase of the maximum target, in ln gamma, after a failed check of the chain's upper bound.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the slack that counts, in units of D. Without a cap, slack would outweigh a penalty.
+/// First cap on the slack, in units of D. More slack has no value, or it would outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Cap below which it is not lowered further, in units of D.
+/// Cap on the slack that is not lowered further, in units of D.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Weight of negative slack relative to positive slack.
+/// Weight of negative slack relative to positive slack when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Convergence tolerance, in ln gamma.
+/// Gain of the target SIR, in ln gamma, below which a step counts as idle. Two idle steps in a row end the ascent.
 const CLOSE: f32 = 3e-6;
 
-/// Expected gain below which an ascent ends, in ln gamma.
+/// Expected gain of the target SIR below which an ascent ends, in ln gamma.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected gain below which the ascent's result is predictable, in ln gamma.
+/// Expected gain of the target SIR below which the end of an ascent can be predicted, in ln gamma.
 const FORESEEN: f32 = 1e-4;
 
-/// Iterations after which a negative slack below `ASTRAY`, in units of D, ends an ascent.
+/// Number of iterations after which an ascent with a slack below -`ASTRAY` D counts as diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Limit of the negative slack at the end of an ascent, in units of D: the judge makes up for less.
+/// Maximum negative slack at the end of an ascent, in units of D. The search for the highest target after the ascent
+/// makes up for less.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
-    /// Try this fraction of the step with this target, in ln gamma.
+    /// Try `share`, a fraction of the relays' steps, with the target `sigma`, in ln gamma.
     Try { share: f32, sigma: f32 },
-    /// Raise the target as far as the unchanged chain allows.
+    /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
-    /// Compute the steps again.
+    /// Compute the relays' steps again, by a backward pass.
     Again,
     /// End the ascent.
     Over,
@@ -64,19 +67,19 @@ pub(crate) enum AscentStep {
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
-    /// Target of the nominal chain, in ln gamma, and its slack, m.
+    /// Target SIR of the current chain, as ln gamma. The next field is the chain's slack for it, m.
     pub(crate) sigma: f32,
     pub(crate) slack: f32,
     floor: f32,
-    /// Maximum target until the chain is probed, in ln gamma, and its next increase.
+    /// Maximum target until the chain's upper bound is checked, in ln gamma. The next field is its next increase.
     limit: f32,
     excess: f32,
-    /// Cap on the slack that counts, in units of D; lowered where slack would outweigh a penalty.
+    /// Cap on the slack, in units of D; lowered where slack would outweigh a penalty.
     spare: f32,
-    /// Penalty of the nominal chain for relays too near the interferer, in metres of slack.
+    /// Penalty of the current chain for relays too near the interferer, in metres of slack.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// Derivative of the slack by ln gamma, m.
+    /// Derivative of the chain's slack by ln gamma, the logarithm of the target SIR, m.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
@@ -87,7 +90,8 @@ pub(crate) struct Ascent {
 }
 
 impl Ascent {
-    /// Creates an ascent of a chain that has `slack` for the target `sigma`.
+    /// Creates an ascent of a chain that has `slack`, m, for the target `sigma`, in ln gamma. The target never falls
+    /// below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -108,7 +112,7 @@ impl Ascent {
         }
     }
 
-    /// Returns the ascent with `limit`, in ln gamma, as the maximum target until its first probe.
+    /// Returns the ascent with a maximum target of `limit`, in ln gamma, until the upper bound is checked.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -121,7 +125,7 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the cap on the slack, m: more slack than that has no additional value.
+    /// Returns the cap on the slack, m: a chain with more slack is no better.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
@@ -140,7 +144,7 @@ impl Ascent {
         true
     }
 
-    /// Continues with `slack`, m, the nominal chain's slack under the lowered cap.
+    /// Continues with `slack`, m, the current chain's slack under the lowered cap.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -148,12 +152,12 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the nominal chain meets the current maximum target.
+    /// Returns true if the current chain meets the maximum target.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the maximum target after a failed probe: the chain needs more spare slack.
+    /// Raises the maximum target after the chain failed at its upper bound: it needs more spare slack.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -165,14 +169,14 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the value function of a segment to the totals of the backward pass.
+    /// Adds the derivative and the expected gains of a segment of the chain to those of the backward pass.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
         self.square += outlook.square;
     }
 
-    /// Returns the next step after a complete backward pass.
+    /// Returns the action that follows a complete backward pass.
     pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -193,23 +197,24 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if neither the slack nor the step is worth more than `by`, in ln gamma.
+    /// Returns true if the slack and the steps' expected gain are each worth less than `by`, in ln gamma.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Returns true if the ascent diverges: the target rises and the chain does not follow.
+    /// Returns true if the ascent diverges: the target rises, and the chain falls far short of Rx.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true while the real chain, after its last step, may still meet the nominal target.
+    /// Returns true while the chain falls short of Rx so little that it may still meet its target.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the ascent, with `turn` next, will end no higher than `sigma`. False if there is a penalty.
+    /// Returns true if the ascent, with the action `turn` next, will end no higher than the target `sigma`. False if
+    /// there is a penalty.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -220,7 +225,7 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target for a fraction of the step.
+    /// Returns the target, in ln gamma, that fits the fraction `share` of the relays' steps.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -239,12 +244,13 @@ impl Ascent {
         }
     }
 
-    /// Returns the value of a chain that has `slack` for `sigma`. Negative slack has a higher weight than positive slack.
+    /// Returns the value of a chain with `slack` for the target `sigma`, in ln gamma. Negative slack has a higher
+    /// weight than positive slack.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial that has `slack` for `sigma` is better than the nominal chain.
+    /// Returns true if a trial with `slack`, m, for the target `sigma` is better than the current chain.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -253,7 +259,7 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the next step after a failed trial: the next fraction, or a smaller trust region.
+    /// Returns the action after a failed trial: a smaller fraction of the step, or a smaller trust region.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -266,7 +272,8 @@ impl Ascent {
         turn
     }
 
-    /// Makes the trial with `share` the nominal chain.
+    /// Makes a trial the current chain: the fraction `share` of the steps, with `slack` for `sigma`. Returns the next
+    /// action.
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -285,7 +292,8 @@ impl Ascent {
         }
     }
 
-    /// Continues after the target has been raised as far as the unchanged chain allows.
+    /// Continues after the target was raised to `sigma`, as far as the unchanged chain allows. Returns the next
+    /// action.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

@@ -95,7 +95,7 @@ pub enum AsideCase {
     Edge(EdgeCoordinate),
     /// Optimum above Rx: the interferer is at Tx (X = Y = 0), so the SIR of the first hop is constant.
     Level,
-    /// Optimum on a vertical face of the corridor, where both hops' level lines of SIR touch; with noise only.
+    /// Optimum on a vertical face of the corridor, with noise: both SIRs' level lines touch there.
     Wall,
     /// Optimum inside the corridor at its lowest or highest altitude, with noise. Found by a search without a proof
     /// of optimality.

@@ -104,7 +104,7 @@ pub enum PlaceCase {
     Level = 9,
     /// Optimum at x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned = 10,
-    /// Optimum at the maximum that SIR_1 has after its minimum, with noise, or where the SIRs cross after that.
+    /// Optimum at the maximum of SIR_1 after its minimum, with noise, or where the SIRs cross after it.
     SecondHill = 11,
 }
 
