@@ -70,7 +70,7 @@ impl InterferenceEstimate {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Spread {
-    /// All hops have the same length.
+    /// Equal length of all hops.
     #[default]
     Even,
     /// First hop, from Tx, half as long as the other hops.

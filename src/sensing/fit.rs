@@ -18,7 +18,7 @@ use crate::mission::{Interferer, Mission};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Unfit {
-    /// Too few measured positions, or too close together, to extrapolate from them.
+    /// Measured positions too few or too close together to extrapolate from them.
     Places,
     /// The measurements fit no single source on the ground.
     NoSource,
