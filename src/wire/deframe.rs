@@ -13,7 +13,7 @@ use super::frame::MAX_DECODED;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// More bytes than the longest frame of the format has.
+    /// Length above the maximum length of a frame.
     Oversized,
     /// Delimiter inside a COBS block: the end of the frame is missing.
     Truncated,
