@@ -21,7 +21,6 @@ impl Geodetic {
     /// Returns the nearest representable position. `None` for a value that is not finite or out of range. Latitude
     /// and longitude are in degrees, and the height above mean sea level in m, within 1e6.
     ///
-    ///
     /// ```
     /// use uav_relay::Geodetic;
     ///

@@ -36,7 +36,6 @@ use crate::root::sqrt;
 
 /// Returns the inverse interference at `at`, the only factor of a hop's SIR that depends on it.
 ///
-///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
 /// interferer it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) /
 /// `Upsilon_max`, with noise.
@@ -165,7 +164,6 @@ pub enum Extremum {
 }
 
 /// Returns the extrema of SIR_1, the first hop's SIR, along x for a relay at `altitude_m`.
-///
 ///
 /// Without noise they are roots of a quadratic, written without cancellation for X < 0; with noise they take at most 190
 /// evaluations of the slope. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.

@@ -84,7 +84,6 @@ impl Estimator {
 
     /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.
     ///
-    ///
     /// With any other `i_max_w` it rejects every sample and never gives an estimate.
     pub const fn new(i_max_w: f32) -> Self {
         let known = i_max_w >= 1e-30 && i_max_w <= 1e6;

@@ -161,7 +161,6 @@ impl Axis {
 
     /// Creates the line from the transmitter to the receiver of `sites`, see [`try_new`](Self::try_new).
     ///
-    ///
     /// # Errors
     /// Same as for [`try_new`](Self::try_new).
     #[inline] // a line is returned through the stack

@@ -461,7 +461,6 @@ impl Mission {
 
     /// Creates a mission in a `const`; an invalid parameter fails the build. Otherwise as [`Mission::try_new`].
     ///
-    ///
     /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant; [`Channel::new`](crate::Channel::new), which
     /// takes the losses as factors, 10^(dB / 10), can:
     ///
@@ -585,7 +584,6 @@ impl Mission {
     }
 
     /// Noise nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m.
-    ///
     ///
     /// 0 without noise and in a field, whose Upsilon includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {

@@ -182,7 +182,6 @@ impl LocalSearch {
 
     /// Continues the search by at most `budget` evaluations of both hops, plus one row of 24.
     ///
-    ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let mut left = budget;

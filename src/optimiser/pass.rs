@@ -285,7 +285,6 @@ impl Link<'_> {
     /// Returns the x that the relay before must take if this one is at `place`, to meet `target`. The reach of the
     /// relay before is `from_m`.
     ///
-    ///
     /// `None` if there is none, because a range that was assumed to have no holes has one. Bounded by two reaches, in a field by
     /// three for each of its points.
     pub fn required_position(

@@ -183,7 +183,6 @@ fn placed(
 /// Returns the position of relay `index` for `target`. It is before the relay's reach if that lets other relays meet
 /// the target.
 ///
-///
 /// `None` if the target cannot be met. At most N^2 reaches.
 pub fn place(
     mission: &Mission,

@@ -175,7 +175,6 @@ impl Search {
 
     /// Continues the search with the slacks, m, of those [`Search::ladder`] targets that every hop meets.
     ///
-    ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
     /// # Errors
@@ -368,7 +367,6 @@ impl Search {
     }
 
     /// Continues after a relay refused its required position for `target`.
-    ///
     ///
     /// First a plain pass, in which no relay holds back, finds a target that no relay can refuse. The interval up to the refused
     /// target is then bisected.

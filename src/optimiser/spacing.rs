@@ -512,7 +512,6 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 
 /// Returns the maximum distance along x, m, from which a relay meets `target` at Rx. The paper's `d_max`.
 ///
-///
 /// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited to D, so
 /// that it is smooth in the target for the root search.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {

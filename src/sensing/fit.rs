@@ -270,7 +270,6 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or the closest one.
     ///
-    ///
     /// `side_m` selects its side of the line if the positions do not determine it.
     ///
     /// # Errors

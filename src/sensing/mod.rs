@@ -41,7 +41,6 @@ use crate::time::Duration;
 
 /// Settings for the estimation of an unknown interferer from the relays' measurements.
 ///
-///
 /// ```
 /// use uav_relay::{Listen, Settings};
 ///

@@ -28,7 +28,6 @@ impl Key {
     /// Returns the authentication tag of `signed`, the header and body of a frame. `sender` and `receiver` are the
     /// nonces of the frame's sender and receiver.
     ///
-    ///
     /// Work: two to five blocks of BLAKE2s.
     pub fn tag(&self, sender: u64, receiver: u64, signed: &[u8]) -> [u8; TAG] {
         let both = u128::from(receiver) << 64 | u128::from(sender);

@@ -79,7 +79,6 @@ impl Deframer {
 
     /// Decodes bytes up to the end of the current COBS block or a delimiter; returns the remaining ones.
     ///
-    ///
     /// Equivalent to [`push`](Self::push) for each of them, in a quarter of the instructions.
     pub fn push_run<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
         let free = self.plain.get_mut(self.len..).unwrap_or_default();

@@ -91,7 +91,6 @@ const fn low_half(crc: u32) -> u16 {
 
 /// Identifier of a mission: of an uploaded one, or of the mission loaded before flight.
 ///
-///
 /// Ordered by version; of two missions with the same version, the one with the larger digest counts as newer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

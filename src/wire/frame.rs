@@ -209,7 +209,6 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
 
 /// Decodes header and message of a frame: [`open`], then [`Message::decode`]. The tag is not verified.
 ///
-///
 /// # Errors
 /// [`FrameError`]; a handshake is not a message.
 pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {

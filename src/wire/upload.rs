@@ -85,7 +85,6 @@ impl core::error::Error for UploadError {}
 impl Upload {
     /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
-    ///
     /// If rounding has put eta of its channel outside of the other two factors, it is clamped to the nearer one.
     ///
     /// # Errors

@@ -60,7 +60,6 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
 ///
-///
 /// # Contract
 /// - *Inputs* take anything, never fail and do a bounded amount of work.
 /// - *Time* is an argument. A backward step of the caller's clock counts as no time between the two calls.

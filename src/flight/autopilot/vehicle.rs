@@ -391,7 +391,6 @@ const TAG: u32 = 0xA_52A5;
 
 /// Measurement of the link's delay by echoes (TIMESYNC): an upper bound of a message's age.
 ///
-///
 /// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock may lose
 /// time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in order: a message
 /// received after an answer was sent after the question, so it is not older than the question.
@@ -594,7 +593,6 @@ impl OffLine {
 }
 
 /// Detection of a drone that is too far from its line for the mission's coordinates.
-///
 ///
 /// Sites with latitude and longitude swapped are valid places, and nothing else shows the mistake.
 ///

@@ -211,7 +211,6 @@ const SIK_ZERO: f32 = -52.154_27;
 
 /// Returns the noise power, W, for the value `noise` of a SiK radio's RADIO_STATUS.
 ///
-///
 /// The radio's documentation states `signal_dBm = (RSSI / 1.9) - 127` as an approximation, and the same units for noise. `None`
 /// for 255 (unknown), and for 0, which a radio reports before its first measurement and which is below any real noise.
 ///
@@ -296,7 +295,6 @@ impl Parser {
     }
 
     /// Returns the result of `read` for the next received message and the bytes of its frame.
-    ///
     ///
     /// Each byte starts at most one checksum, of at most 266 bytes. In real frames at most one byte in ten does so, in
     /// maliciously chosen bytes one in three.

@@ -156,7 +156,6 @@ impl Signing {
 
     /// Checks the signature of a received frame. Work: a hash of one frame.
     ///
-    ///
     /// # Errors
     /// [`Flaw`] states why the frame is rejected.
     pub fn check(&mut self, now: Instant, received: &Received, frame: &[u8]) -> Result<(), Flaw> {

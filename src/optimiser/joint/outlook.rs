@@ -240,7 +240,6 @@ impl Policy {
 
     /// Returns the change of the two free coordinates, m, for the fraction `share` of the step.
     ///
-    ///
     /// `change` is the move of the previous relay.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();

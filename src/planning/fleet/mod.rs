@@ -78,7 +78,6 @@ impl Most {
     /// Returns the highest target SIR that any number of relays meets. `None` if it is below 1e-20 of the highest
     /// possible SIR of the first hop.
     ///
-    ///
     /// With different altitudes, or a minimum separation, it is a feasible target but not certainly the highest. Work: 33 times
     /// that of [`Fewest::of`].
     pub fn of(mission: &Mission, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
@@ -113,7 +112,6 @@ impl Most {
 
 impl Mission {
     /// Writes positions with which the mission's N relays meet `target` to `places`, relay 1 first.
-    ///
     ///
     /// Returns false if they do not meet it, or `places` is shorter than N. Every hop but one has its maximum length, and meets
     /// the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
@@ -309,8 +307,6 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
 
 /// Returns the highest target SIR that the mission's N relays meet in its field, all with `profile`. It is linear, to
 /// an f32's step.
-///
-///
 ///
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
 /// `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,

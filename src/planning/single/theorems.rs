@@ -281,7 +281,6 @@ pub enum FreeCase {
 /// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. Its x is in [0, D],
 /// and its altitude in the mission's band.
 ///
-///
 /// Work: at most 190 evaluations of both hops and one of Lemma 1.
 pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     let config = mission.config();
@@ -324,8 +323,6 @@ pub struct Guide {
 }
 
 /// Returns the power ratios C_1 to C_3 for a relay at `altitude_m`, m, above 0; `None` in a field.
-///
-///
 ///
 /// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems/`. Constant work.
 pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {

@@ -132,7 +132,6 @@ fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] 
 /// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without
 /// a field.
 ///
-///
 /// It only evaluates positions where E(SIR_2) is one of its targets, so it may miss the optimum of a field that changes much
 /// between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {

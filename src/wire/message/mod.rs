@@ -177,7 +177,6 @@ impl Message {
 impl Message {
     /// Encodes the message body into `buffer`; returns its length, at most [`MAX_BODY`] bytes.
     ///
-    ///
     /// `None` if it does not fit, or needs a feature that the crate was built without.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         match self {

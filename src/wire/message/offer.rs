@@ -34,7 +34,6 @@ impl Upload {
 
     /// Decodes a stored uploaded mission; `None` if `bytes` are not exactly one valid upload.
     ///
-    ///
     /// The caller protects the stored bytes by a check sequence.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let (&tag::OFFER, body) = bytes.split_first()? else {

@@ -331,7 +331,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Returns the required x, m, of the relay before `segment` if its last relay is at `place_m`.
     ///
-    ///
     /// `None` if a relay of the segment cannot take its required position.
     pub(super) fn held_back_x_m(
         &self,
