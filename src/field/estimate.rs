@@ -71,7 +71,7 @@ pub struct Estimate {
     /// probability of about 95 %. The error covers sampling only, not a deviation of the interference from a Beta
     /// distribution.
     pub standard_error_per_w: f32,
-    /// Number of samples used.
+    /// Number of accepted samples on which the estimate is based.
     pub samples: u32,
 }
 

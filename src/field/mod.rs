@@ -142,22 +142,22 @@ impl Field {
         self.points
     }
 
-    /// Returns the smallest Upsilon of the table, 1/W: the worst interference.
+    /// Returns the smallest Upsilon = E[1/I] of the table, 1/W: the worst interference.
     pub const fn smallest(&self) -> f32 {
         self.smallest
     }
 
-    /// Returns the largest Upsilon of the table, 1/W.
+    /// Returns the largest Upsilon = E[1/I] of the table, 1/W: the weakest interference.
     pub const fn largest(&self) -> f32 {
         self.largest
     }
 
-    /// Returns true if Upsilon is the same everywhere: the paper's i.i.d. interference.
+    /// Returns true if Upsilon = E[1/I] is the same everywhere: the paper's i.i.d. interference.
     pub const fn is_constant(&self) -> bool {
         !(self.smallest < self.largest)
     }
 
-    /// Returns Upsilon at `x_m`, 1/W, interpolated linearly with a relative error below 4e-7.
+    /// Returns Upsilon = E[1/I] at `x_m`, 1/W, interpolated linearly with a relative error below 4e-7.
     ///
     /// Every `x_m` is valid: beyond the ends it returns that of the end point, and for NaN that of the first point. The result is
     /// never outside the range of the two points around it. Work: at most eleven comparisons of a binary search, three divisions.

@@ -41,7 +41,7 @@ pub(super) struct Clearance {
     accepted: Option<(Address, RelayNumbers)>,
     /// Pending answer to a command: its addressee, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays this relay has to clear.
+    /// Side whose lost relays the operator has cleared, until the relay is told.
     cleared: Option<Side>,
 }
 
