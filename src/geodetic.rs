@@ -43,7 +43,7 @@ impl Geodetic {
     }
 }
 
-/// Rounds to the nearest integer, halves away from zero.
+/// Rounds `value` to the nearest integer, halves away from zero.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "saturates, and callers hand in what fits"

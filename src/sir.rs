@@ -34,7 +34,7 @@ use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 
-/// Returns the inverse interference at `at`, the only factor of a hop's SIR that depends on it.
+/// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
 /// interferer it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) /

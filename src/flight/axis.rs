@@ -477,7 +477,7 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     1.0 / (north2 / meridian + (1.0 - north2) / prime)
 }
 
-/// Radians in 10⁻⁷ degrees.
+/// Factor that converts units of 10⁻⁷ degrees to radians.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
 /// Returns sine and cosine of an angle in units of 10⁻⁷ degrees. The angle is reduced to an eighth of a turn exactly, in
@@ -531,7 +531,8 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Special cases of the line. Its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
+/// Tests of special cases of a line on earth: its ends, a pole, the antimeridian, its rotation. It rotates with the
+/// earth's curvature.
 #[cfg(test)]
 mod tests {
     use super::{Axis, AxisError, LONGEST_M};

@@ -655,15 +655,15 @@ impl Mission {
 }
 
 impl Mission {
-    /// Gain A of the first hop, whose SIR is A [`crate::sir::quiet`] / squared length. `p_t` / `p_MSI`, in a field
-    /// `p_t` `Upsilon_max` / eta.
+    /// Gain A of the first hop: its SIR is A [`crate::sir::quiet`] / squared length. A is `p_t` / `p_MSI`, the powers
+    /// of Tx and interferer; in a field `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Gain of a hop from a relay of `power_w` watts to another drone. (`p_u` / `p_MSI`)(eta / `mu_los`), in a field
-    /// `p_u` `Upsilon_max` / `mu_los`.
+    /// Gain of a hop from a relay of `power_w` watts to another drone. It is (`p_u` / `p_MSI`)(eta / `mu_los`), with
+    /// the relay's power and the interferer's; in a field `p_u` `Upsilon_max` / `mu_los`.
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
@@ -713,14 +713,14 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the last x for relay `index`, m, that leaves the relays after it their separation. "After" is in pass
-    /// order. `across_squared` is the maximum squared distance across the line between two neighbours among them,
-    /// m^2; it reduces the steps in x.
+    /// Returns the farthest x of relay `index` in the direction of a pass that leaves later relays room, m. They need
+    /// their minimum separation. `across_squared` is the maximum squared distance across the line between two
+    /// neighbours among them, m^2; it reduces the steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the last x for relay `index`, m, if the relays after it in pass order need no separation.
+    /// Returns the farthest x of relay `index` in the direction of a pass, m, without a minimum separation.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }

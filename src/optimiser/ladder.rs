@@ -41,12 +41,12 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets, for a plain pass if `plain` is true. No relay holds back in a plain pass.
+    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay is at its reach.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true for a plain pass, in which no relay holds back.
+    /// Returns true for a plain pass, in which every relay is at its reach and none before it.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }

@@ -199,7 +199,7 @@ impl Link<'_> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the slack of the chain for `target`, m, and the x of this last relay, m.
+    /// Returns the slack (spare length) of the chain for `target`, m, and the x of this last relay, m.
     ///
     /// A slack of 0 or more means that the chain meets the target. `reach` is the end of this relay's range, and
     /// `from_m` that of the relay before. `None` if Rx is out of reach from everywhere. Toward Rx the slack is reach
@@ -351,20 +351,21 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of one sweep along the chain: the slack of each target, and the target to commit.
+/// Result of one sweep along the chain: slack (spare length) of each target, and target to commit.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
     /// Index of the committed target in the ladder; `None` if the search goes on. After a commit every relay takes
     /// its position for that target.
     pub commit: Option<u8>,
-    /// Slack of the chain for each target that every hop can meet, m: 0 or more if the chain meets it.
+    /// Slack (spare length) of the chain for each target that every hop can meet, m. It is 0 or more if the chain
+    /// meets the target.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
-    /// Returns the result of a sweep of `ladder`, whose `targets` have these `slacks`. A target is committed if the
-    /// next higher one is known to be infeasible and within the mission's tolerance, or if the ladder has no other
-    /// target: the step of the paper's Algorithm 1.
+    /// Returns the result of a sweep of `ladder`, whose `targets` have these `slacks` (spare lengths). A target is
+    /// committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the
+    /// ladder has no other target: the step of the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -391,8 +392,9 @@ impl Verdict {
     }
 }
 
-/// Returns the index of the highest target that is met, plus one; 0 if none is. If every relay has the same altitude, all lower
-/// targets are met too. In a varying field, and with different altitudes, some may be missed, and the highest one still counts.
+/// Returns the index of the highest target that is met (slack of 0 or more), plus one; 0 if none is. If every relay
+/// has the same altitude, all lower targets are met too. In a varying field, and with different altitudes, some may
+/// be missed, and the highest one still counts.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -423,8 +425,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes the reaches of all relays; returns the chain's slack, m, and the last relay's x, m. `visit` gets the
-    /// index and the reach of each relay. `None` if a hop cannot meet the target.
+    /// Computes the reaches of all relays; returns the chain's slack (spare length), m, and the last x, m. That x is
+    /// the last relay's. `visit` gets the index and the reach of each relay. `None` if a hop cannot meet the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();
@@ -451,8 +453,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             }) || self.place(0).is_some())
     }
 
-    /// Returns the x of relay `index`, m, if no relay has to hold back; else `None`. For the index 0 it returns the x
-    /// of some relay.
+    /// Returns the x of relay `index`, m, if every relay can be at its reach; else `None`. For the index 0 it returns
+    /// the x of some relay.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = Self {
             plain: true,

@@ -158,8 +158,8 @@ pub fn solve(
     }
 }
 
-/// Returns the position of relay `index` for `target`; `plain` is true if no relay may hold back. `None` if a relay
-/// has no position.
+/// Returns the position of relay `index` for `target`. `plain` is true if every relay must be at its reach. `None` if
+/// a relay has no position.
 fn placed(
     mission: &Mission,
     target: f32,

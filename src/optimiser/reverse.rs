@@ -322,7 +322,7 @@ mod tests {
         assert!(found > 12, "{found}");
     }
 
-    /// A relay 100 m behind a strong interferer, as seen from Rx, hears Rx only from farther away.
+    /// Tests a relay 100 m behind a strong interferer, as seen from Rx. It receives Rx only from farther away.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -80,12 +80,12 @@ pub struct Search {
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True for plain passes, in which no relay holds back. In the paper's schedule, and after a chain with relays
-    /// that hold back was refused.
+    /// True for plain passes, in which every relay is at its reach. They are used in the paper's schedule, and after
+    /// a relay refused a position before its reach.
     plain: bool,
     /// Lowest known target that no chain can meet.
     most: Option<f32>,
-    /// Bisection after a relay has refused its required position.
+    /// Bisection of targets after a relay has refused its required position; `None` before.
     trials: Option<StandTrials>,
     /// True for a mission with traffic in both directions.
     both_ways: bool,
@@ -159,7 +159,8 @@ impl Search {
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target that no chain can meet, after a pass with these `slacks`. `None` after plain passes only.
+    /// Returns the lowest target that no chain can meet, after a pass with these `slacks` (spare lengths). `None`
+    /// after plain passes only.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if cfg!(feature = "reverse") && self.both_ways {
             // Reaches and held positions of both directions are not proven to exclude no chain.
@@ -173,7 +174,8 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues the search with the slacks, m, of those [`Search::ladder`] targets that every hop meets.
+    /// Continues the search with the slacks (spare lengths, m) of those targets that every hop meets. The targets are
+    /// the first ones of [`Search::ladder`].
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
@@ -292,9 +294,9 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target with zero slack, by interpolation, a cubic of log target in the slack. The cubic passes through
-/// the four points about the sign change. `None` if the cubic and the straight line disagree: the slack jumps there,
-/// and neither root is meaningful.
+/// Returns the target with zero slack (spare length), by interpolation. It is a cubic of log target in the slack. The
+/// cubic passes through the four points about the sign change. `None` if the cubic and the straight line disagree:
+/// the slack jumps there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;

@@ -12,10 +12,10 @@ use crate::geodetic::{LineError, Sites};
 use crate::mission::{Interference, Mission};
 use crate::mission::{MissionConfig, MissionError};
 
-/// True with the feature `upload`; without it no mission can be uploaded in flight.
+/// True with the feature `upload`; without it no mission can be uploaded.
 pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
 
-/// Mission uploaded in flight, with a version.
+/// Mission uploaded by the operator, with a version. It replaces the one loaded before flight.
 #[cfg(feature = "upload")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -179,8 +179,8 @@ impl Upload {
     }
 }
 
-/// Mission uploaded in flight. The type is uninhabited without the feature `upload`, so that the compiler drops all
-/// code that handles one.
+/// Mission uploaded by the operator. The type is uninhabited without the feature `upload`, so that the compiler drops
+/// all code that handles one.
 #[cfg(not(feature = "upload"))]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Upload {}

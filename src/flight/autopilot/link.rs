@@ -38,7 +38,7 @@ const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Delay of a target after which a PX4 may be in its failsafe.
+/// Delay of a due target after which a PX4 may be in its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
 /// Time for which positions must be received regularly before a blind link recovers. The next constants: the longer
@@ -297,7 +297,7 @@ impl Autopilot {
         self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
-    /// Sets the numbers sent to the operator once a second: a SIR in decibels and the drone's setpoint.
+    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the drone's setpoint.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }

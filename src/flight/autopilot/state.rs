@@ -117,7 +117,7 @@ pub enum FlightMode {
     Brake,
     /// RTL or SMART_RTL: the drone returns to its launch position.
     Return,
-    /// Landing mode.
+    /// Landing mode: the drone descends and lands.
     Land,
     /// Any other mode, such as a mission or a take-off.
     Other,

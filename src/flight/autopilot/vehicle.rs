@@ -480,11 +480,12 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the time over which the minimum delay is taken. The minimum covers the last one to two halves.
+/// Half of the window over which the minimum delay of messages is taken. The minimum covers the last one to two
+/// halves.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of that time. A gap and the burst after it then do not change the minimum
-/// delay.
+/// Minimum number of messages in each half of the window for the minimum delay. A gap and the burst after it then do
+/// not change that delay.
 const LEAST: u8 = 8;
 
 /// Assumed maximum drift between the clocks of relay and autopilot: one part in 2^10. With more drift the minimum
@@ -504,7 +505,7 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    /// Minimum difference between the clocks, µs: in the previous half of the time, and in the present one.
+    /// Minimum difference between the clocks, µs: in the previous half of the window, and the present one.
     least: [i64; 2],
     since: Instant,
     messages: u8,

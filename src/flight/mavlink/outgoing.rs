@@ -20,9 +20,9 @@ pub type FrameBytes = Vec<u8, { HEADER + LONGEST + CHECKSUM + SIGNING }>;
 
 /// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
 pub mod severity {
-    /// Problem with which the flight continues.
+    /// Severity of a problem with which the flight continues.
     pub const WARNING: u8 = 4;
-    /// Information for an operator.
+    /// Severity of a piece of information for the operator.
     pub const INFO: u8 = 6;
 }
 

@@ -6,32 +6,33 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed steps that an ascent tries, in this order.
+/// Fractions of the relays' computed steps that an ascent of the joint method tries, in this order.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
 /// Initial trust region: limit of a relay's step, as a fraction of its distance from the interferer. It also limits
 /// the change of ln gamma, the logarithm of the target SIR.
 const TRUST: f32 = 0.5;
 
-/// Trust region below which the result of an ascent is not predicted from its next step.
+/// Trust region (limit of the steps) below which the result of an ascent is not predicted.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust region below which the ascent ends, as a fraction like [`TRUST`].
+/// Trust region (limit of the steps) below which the ascent ends; a fraction like [`TRUST`].
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum fall of the slack per unit of ln gamma (target SIR), in units of the distance D. Hops of a total length D
-/// lose half of it when the target rises by a factor of e.
+/// Minimum fall of the slack (spare length at Rx) per unit of ln gamma, in units of the distance D. gamma is the
+/// target SIR. Hops of a total length D lose half of it when the target rises by a factor of e.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the maximum target, in ln gamma, after a failed check of the chain's upper bound.
+/// First increase of the maximum target SIR, in ln gamma, after the chain failed at its upper bound.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the slack, in units of D. More slack has no value, or it would outweigh a penalty.
+/// First cap on the slack (spare length of the chain at Rx), in units of D. More slack has no value, or it would
+/// outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Cap on the slack that is not lowered further, in units of D.
+/// Smallest cap on the slack (spare length of the chain at Rx), in units of D. It is not lowered further.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Weight of negative slack relative to positive slack when two chains are compared.
+/// Weight of a length that is missing at Rx, relative to spare length, when two chains are compared.
 const SHORT: f32 = 2.0;
 
 /// Gain of the target SIR, in ln gamma, below which a step counts as idle. Two idle steps in a row end the ascent.
@@ -43,12 +44,13 @@ const SETTLED: f32 = 0.3 * CLOSE;
 /// Expected gain of the target SIR below which the end of an ascent can be predicted, in ln gamma.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which an ascent with a slack below -`ASTRAY` D counts as diverged.
+/// Number of iterations after which an ascent has diverged if its chain is too short by `ASTRAY` D. D is the distance
+/// from Tx to Rx.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Maximum negative slack at the end of an ascent, in units of D. The search for the highest target after the ascent
-/// makes up for less.
+/// Length by which a chain may fall short of Rx at the end of an ascent, in units of D. The search for the highest
+/// target after the ascent makes up for it.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -67,19 +69,22 @@ pub(crate) enum AscentStep {
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
-    /// Target SIR of the current chain, as ln gamma. The next field is the chain's slack for it, m.
+    /// Target SIR of the current chain, as ln gamma. The next field is the slack, the chain's spare length at Rx for
+    /// it, m.
     pub(crate) sigma: f32,
     pub(crate) slack: f32,
     floor: f32,
-    /// Maximum target until the chain's upper bound is checked, in ln gamma. The next field is its next increase.
+    /// Maximum target SIR until the chain is checked at its upper bound, in ln gamma. The next field is its next
+    /// increase.
     limit: f32,
     excess: f32,
-    /// Cap on the slack, in units of D; lowered where slack would outweigh a penalty.
+    /// Cap on the slack (spare length of the chain at Rx), in units of D. It is lowered where slack would outweigh a
+    /// penalty.
     spare: f32,
-    /// Penalty of the current chain for relays too near the interferer, in metres of slack.
+    /// Penalty of the current chain for relays too near the interferer, in metres of length at Rx.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// Derivative of the chain's slack by ln gamma, the logarithm of the target SIR, m.
+    /// Derivative of the slack (spare length at Rx) by ln gamma, the logarithm of the target SIR, m.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
@@ -90,8 +95,8 @@ pub(crate) struct Ascent {
 }
 
 impl Ascent {
-    /// Creates an ascent of a chain that has `slack`, m, for the target `sigma`, in ln gamma. The target never falls
-    /// below `floor`.
+    /// Creates an ascent of a chain with `slack`, its spare length at Rx, m, for the target `sigma`. Targets are in
+    /// ln gamma, and never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -112,7 +117,7 @@ impl Ascent {
         }
     }
 
-    /// Returns the ascent with a maximum target of `limit`, in ln gamma, until the upper bound is checked.
+    /// Returns the ascent with a maximum target of `limit`, in ln gamma, until the chain is checked there.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -125,17 +130,17 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the cap on the slack, m: a chain with more slack is no better.
+    /// Returns the cap on the slack (spare length at Rx), m: a chain with more is no better.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the slack.
+    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the slack (spare length at Rx).
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the cap on the slack if a penalty applies; returns true if it was lowered.
+    /// Lowers the cap on the slack (spare length at Rx) if a penalty applies; returns true if it did.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -144,7 +149,7 @@ impl Ascent {
         true
     }
 
-    /// Continues with `slack`, m, the current chain's slack under the lowered cap.
+    /// Continues with `slack`, the chain's spare length at Rx under the lowered cap, m. Returns the next action.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -157,7 +162,7 @@ impl Ascent {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the maximum target after the chain failed at its upper bound: it needs more spare slack.
+    /// Raises the maximum target after the chain failed at it; it needs more spare length. Returns the next action.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -169,7 +174,7 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the derivative and the expected gains of a segment of the chain to those of the backward pass.
+    /// Adds a segment's derivative by the target, and its expected gains, to the backward pass's totals.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -197,7 +202,7 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if the slack and the steps' expected gain are each worth less than `by`, in ln gamma.
+    /// Returns true if spare length and expected gain are each worth less than `by`, in ln gamma.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -225,7 +230,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target, in ln gamma, that fits the fraction `share` of the relays' steps.
+    /// Returns the target, in ln gamma, that the chain should just meet with `share` of the steps. `share` is a
+    /// fraction.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -244,13 +250,14 @@ impl Ascent {
         }
     }
 
-    /// Returns the value of a chain with `slack` for the target `sigma`, in ln gamma. Negative slack has a higher
-    /// weight than positive slack.
+    /// Returns the value of a chain with `slack` (spare length at Rx, m) for the target `sigma`. Both are combined in
+    /// ln gamma. A missing length has a higher weight than a spare one.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial with `slack`, m, for the target `sigma` is better than the current chain.
+    /// Returns true if a trial is better than the current chain: `slack`, m, for the target `sigma`. `slack` is its
+    /// spare length at Rx, and `sigma` is in ln gamma.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -272,8 +279,8 @@ impl Ascent {
         turn
     }
 
-    /// Makes a trial the current chain: the fraction `share` of the steps, with `slack` for `sigma`. Returns the next
-    /// action.
+    /// Makes a trial the current chain: fraction `share` of the steps, spare length `slack` for `sigma`. Returns the
+    /// next action.
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -292,8 +299,8 @@ impl Ascent {
         }
     }
 
-    /// Continues after the target was raised to `sigma`, as far as the unchanged chain allows. Returns the next
-    /// action.
+    /// Continues after the target was raised to `sigma`, as far as the unchanged chain allows. `slack` is the chain's
+    /// spare length for it, m. Returns the next action.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

@@ -11,18 +11,21 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function: derivatives of the chain's slack by a relay's position. Later relays react optimally.
+/// Value function: derivatives of the slack, the chain's spare length at Rx, by a relay's position. Later relays
+/// react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// First derivatives of the slack by the relay's x, y and h, m per m.
+    /// First derivatives of the slack (spare length at Rx) by the relay's x, y and h, m per m.
     pub(crate) slope: Triple,
-    /// Second derivatives of the slack by the relay's x, y and h, 1/m; symmetric.
+    /// Second derivatives of the slack (spare length at Rx) by the relay's x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// Derivative of the slack by the logarithm of the target SIR, m.
+    /// Derivative of the slack (spare length at Rx) by the logarithm of the target SIR, m.
     pub(crate) by_target: f32,
-    /// Gain of slack expected from later relays' steps, m: the term by the tried fraction.
+    /// Gain of spare length at Rx expected from later relays' steps, m: the part linear in the fraction. It is
+    /// multiplied by the fraction of the steps that is tried.
     pub(crate) linear: f32,
-    /// Gain of slack expected from later relays' steps, m: the term by the square of the tried fraction.
+    /// Gain of spare length at Rx expected from later relays' steps, m: the part quadratic in the fraction. It is
+    /// multiplied by the square of the fraction of the steps that is tried.
     pub(crate) square: f32,
 }
 

@@ -20,8 +20,8 @@ pub(super) enum Start {
     /// `up` are the direction of that position, `far` its distance relative to the geometric mean of those of Tx and
     /// Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Parabola as `Arch`, without a minimum separation. Its target is found by the rules of the relays' sweep, which
-    /// let relays hold back.
+    /// Parabola as `Arch`, without a minimum separation. Its target is found by the hops of a message sweep, in which
+    /// relays may stop before their reach.
     Through { aside: f32, up: f32 },
     /// Parabola to the side, with altitudes interpolated between the relays with a fixed altitude.
     ///
@@ -250,7 +250,7 @@ impl Start {
 /// Bisection for the highest feasible target SIR of a chain, in ln gamma.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest target found feasible, and true if relays have to hold back to meet it.
+    /// Highest target found feasible, and true if relays have to stop before their reach to meet it.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -274,8 +274,8 @@ impl Seek {
     }
 
     /// Creates a search upward from the feasible target `sigma`, in ln gamma, to a precision of `width`. The first
-    /// step is `step`, each next one three times as long. `holds_back` is true if relays have to hold back for
-    /// `sigma`.
+    /// step is `step`, each next one three times as long. `holds_back` is true if relays have to stop before their
+    /// reach for `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -288,7 +288,7 @@ impl Seek {
     }
 
     /// Records the result of the current target; returns true if there is another one to try. `met` is `None` if the
-    /// target is infeasible, and true if relays have to hold back for it.
+    /// target is infeasible, and true if relays have to stop before their reach for it.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -314,7 +314,7 @@ impl Seek {
         true
     }
 
-    /// Returns the highest target found feasible, and true if relays have to hold back to meet it.
+    /// Returns the highest feasible target found, and true if relays have to stop before their reach.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }

@@ -33,7 +33,7 @@ use crate::sir::square;
 pub struct Fewest {
     /// Number of relays that meets the target.
     pub relays: u16,
-    /// True if no smaller number meets it.
+    /// True if it is proven that no smaller number of relays meets the target.
     pub proven: bool,
 }
 

@@ -313,7 +313,7 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
-    /// Ratio C_1: below it the first hop is the worse one even right above Tx; 0 with the interferer at Rx.
+    /// Ratio C_1: below it the first hop is the worse one even right above Tx. It is 0 with the interferer at Rx.
     pub c1: f32,
     /// Ratio C_2: above it the first hop is the better one even right above Rx.
     pub c2: f32,

@@ -25,7 +25,7 @@ pub struct Hello {
     pub requests_reply: bool,
     /// True to request a new view.
     pub requests_view: bool,
-    /// True if the sender has restarted and has not taken part in anything yet.
+    /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
     /// True if the sender could join between the destination and the destination's neighbour on this side. The sender
     /// and that neighbour receive each other.

@@ -86,7 +86,8 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum slack or reach in a message, m. A position is at most 1e6, and the last hop is limited to 1e9.
+/// Maximum slack (spare length) or reach in a message, m. A position is at most 1e6, and the last hop is limited to
+/// 1e9.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, Serialize, Deserialize)]

@@ -21,7 +21,7 @@ use crate::wire::message::parts::{
 /// Sweep message: the target SIRs of a pass along the chain, and how far each is met.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
@@ -135,7 +135,7 @@ pub struct Answer {
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Slacks of the sweep's targets, and the committed target.
+    /// Slacks (spare lengths) of the sweep's targets, and the committed target.
     pub verdict: Verdict,
     /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
     pub required_x_m: Option<f32>,
@@ -198,7 +198,7 @@ pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 /// chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
@@ -256,7 +256,7 @@ impl Roster {
 /// Token message of Algorithm 2, in which one relay after the other improves its own position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
@@ -426,7 +426,7 @@ pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 /// the sender, back those of the relays from the sender on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,

@@ -141,8 +141,8 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 pub(super) struct Mark {
     /// x of the relay before the segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the slack by the position of the segment's last relay, m per m. The next field has the
-    /// second ones, 1/m.
+    /// First derivatives of the slack (spare length at Rx) by the segment's last relay's position, m/m. The next
+    /// field has the second ones, 1/m.
     pub(super) slope: Triple,
     pub(super) bend: [f32; 6],
 }

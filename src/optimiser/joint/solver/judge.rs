@@ -65,7 +65,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Records the result of one target, and selects the next work. `met` is `Some` if the target is feasible, and
-    /// true if relays have to hold back for it.
+    /// true if relays have to stop before their reach for it.
     pub(super) fn tried(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -172,8 +172,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the search for the highest target with the rules of the relays' sweep. It follows an ascent that ended
-    /// at the target `sigma`; `ceiling` is the upper bound, both in ln gamma.
+    /// Returns the search for the highest target by the hops of a message sweep. Relays may stop before their reach
+    /// in it. It follows an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in ln gamma.
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {

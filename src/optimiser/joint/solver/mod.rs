@@ -51,7 +51,7 @@ enum Work {
     Seek(Seek, Purpose),
     /// Compute the chain for one target SIR, in ln gamma, and store it.
     Settle(f32, Purpose),
-    /// Check that relays can hold back: segment, required x of its last relay in m, search, its purpose.
+    /// Check that relays can stop before their reach: segment, required x at its end, search, purpose.
     HoldBack(u8, f32, Seek, Purpose),
     /// Try the next move of one relay; the chain meets this target SIR, in ln gamma.
     Polish(f32),
@@ -68,20 +68,21 @@ enum Purpose {
     Start,
     /// The search raises the target during an ascent, with the chain unchanged.
     Raise,
-    /// The chain's slack is computed again after its cap was lowered.
+    /// The search computes the chain's spare length at Rx again after its cap was lowered.
     Tighten,
-    /// The search finds the highest target of an ascent's result.
+    /// The search finds the highest target of an ascent's chain, by the hops of the joint method.
     Judge,
-    /// The search finds the highest target of an ascent's result by the rules of the relays' sweep.
+    /// The search finds the highest target of an ascent's chain, by the hops of a message sweep. Relays may stop
+    /// before their reach in it.
     Last,
-    /// The search checks, by the rules of the relays' sweep, that the chain meets its upper bound.
+    /// The search checks, by the hops of a message sweep, that the chain meets its upper bound.
     Probe,
-    /// The search checks one relay's move in the polish, by the rules of the relays' sweep.
+    /// The search checks a move of one relay, by the hops of a message sweep.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the chain is computed by the rules of the relays' sweep.
+    /// Returns true if the search computes the chain by the hops of a message sweep.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -114,7 +115,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
-    /// True if relays have to hold back, taking a position before their reach, for the target found.
+    /// True if relays have to take a position before their reach for the target found.
     holds_back: bool,
     /// True if the minimum separation limited the ascent from any initial chain.
     walled: bool,

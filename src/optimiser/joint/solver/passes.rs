@@ -192,7 +192,7 @@ const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Continues a pass without steps for the target `sigma`, in ln gamma. Stores the chain if `kept`. Ready with the
-    /// slack at its end; `None` if a hop cannot meet the target.
+    /// slack, the spare length at Rx, m; `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -272,8 +272,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Returns the hop to relay `index` of the current chain, by the rules of the relays' sweep. It ends at `end_m`,
-    /// m, at most.
+    /// Returns the hop to relay `index` of the current chain, as in a message sweep. It ends at `end_m`, m, at most.
     pub(super) fn hop(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -315,8 +314,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
     ///
-    /// To be called once the chain is solved. The limit is equal, to the bit, to the one in the solver's passes with
-    /// the rules of the relays' sweep.
+    /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used in its
+    /// passes by the hops of a message sweep.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
         let first = mission.config().distance_m - steps.clone().sum::<f32>();
