@@ -62,10 +62,10 @@ pub struct Field {
 }
 
 impl Field {
-    /// Maximum number of points of a field.
+    /// Maximum number of points of an interference field.
     pub const MAX_POINTS: usize = 1024;
 
-    /// Creates a field from a table, after checking every point.
+    /// Creates an interference field from a table, after checking every point.
     ///
     /// Usable in a constant, where [`Field::new`] turns an error into a failed build.
     ///

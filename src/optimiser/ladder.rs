@@ -26,7 +26,7 @@ pub struct Ladder {
     gap: u8,
     /// Growth of the gaps outward: each is 1 + `growth` / 16 times its inner neighbour.
     growth: u8,
-    /// True for a plain pass, in which no relay holds back: each takes its position at its reach.
+    /// True for a plain pass, in which every relay is at its reach and none stops before it.
     plain: bool,
 }
 

@@ -63,7 +63,7 @@ pub struct Link<'a> {
     pub own: Station,
     /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the agreed field.
     pub measured_per_w: Option<f32>,
-    /// True for a plain pass, in which no relay holds back: each takes its position at its reach.
+    /// True for a plain pass, in which every relay is at its reach and none stops before it.
     pub plain: bool,
     /// Maximum x of the relay by the joint method, m; `None` with other methods.
     pub end_m: Option<f32>,
@@ -442,8 +442,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns true if the chain meets its target. It does so on a plain pass, or with required positions that all
-    /// relays can take.
+    /// Returns true if the chain meets its target. Either every relay can be at its reach, or all relays can take
+    /// their required positions.
     pub(crate) fn is_met(&self) -> bool {
         let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
         closes(self)

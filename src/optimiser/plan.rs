@@ -122,7 +122,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty sweeps over N hops with the bracketed schedule.
 ///
-/// If relays hold back, their positions are checked as in [`place`].
+/// If relays have to stop before their reach, their positions are checked as in [`place`].
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.

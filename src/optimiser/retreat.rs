@@ -33,12 +33,12 @@ use crate::sir::square;
 /// Hop toward Rx in a field whose receiver's position is known, prepared for many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat {
-    /// Gain A of the hop, m^2, for a receiver at the field's largest Upsilon; for the hop to Rx, at Rx.
+    /// Gain A of the hop, m^2: with the field's largest Upsilon = E[1/I], or at Rx for the hop to Rx.
     gain: f32,
     /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest x of the sender, m.
+    /// Smallest x that the sender may take, m.
     end_m: f32,
     to_rx: bool,
 }

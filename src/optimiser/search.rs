@@ -152,8 +152,8 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next ladder of targets by the one that the leader predicts to end with a commit. If it is for a
-    /// plain pass, all later ones are, too.
+    /// Replaces the next ladder of targets by the leader's prediction of the one that ends with a commit. If it is
+    /// for a plain pass, all later ones are, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
@@ -370,8 +370,8 @@ impl Search {
 
     /// Continues after a relay refused its required position for `target`.
     ///
-    /// First a plain pass, in which no relay holds back, finds a target that no relay can refuse. The interval up to the refused
-    /// target is then bisected.
+    /// First a plain pass, in which every relay is at its reach, finds a target that no relay can refuse. The
+    /// interval up to the refused target is then bisected.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.

@@ -65,8 +65,8 @@ const OF_ONE_MIND: f64 = 0.1;
 /// Number of sensing passes after a failed search for the faulty relay before the next search.
 const REST: u8 = 4;
 
-/// Maximum difference at which an excluded relay fits the others again: in variances, and absolutely. Both are
-/// squared relative differences; the larger limit counts.
+/// Limits of the difference at which an excluded relay fits the others again. The first is a multiple of the
+/// variance, the second a squared relative difference; the larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays to identify a faulty one. With four, an exclusion leaves three, and three unknowns fit
@@ -305,8 +305,8 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Minimum difference of the level at Tx or Rx that does not fit: in variances, and absolutely. Both are squared
-/// relative differences; the second is a factor of 1.5.
+/// Limits of the difference above which the level measured at Tx or Rx does not fit. The first is a multiple of the
+/// variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is

@@ -76,8 +76,9 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position at `wanted`, or the closest one that the hop reaches with `target`. The sender is at x =
-    /// `from_m`. `None` if no hop meets the target. The position's x is at most that of Rx.
+    /// Returns the position at the cross-section `wanted`, or the closest one that the hop reaches. The hop has to
+    /// meet `target` from a sender at x = `from_m`. `None` if no hop meets the target. The position's x is at most
+    /// Rx's.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;

@@ -27,8 +27,8 @@ pub(super) enum Start {
     ///
     /// Before the first and after the last of those relays the chain is `level`, or goes down to Tx and Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Chain for relays that cannot be in a row: alternately at the outer, upper corner and beside it. The corner is
-    /// that of the allowed lateral offsets and altitudes; "beside" is one minimum separation away.
+    /// Chain for relays that have no room in a row. They are in turn at an upper corner and one separation beside it.
+    /// The corner is that of the allowed lateral offsets and altitudes, on the side away from the interferer.
     Turns,
     /// Chain at the lowest altitude, for a target SIR so high that no hop leaps over the interferer.
     Near,

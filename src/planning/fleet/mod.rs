@@ -31,7 +31,7 @@ use crate::sir::square;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fewest {
-    /// Number of relays that meets the target.
+    /// Number of relays with which a chain meets the target SIR.
     pub relays: u16,
     /// True if it is proven that no smaller number of relays meets the target.
     pub proven: bool,

@@ -105,7 +105,8 @@ impl TwoHops<'_> {
     }
 }
 
-/// Edge of the box: `free` is the coordinate that varies, within `room`, m. The other two are those of `through`.
+/// Edge of the box in which a relay may be. `free` is the coordinate that varies, within `room`, m; the other two are
+/// those of `through`.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
     pub(super) free: EdgeCoordinate,

@@ -46,7 +46,7 @@ pub const MAX_BODY: usize = LONG;
 /// Message between neighbours. *Onward* is the direction of a pass: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Onward message: target SIRs, and the sender's reach (its farthest position) for each.
+    /// Message to the next relay of a pass: target SIRs, and the sender's reach (farthest x) for each.
     Sweep(Sweep),
     /// Reply to a sweep: its verdict, the result for each target. It acknowledges the sweep of the same number.
     Verdict(Answer),
@@ -64,25 +64,26 @@ pub enum Message {
         /// Number of the answered request, 0 for none.
         reply: u16,
     },
-    /// Onward message: profiles (altitude and power) of the relays up to the sender.
+    /// Message to the next relay of a pass: profiles (altitude and power) of the relays up to the sender.
     Gather(Roster),
     /// Reply to a gathering: profiles (altitude and power) of the whole chain.
     Gathered(Roster),
-    /// Onward message: interference estimate, and measurements of the relays up to the sender.
+    /// Message to the next relay of a pass: interference estimate, and measurements up to the sender. The
+    /// measurements are those of the relays from the leader to the sender.
     Sense(Heard),
-    /// Reply to a sensing pass: measurements of the relays from the sender on.
+    /// Reply to a sensing pass: measurements of the sender and of all later relays of the pass.
     Sensed(Heard),
-    /// Onward message: token of Algorithm 2, whose receiver may move.
+    /// Message to the next relay of a pass: token of Algorithm 2, whose receiver may move.
     Token(Token),
     /// Reply to a token: position of the sender and SIRs after the pass.
     Moved(Moved),
-    /// Onward message: lease renewal by the view's leader.
+    /// Message to the next relay: lease renewal by the view's leader.
     Pulse(Pulse),
     /// Reply to a lease renewal: its acknowledgement.
     Pulsed(Pulsed),
     /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// Onward message: proposal of a new view, which counts the present relays.
+    /// Message to the next relay: proposal of a new view, which counts the present relays.
     Proposal(Proposal),
     /// Reply to a proposal: the decision on it.
     Decision(Decision),
@@ -160,7 +161,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward onward: of passes, proposals and lease renewals.
+    /// Returns true for messages that relays forward in the direction of a pass (onward). They are messages of
+    /// passes, proposals and lease renewals, but not the replies to them.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

@@ -42,7 +42,7 @@ pub struct Sweep {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower middle target of the ladder, or its only one; negative for a plain pass.
+    /// Lower middle target SIR of the ladder, or its only one; negative for a plain pass.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -139,7 +139,7 @@ pub struct Answer {
     pub verdict: Verdict,
     /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
     pub required_x_m: Option<f32>,
-    /// True if the sender, or a relay farther onward, has a profile other than the mission's common one.
+    /// True if the sender, or a later relay of the pass, has a profile other than the mission's common one.
     pub own: bool,
 }
 
@@ -194,8 +194,8 @@ pub struct OwnSeat {
 /// List of relay profiles in the order of the relays' indices.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles. Onward it has those of the relays up to the sender, back those of the whole
-/// chain.
+/// Message that collects relay profiles. In the direction of the pass it has those of the relays up to the sender, in
+/// a reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass along the chain, wrapping.
@@ -387,7 +387,7 @@ pub struct Moved {
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
-    /// True if the sender, or a relay farther onward, has moved in this pass.
+    /// True if the sender, or a later relay of the pass, has moved in this pass.
     pub position_changed: bool,
     /// SIR of the worst hop after the sender in the direction of the pass, linear.
     pub worst_sir: f32,
@@ -422,8 +422,8 @@ fn sir_in_range(sir: f32) -> Option<f32> {
 /// Length of a sensing message's body, bytes: tag, pass, estimate, sums, Rx's level, excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: the interference estimate, and the relays' measurements. Onward it has those of the relays up to
-/// the sender, back those of the relays from the sender on.
+/// Sensing message: the interference estimate, and the relays' measurements. In the direction of the pass it has
+/// those of the relays up to the sender, in a reply those of the sender and of all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass along the chain, wrapping.

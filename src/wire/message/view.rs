@@ -7,7 +7,7 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// Proposal of a new view, an agreement on the chain's members; sent onward from relay to relay.
+/// Proposal of a new view, an agreement on the chain's members; relays forward it from one to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {

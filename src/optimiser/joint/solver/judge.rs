@@ -41,8 +41,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.tried(chain, seek, purpose, met.then_some(false))
     }
 
-    /// Checks in one more segment, from the last to the first, that relays can hold back. They hold back if they take
-    /// a position before their reach, for the sake of later relays. `place_m` is the required x of the segment's last
+    /// Checks in one more segment, from the last to the first, that relays can hold back. Holding back is to take a
+    /// position before one's reach, for the sake of later relays. `place_m` is the required x of the segment's last
     /// relay. Bounded by twenty relays.
     pub(super) fn try_hold_back(
         &mut self,

@@ -34,9 +34,9 @@ pub use chain::Seat;
 struct ForwardPass {
     /// Number of relays that the forward pass has completed.
     done: u16,
-    /// New position of the last relay that this forward pass has computed.
+    /// New position of the relay that this forward pass has computed last.
     from: Placement,
-    /// Position before this forward pass of the last relay that it has computed.
+    /// Old position, before this forward pass, of the relay that the pass has computed last.
     old: Placement,
     penalty: f32,
     end_m: f32,
