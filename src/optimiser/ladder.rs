@@ -51,7 +51,7 @@ impl Ladder {
         self.plain
     }
 
-    /// Returns a ladder with equal ratios from just below `low` to just above `high`; 0 < `low` < `high`.
+    /// Returns a ladder of targets in equal ratios, from just below `low` to just above `high`. 0 < `low` < `high`.
     pub fn spanning(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -60,7 +60,7 @@ impl Ladder {
         )
     }
 
-    /// Returns a ladder with equal ratios strictly between `low` and `high`; 0 < `low` < `high`.
+    /// Returns a ladder of targets in equal ratios, strictly between `low` and `high`; 0 < `low` < `high`.
     pub fn between(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),

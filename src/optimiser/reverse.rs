@@ -198,8 +198,8 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin of the SIR at the last relay, at `x_m`, for Rx's signal. It is relative to the required
-    /// SIR, times D, m, and continuous in the target.
+    /// Returns the margin of Rx's signal at the last relay, at `x_m`: (SIR / required SIR - 1) D, m. It is continuous
+    /// in the target.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;

@@ -59,7 +59,7 @@ const DEPTH: f32 = 1e-12;
 /// the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Maximum width of the bracket after a sweep, relative to that before, for the next interpolation.
+/// Ratio of the bracket's widths after and before a sweep above which interpolation is not used next.
 const PROGRESS: f32 = 0.25;
 
 /// Number of sweeps after which the search commits the best feasible target found.
@@ -294,9 +294,9 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target with zero slack (spare length), by interpolation. It is a cubic of log target in the slack. The
-/// cubic passes through the four points about the sign change. `None` if the cubic and the straight line disagree:
-/// the slack jumps there, and neither root is meaningful.
+/// Returns the target at which the slack (spare length) is 0, by cubic interpolation of log target. The cubic passes
+/// through the four points about the sign change. `None` if the cubic and the straight line disagree: the slack jumps
+/// there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;

@@ -56,7 +56,8 @@ const DEVIATIONS: f64 = 49.0;
 /// 15 % at one position has this residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of the fits' variances without the second suspect and without the faulty relay.
+/// Minimum ratio of the fits' variances without the second suspect and without the first one. With a smaller ratio
+/// the faulty relay counts as unknown.
 const DECISIVE: f64 = 6.0;
 
 /// Maximum variance of the relative errors for measurements to count as consistent (some 1.5 dB).

@@ -204,7 +204,7 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake that requests a reply to the silent node `to`, unless that reuses a nonce.
+    /// Schedules a handshake with a request to the silent node `to`, unless it restarted with a used nonce.
     ///
     /// A node that has restarted with a used nonce gets none: with a handshake that contains its nonce it could
     /// continue as its earlier start, and use nonces and counters twice.

@@ -102,9 +102,10 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns `wanted`, or the closest reachable cross-section on the line from the best one to it. All are allowed
-    /// ones. Reachable means without a step back along x; `None` if nothing is. For c > 1 a hop from p reaches a
-    /// ball, with the interferer at m: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// Returns the reachable cross-section closest to `wanted` on the line to it from the best allowed one. Both ends
+    /// of the line are moved into the allowed range. Reachable means without a step back along x; `None` if nothing
+    /// is. For c > 1 a hop from p reaches a ball, with the interferer at m: its centre is p + (p - m) / (c - 1), its
+    /// radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
