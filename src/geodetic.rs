@@ -18,7 +18,8 @@ pub struct Geodetic {
 }
 
 impl Geodetic {
-    /// Returns the nearest representable position. `None` for a latitude, longitude or height that is not finite or out of range.
+    /// Returns the nearest representable position. `None` for a value that is not finite or out of range. Latitude
+    /// and longitude are in degrees, and the height above mean sea level in m, within 1e6.
     ///
     /// ```
     /// use uav_relay::Geodetic;
@@ -42,7 +43,7 @@ impl Geodetic {
     }
 }
 
-/// Rounds to the nearest integer, halves away from zero.
+/// Rounds `value` to the nearest integer, halves away from zero.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "saturates, and callers hand in what fits"
@@ -52,7 +53,7 @@ pub(crate) fn to_integer(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
-/// Ground positions of both ends of the line.
+/// Ground positions of the transmitter and the receiver, the two ends of the mission's line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sites {
@@ -62,7 +63,7 @@ pub struct Sites {
     pub rx: Geodetic,
 }
 
-/// Length of the encoded sites, bytes.
+/// Length of [`Sites`], the positions of transmitter and receiver, on the wire, bytes.
 pub(crate) const SITES_LENGTH: usize = 24;
 
 impl Sites {
@@ -101,20 +102,20 @@ impl Sites {
     }
 }
 
-/// Reason why a newer mission does not fit its line on earth or the relay's own geofence.
+/// Reason why an uploaded mission does not fit its line on earth or the relay's own geofence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance differs from that between its sites. Or it has no sites, and its distance differs from the
-    /// configured one at a relay with `Settings::sited`.
+    /// The mission's distance differs from the distance between its sites (transmitter and receiver). Or it has no
+    /// sites, and its distance differs from the configured one at a relay with `Settings::sited`.
     Distance,
-    /// The mission's sites are less than 10 m or more than 100 km apart.
+    /// The mission's sites, transmitter and receiver, are less than 10 m or more than 100 km apart.
     Sites,
     /// The mission's altitudes exceed the relay's own geofence. See [`GuardConfig::fence`](crate::guard::config::GuardConfig).
     Altitude,
-    /// The mission's lateral band exceeds the geofence.
+    /// The mission's range of lateral offsets exceeds the relay's own geofence.
     Lateral,
-    /// The mission's distance exceeds the geofence, with or without sites of its own.
+    /// The mission's distance from transmitter to receiver exceeds the relay's own geofence.
     Length,
 }
 

@@ -130,7 +130,7 @@ texts!(LineError {
     LineError::Length => "the distance must be within the relay's own geofence",
 });
 
-/// Texts about the autopilot.
+/// Log texts of the autopilot's states, modes, events and reasons.
 #[cfg(feature = "flight")]
 mod autopilot {
     use crate::flight::autopilot::state::{FlightMode, Release, ReleaseCause, State, WaitReason};
@@ -228,7 +228,7 @@ mod autopilot {
         }
     }
 
-    /// Returns the relay numbers without their padding.
+    /// Returns the relay numbers in `relays` before the zeros that pad it.
     fn named(relays: &[u16]) -> &[u16] {
         relays.split(|node| *node == 0).next().unwrap_or_default()
     }

@@ -16,19 +16,19 @@
 pub struct Placement {
     /// Distance from the transmitter along the ground, m, in [0, D].
     pub x_m: f32,
-    /// Distance from the line through transmitter and receiver, m: to its right above 0, to its left below.
+    /// Lateral offset from the line Tx to Rx, m: to its right above 0, to its left below.
     pub y_m: f32,
     /// Height above the ground, m.
     pub altitude_m: f32,
 }
 
 impl Placement {
-    /// Returns the position right above the line, where the paper has all relays.
+    /// Returns the position right above the line from transmitter to receiver (y = 0), as in the paper.
     pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
         CrossSection::on_line(altitude_m).at(x_m)
     }
 
-    /// Returns the position's y and altitude.
+    /// Returns y and altitude of the position, without its x.
     #[doc(hidden)]
     pub const fn cross_section(self) -> CrossSection {
         CrossSection {
@@ -38,18 +38,18 @@ impl Placement {
     }
 }
 
-/// Position of a relay across the line from transmitter to receiver, at any x.
+/// Lateral offset and altitude of a relay: its position without x, which runs along the line Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
-    /// Distance from the line, m: to its right above 0.
+    /// Lateral offset from the line Tx to Rx, m: to its right above 0, to its left below.
     pub y_m: f32,
     /// Height above the ground, m.
     pub altitude_m: f32,
 }
 
 impl CrossSection {
-    /// Returns the cross-section right above the line.
+    /// Returns the cross-section right above the line Tx to Rx (y = 0) at `altitude_m`.
     pub const fn on_line(altitude_m: f32) -> Self {
         Self {
             y_m: 0.0,
@@ -57,7 +57,7 @@ impl CrossSection {
         }
     }
 
-    /// Returns the position at `x_m` in this cross-section.
+    /// Returns the position at `x_m` with this lateral offset and altitude.
     pub const fn at(self, x_m: f32) -> Placement {
         Placement {
             x_m,
@@ -72,12 +72,12 @@ impl CrossSection {
     }
 }
 
-/// Cross-section and power of a relay, at any x.
+/// Lateral offset, altitude and power of a relay; its x is free.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {
-    /// Position across the line.
+    /// Lateral offset and altitude of the relay.
     pub cross_section: CrossSection,
-    /// Transmit power, W.
+    /// Transmit power of the relay, W.
     pub power_w: f32,
 }

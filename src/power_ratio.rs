@@ -33,12 +33,13 @@ impl PowerRatio {
         f64::from(self.hi) + f64::from(self.lo)
     }
 
-    /// Returns `target` / gain, rounded.
+    /// Returns `target` / gain, rounded to f32; the gain is this ratio.
     pub const fn ratio(&self, target: f32) -> f32 {
         target / self.hi
     }
 
-    /// Returns `target` / gain - 1, with a relative error below 2e-7 even if the two are nearly equal.
+    /// Returns `target` / gain - 1, with a relative error below 2e-7 even if the two are nearly equal. The gain is
+    /// this ratio.
     pub const fn excess(&self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
     }

@@ -2,18 +2,18 @@
 
 use crate::mission::Heading;
 
-/// Neighbour of a relay, or the link to it.
+/// Direction along the chain as seen from a relay: a neighbour of the relay, or the link to it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Side of the transmitter.
+    /// Direction toward the transmitter.
     Upstream,
-    /// Side of the receiver.
+    /// Direction toward the receiver.
     Downstream,
 }
 
 impl Side {
-    /// Returns the side to which passes are sent.
+    /// Returns the side to which a relay forwards passes along the chain.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -21,7 +21,7 @@ impl Side {
         }
     }
 
-    /// Returns the side from which passes are received, and to which their replies are sent.
+    /// Returns the side from which a relay receives passes, and to which it sends their replies.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

@@ -34,11 +34,11 @@ use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 
-/// Returns the inverse interference at `at`. It is the one term of a hop's SIR that depends on the kind of interference.
+/// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
-/// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an interferer
-/// it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) / `Upsilon_max`, with
-/// noise.
+/// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
+/// interferer it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) /
+/// `Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -53,12 +53,13 @@ pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     }
 }
 
-/// Returns s / (1 + nu s), m^2, for s in m^2 and `nu` in 1/m^2; without noise exactly s.
+/// Returns the inverse interference plus noise, s / (1 + nu s), m^2; without noise exactly s. `s` is the squared
+/// distance from the interferer, m^2, and `nu` the noise, 1/m^2.
 pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
     if nu > 0.0 { s / (1.0 + nu * s) } else { s }
 }
 
-/// Sending node of a hop: its cross-section and its power relative to the interference.
+/// Sending node of a hop: its lateral offset and altitude, and its power relative to the interference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
@@ -67,7 +68,7 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// Returns the ground transmitter, node 0.
+    /// Returns the ground transmitter, node 0, as a sender.
     pub const fn transmitter(mission: &Mission) -> Self {
         Self {
             cross_section: CrossSection::on_line(0.0),
@@ -83,7 +84,7 @@ impl Sender {
         }
     }
 
-    /// Returns the ground receiver, node N + 1, as the sender of the way back.
+    /// Returns the ground receiver, node N + 1, as the sender of the first hop from Rx to Tx.
     pub fn receiver(mission: &Mission) -> Self {
         let config = mission.config();
         let relative = f64::from(config.rx_power_w) / f64::from(config.tx_power_w);
@@ -112,13 +113,14 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     mission.receiver_gain(power_w) / (square(distance) + across)
 }
 
-/// Returns the SIR at Tx on the way back for a relay of `power_w` W at `from`; 0 without a source.
+/// Returns the SIR at Tx when a relay at `from` sends to it with `power_w` watts. 0 unless the interferer is known.
 pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let across = square(from.y_m) + square(from.altitude_m);
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns K of the last hop of the way back, m^2: the counterpart of [`Mission::receiver_gain`] at Tx.
+/// Returns K of the hop from a relay to Tx, m^2: the SIR at Tx is K / squared distance. It is the counterpart of
+/// [`Mission::receiver_gain`].
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"
@@ -139,13 +141,13 @@ pub(crate) const fn square(x: f32) -> f32 {
     x * x
 }
 
-/// Bisection steps in an interval in which the slope changes its sign.
+/// Number of bisection steps for an x at which the slope of SIR_1 changes its sign.
 const HALVINGS: u8 = 32;
 
 /// Maximum number of doublings of x in the search for the sign change of a falling function.
 const DOUBLINGS: u8 = 64;
 
-/// Shape of SIR_1 along x >= 0 at one altitude.
+/// Shape of SIR_1, the SIR of the first hop, along x >= 0 at one altitude.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extremum {
@@ -161,7 +163,7 @@ pub enum Extremum {
     Level,
 }
 
-/// Returns the extrema of SIR_1 along x for a relay at `altitude_m`.
+/// Returns the extrema of SIR_1, the first hop's SIR, along x for a relay at `altitude_m`.
 ///
 /// Without noise they are roots of a quadratic, written without cancellation for X < 0; with noise they take at most 190
 /// evaluations of the slope. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
@@ -187,32 +189,32 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// Sign of the slope of SIR_1 along x.
+/// Terms of the function phi(x), whose sign is that of the slope of SIR_1 along x.
 struct Slope {
     x: f32,
     q: f32,
-    /// h^2, m^2.
+    /// Squared altitude h^2 of the relay, m^2.
     squared: f32,
-    /// Y^2 + h^2, m^2.
+    /// Squared distance of the relay from the interferer across x, Y^2 + h^2, m^2.
     aside: f32,
-    /// nu, 1/m^2.
+    /// Noise nu, 1/m^2.
     noise: f32,
 }
 
 impl Slope {
-    /// Returns phi at `at`, which has the sign of the slope.
+    /// Returns phi at x = `at`, m; it has the sign of the slope of SIR_1.
     fn sign(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         self.x * at - self.q - self.x * (self.squared / at) - self.noise * s * s
     }
 
-    /// Returns half the derivative of phi at `at`, for X > 0. The derivative falls beyond X.
+    /// Returns half the derivative of phi at x = `at`, m, for X > 0. The derivative falls beyond X.
     fn bend(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)
     }
 
-    /// Returns the maximum for X < 0; `peak` is the noise-free maximum.
+    /// Returns the maximum of SIR_1 for X < 0; `peak` is the x of the maximum without noise, m.
     fn hill(&self, peak: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Hill(peak);
@@ -220,7 +222,7 @@ impl Slope {
         Extremum::Hill(last(0.0, peak, |at| self.sign(at) > 0.0))
     }
 
-    /// Returns the extrema for X > 0; `bottom` is the noise-free minimum.
+    /// Returns the extrema of SIR_1 for X > 0; `bottom` is the x of the minimum without noise, m.
     fn turns(&self, bottom: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Valley(bottom);

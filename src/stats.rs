@@ -6,13 +6,14 @@
 pub struct Stats {
     /// Frames passed to the link, including retransmissions.
     pub sent: u32,
-    /// Retransmissions of round messages (sweeps, gatherings, tokens) and proposals after a missing reply.
+    /// Retransmissions of pass messages (sweeps, gatherings, tokens) and proposals after a missing reply.
     pub repeats: u32,
-    /// Passes of any kind, and proposals, that this relay has started as the leader.
+    /// Passes along the chain, of any kind, and proposals that this relay has started as the leader.
     pub passes_begun: u32,
-    /// Messages received from a neighbour with values in range. Some are also counted below, for example as stale.
+    /// Messages received from a neighbour with all values in range. Some are also counted by another counter, for
+    /// example as stale.
     pub received: u32,
-    /// Duplicate passes and proposals, to which the reply is sent again.
+    /// Duplicate pass messages and proposals received; the reply to them is sent again.
     pub repeated: u32,
     /// Intact frames between other nodes of the network, received on a shared channel.
     pub overheard: u32,
@@ -22,39 +23,42 @@ pub struct Stats {
     pub truncated: u32,
     /// Frames with a CRC mismatch.
     pub crc: u32,
-    /// Intact frames of another version of the format.
+    /// Intact frames of another version of the frame format.
     pub version: u32,
-    /// Handshake frames with the right tag; they have no effect beyond the handshake.
+    /// Handshake frames with the right authentication tag. They only establish sessions, and carry no message.
     pub handshakes: u32,
-    /// Intact frames without a tag at a relay with a key. Without a key, messages that are accepted with a tag only.
+    /// Intact frames without an authentication tag at a relay with a key. At a relay without a key, mission offers,
+    /// which only a key makes acceptable.
     pub unsigned: u32,
-    /// Intact frames with a wrong tag: of a sender without the key, altered, or of another epoch.
+    /// Intact frames with a wrong authentication tag: sent without the key, altered, or of another epoch.
     pub forged: u32,
-    /// Frames with the right tag that were received before, or are too old to check.
+    /// Frames with the right authentication tag that were received before, or are too old to check.
     pub replayed: u32,
     /// Intact frames without a valid message, or with a value out of range.
     pub malformed: u32,
     /// Intact frames of another network.
     pub foreign: u32,
-    /// Intact frames from a node that is no neighbour, or for another node on a link to this relay only.
+    /// Intact frames from a node that is no neighbour, or, on a point-to-point link, for another node.
     pub misaddressed: u32,
-    /// Messages from the wrong side. A pass or proposal from downstream of its direction, or a reply from upstream of it.
+    /// Messages from the wrong side: a pass or proposal against its direction, or a reply along it.
     pub misdirected: u32,
-    /// Messages of another mission, and offers of a mission for other sites. The events are
-    /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and [`Event::UploadRefused`](crate::Event::UploadRefused).
+    /// Messages of another mission, and offers of a mission that this relay refuses. The events are
+    /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
+    /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Messages of a round or view change that belong to another view. They may also belong to a mission that is not flown in it.
+    /// Messages of a pass or view change for another view. Also those for a mission that is not flown in this view.
     pub view: u32,
     /// New views that this relay has accepted.
     pub views: u32,
-    /// Messages of a pass or view change that is over or cannot be joined. Offers that answer no recent hello.
+    /// Messages of a pass or view change that is over or cannot be joined. Also mission offers that answer no recent
+    /// hello.
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or without a measurement in progress.
     pub samples_rejected: u32,
 }
 
 impl Stats {
-    /// Returns the number of rejected frames, over all reasons.
+    /// Returns the number of rejected frames and messages, over all reasons.
     pub fn rejected(&self) -> u32 {
         [
             self.oversized,

@@ -2,19 +2,20 @@
 
 use crate::mission::MAX_RELAYS;
 
-/// Identifier of a view, ordered. A number, and the node that proposed it, so that no two nodes propose the same view.
+/// Identifier of a view, an agreement on the members of the chain; ordered. It has a number, and the node that
+/// proposed the view, so that no two nodes propose the same view.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
 
-/// Bits of the proposer: a chain has at most 1000 relays.
+/// Number of bits for the proposer's node number: a chain has at most 1000 relays.
 const NODE: u32 = 10;
 
 impl ViewId {
     /// Initial view: the chain as configured in the mission, without a proposer.
     pub const LOADED: Self = Self(0);
 
-    /// Decodes an identifier: the proposer in the low ten bits, the number above.
+    /// Decodes a view identifier: the proposer in the low ten bits, the number above.
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
@@ -34,12 +35,12 @@ impl ViewId {
         (self.0 & ((1 << NODE) - 1)) as u16
     }
 
-    /// Returns true if a node can have proposed this view.
+    /// Returns true if a node can have proposed this view: not the initial one, and a valid proposer.
     pub(crate) const fn is_proposed(self) -> bool {
         self.number() > 0 && 1 <= self.proposer() && self.proposer() <= MAX_RELAYS
     }
 
-    /// Returns the next view that `node`, 1 to 1000, may propose; `None` after four million.
+    /// Returns the view with the next number, proposed by `node`, 1 to 1000. `None` after four million views.
     pub(crate) const fn next_by(self, node: u16) -> Option<Self> {
         let number = self.number() + 1;
         if number >> (32 - NODE) == 0 {
@@ -49,7 +50,8 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, or a view at most `most` numbers ahead of this view if `view` is farther ahead.
+    /// Returns `view`, or a lower one if its number is more than `most` ahead of this view's. The lower one is `most`
+    /// ahead.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -59,15 +61,15 @@ impl ViewId {
         }
     }
 
-    /// Value added to a mission's digest in the passes of a view. Views of one number, and of thousands of consecutive ones, have
-    /// different marks.
+    /// Value that a view adds to the mission's digest in its pass messages, to tell views apart. Views of one number,
+    /// and of thousands of consecutive ones, have different values.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
     }
 }
 
-/// View identifier and number of members.
+/// View of the chain's members: its identifier and the number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct View {

@@ -2,22 +2,22 @@
 
 use crate::place::Placement;
 
-/// Behaviour of a relay while its part of the chain has no quorum.
+/// Behaviour of a relay while the relays that it can reach are no quorum of the chain.
 ///
-/// [`Leave`](Self::Leave) clears the line for the part that has a quorum. Set the same value on all relays: relays that leave the
-/// line then keep their order and distances.
+/// [`Leave`](Self::Leave) clears the line for the relays that have a quorum. Set the same value on all relays: relays
+/// that leave the line then keep their order and distances.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
-    /// Hold the agreed position.
+    /// Hold the last agreed position.
     #[default]
     Hold,
-    /// Leave the line from the agreed position, along y and upward. With a guard, only within its geofence
+    /// Leave the line from the last agreed position, along y and upward. With a guard, only within its geofence
     /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
-        /// Lateral offset, m: -1e4 to 1e4.
+        /// Lateral offset that is added to the agreed position, m: -1e4 to 1e4.
         y_m: f32,
-        /// Climb, m: 0 to 1e4.
+        /// Climb from the agreed position, m: 0 to 1e4.
         up_m: f32,
     },
 }
@@ -30,7 +30,7 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the position to take without a quorum; `place` is the agreed one.
+    /// Returns the position to take without a quorum; `place` is the last agreed one.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

@@ -30,13 +30,14 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Fixed-point 1: 2^32 samples of it sum to 2^63, and their squares, times their number, to 2^126.
+/// Number 1 in the fixed-point format of the samples: 2^31, so that no sum overflows. 2^32 samples sum to at most
+/// 2^63, and their squares, times the number of samples, to 2^126.
 const ONE: f32 = 2_147_483_648.0;
 
-/// Fractional bits of the fixed-point numbers.
+/// Fractional bits of the fixed-point numbers in which samples are summed.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of I / `I_max` that is resolved: the fixed-point step is 5e-4 of 1e-6.
+/// Smallest mean of I / `I_max` for which an estimate is made: the fixed-point step is 5e-4 of it.
 const LEAST_MEAN: f32 = 1e-6;
 
 /// Running sums of the interference powers measured at one position; samples are not stored.
@@ -46,41 +47,42 @@ const LEAST_MEAN: f32 = 1e-6;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimator {
-    /// Sum of the squares of the samples, in units of 2^-62.
+    /// Sum of the squares of the accepted samples I / `I_max`, in units of 2^-62.
     squares: u128,
-    /// Sum of the samples as parts of `I_max`, in units of 2^-31.
+    /// Sum of the accepted samples I / `I_max`, in units of 2^-31.
     sum: u64,
-    /// `I_max`, W; 0 if it was rejected.
+    /// Maximum interference power `I_max`, W; 0 if [`Estimator::new`] got a value out of range.
     i_max_w: f32,
     accepted: u32,
     rejected: u32,
 }
 
-/// Result of an [`Estimator`]. Every number is finite.
+/// Estimate of Upsilon = E[1/I] from the samples of an [`Estimator`]. Every number is finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
-    /// First shape of the Beta distribution of I / `I_max`, above 1.
+    /// First shape parameter of the Beta distribution fitted to I / `I_max`, above 1.
     pub alpha: f32,
-    /// Second shape, above 0.
+    /// Second shape parameter of the Beta distribution fitted to I / `I_max`, above 0.
     pub beta: f32,
-    /// Upsilon = E[1/I], 1/W: 1e-9 to 1e32, so it may be a point of a [`Field`](super::Field).
+    /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32, so it may be a point of a [`Field`](super::Field).
     pub upsilon_per_w: f32,
-    /// Standard error of `upsilon_per_w`, 1/W, above 0. The truth is within two of them with a probability of about 95 %. It covers
-    /// sampling only, not a deviation of the interference from a Beta distribution.
+    /// Standard error of `upsilon_per_w`, 1/W, above 0. The true Upsilon is within two standard errors with a
+    /// probability of about 95 %. The error covers sampling only, not a deviation of the interference from a Beta
+    /// distribution.
     pub standard_error_per_w: f32,
-    /// Number of samples used.
+    /// Number of accepted samples on which the estimate is based.
     pub samples: u32,
 }
 
 impl Estimator {
-    /// Minimum number of samples of an estimate.
+    /// Minimum number of accepted samples for an estimate.
     ///
-    /// With so few samples and a true alpha below 1.5, most estimates exist because alpha is overestimated by chance, and are
-    /// too low.
+    /// It does not make every estimate good: with 100 samples and a true alpha below 1.5, most estimates exist only
+    /// because alpha is overestimated by chance, and their Upsilon is too low.
     pub const MIN_SAMPLES: u32 = 100;
 
-    /// Creates an estimator without samples, for interference that never exceeds `i_max_w`, W. 1e-30 to 1e6.
+    /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.
     ///
     /// With any other `i_max_w` it rejects every sample and never gives an estimate.
     pub const fn new(i_max_w: f32) -> Self {
@@ -178,12 +180,12 @@ impl Estimator {
 
 /// Beta distribution with the mean and the variance of the samples.
 struct Fit {
-    /// Mean, and 1 - mean without cancellation.
+    /// Mean m of I / `I_max`. The next field, `rest`, is 1 - m, computed without cancellation.
     m: f32,
     rest: f32,
-    /// Standard deviation.
+    /// Standard deviation of I / `I_max`.
     s: f32,
-    /// alpha + beta.
+    /// Sum of the shape parameters, alpha + beta.
     w: f32,
 }
 

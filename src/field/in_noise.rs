@@ -18,7 +18,7 @@
 
 use super::{Field, FieldPoint};
 
-/// Field together with the receiver noise.
+/// Interference field with the receiver noise N, W. It turns Upsilon = E[1/I] into Upsilon / (1 + N Upsilon).
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(
@@ -31,7 +31,7 @@ pub struct InNoise<'a> {
 }
 
 impl Field {
-    /// Returns the field with receiver noise of `noise_w` watts, 0 to 1.
+    /// Returns this field combined with a receiver noise of `noise_w` watts, 0 to 1.
     pub(crate) const fn in_noise(&self, noise_w: f32) -> InNoise<'_> {
         InNoise {
             field: self,
@@ -41,7 +41,8 @@ impl Field {
 }
 
 impl InNoise<'_> {
-    /// Returns the effective Upsilon of `upsilon`, 1/W. Finite, since `upsilon` is at most 1e32 and N at most 1.
+    /// Returns Upsilon = E[1/I] with the noise N included, 1/W: `upsilon` / (1 + N `upsilon`). It is finite, since
+    /// `upsilon` is at most 1e32 and N at most 1.
     const fn of(&self, upsilon: f32) -> f32 {
         if self.noise_w > 0.0 {
             upsilon / (1.0 + self.noise_w * upsilon)
@@ -50,7 +51,8 @@ impl InNoise<'_> {
         }
     }
 
-    /// Returns the effective Upsilon at `x_m`, 1/W, interpolated as in [`Field::upsilon`].
+    /// Returns Upsilon = E[1/I] at `x_m` with the receiver noise included, 1/W. It is interpolated as in
+    /// [`Field::upsilon`].
     pub(crate) const fn upsilon(&self, x_m: f32) -> f32 {
         match self.field.around(x_m) {
             (left, Some(right)) => super::between(self.point(left), self.point(right), x_m),
@@ -58,7 +60,7 @@ impl InNoise<'_> {
         }
     }
 
-    /// Returns the largest effective Upsilon; it is where Upsilon is largest.
+    /// Returns the largest Upsilon = E[1/I] of the field with the receiver noise included, 1/W.
     pub(crate) const fn largest(&self) -> f32 {
         self.of(self.field.largest)
     }

@@ -9,10 +9,11 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon, 1/W. Interference between 1e9 W and 1e-32 W, far outside of what is measured.
+/// Allowed range of Upsilon = E[1/I], 1/W. It stands for interference of 1e9 W to 1e-32 W, far beyond measured
+/// values.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
-/// Upsilon at one position.
+/// Point of a [`Field`]: an x, and Upsilon = E[1/I], the mean of the inverse interference power there.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FieldPoint {
@@ -22,7 +23,7 @@ pub struct FieldPoint {
     pub upsilon_per_w: f32,
 }
 
-/// Reason why a table of points is rejected.
+/// Reason why [`Field::try_new`] rejects a table of points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -31,7 +32,7 @@ pub enum FieldError {
     Points,
     /// The `x_m` of a point is not within -1e7 to 1e7.
     Place,
-    /// The `x_m` of a point is not above that of the point before it.
+    /// The `x_m` of a point is not larger than the `x_m` of the point before it.
     Order,
     /// The `upsilon_per_w` of a point is not within 1e-9 to 1e32.
     Upsilon,
@@ -50,7 +51,8 @@ impl core::fmt::Display for FieldError {
 
 impl core::error::Error for FieldError {}
 
-/// Upsilon along x: linear between the points of a checked table, and constant beyond its ends.
+/// Interference field: a checked table of Upsilon = E[1/I] along x. It is linear between two points, and constant
+/// beyond the ends of the table.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Field {
@@ -60,10 +62,10 @@ pub struct Field {
 }
 
 impl Field {
-    /// Maximum number of points of a field.
+    /// Maximum number of points of an interference field.
     pub const MAX_POINTS: usize = 1024;
 
-    /// Creates a field from a table, after checking every point.
+    /// Creates an interference field from a table, after checking every point.
     ///
     /// Usable in a constant, where [`Field::new`] turns an error into a failed build.
     ///
@@ -105,15 +107,11 @@ impl Field {
         })
     }
 
-    /// Creates a field that is a constant of the firmware; otherwise as [`Field::try_new`].
+    /// Creates a field from a table in a `const`; an invalid table fails the build.
     ///
     /// # Panics
     /// Panics on an invalid table: in a `const` this is a failed build, as intended. For values known at run time use
-    /// [`Field::try_new`].
-    #[expect(
-        clippy::panic,
-        reason = "in a constant this fails the build, as documented"
-    )]
+    /// [`Field::try_new`], which makes the same checks.
     ///
     /// ```
     /// use uav_relay::{Field, FieldPoint};
@@ -125,6 +123,10 @@ impl Field {
     /// ]);
     /// assert_eq!(FIELD.upsilon(500.0), 4.5e5);
     /// ```
+    #[expect(
+        clippy::panic,
+        reason = "in a constant this fails the build, as documented"
+    )]
     pub const fn new(points: &'static [FieldPoint]) -> Self {
         match Self::try_new(points) {
             Ok(field) => field,
@@ -140,22 +142,22 @@ impl Field {
         self.points
     }
 
-    /// Returns the smallest Upsilon of the table, 1/W: the worst interference.
+    /// Returns the smallest Upsilon = E[1/I] of the table, 1/W: the worst interference.
     pub const fn smallest(&self) -> f32 {
         self.smallest
     }
 
-    /// Returns the largest Upsilon of the table, 1/W.
+    /// Returns the largest Upsilon = E[1/I] of the table, 1/W: the weakest interference.
     pub const fn largest(&self) -> f32 {
         self.largest
     }
 
-    /// Returns true if Upsilon is the same everywhere: the paper's i.i.d. interference.
+    /// Returns true if Upsilon = E[1/I] is the same everywhere: the paper's i.i.d. interference.
     pub const fn is_constant(&self) -> bool {
         !(self.smallest < self.largest)
     }
 
-    /// Returns Upsilon at `x_m`, 1/W, interpolated linearly with a relative error below 4e-7.
+    /// Returns Upsilon = E[1/I] at `x_m`, 1/W, interpolated linearly with a relative error below 4e-7.
     ///
     /// Every `x_m` is valid: beyond the ends it returns that of the end point, and for NaN that of the first point. The result is
     /// never outside the range of the two points around it. Work: at most eleven comparisons of a binary search, three divisions.
@@ -165,7 +167,7 @@ impl Field {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// Returns the two points around `x_m`, or the single point whose Upsilon applies.
+    /// Returns the two points around `x_m`, or a single point if `x_m` is at a point or beyond the table.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {
@@ -210,10 +212,11 @@ pub(crate) const fn is_upsilon(upsilon_per_w: f32) -> bool {
 }
 
 impl FieldPoint {
-    /// Returns Upsilon = E[1/I], 1/W, of a Beta distribution. I / `i_max_w` has the shapes `alpha` and `beta`.
+    /// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution.
     ///
-    /// (alpha + beta - 1) / ((alpha - 1) `I_max`); the paper prints it without `I_max`, for I relative to it. `i_max_w` in W. `None`
-    /// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are finite. In f64,
+    /// It is (alpha + beta - 1) / ((alpha - 1) `i_max_w`), with the shape parameters `alpha` and `beta`, and the
+    /// maximum power `i_max_w` in W. The paper prints it without `I_max`, for I relative to it. `None` unless alpha >
+    /// 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are finite. In f64,
     /// since near alpha = 1 an f32 of alpha would be too coarse; intended for constants, where it is free. Accuracy:
     /// `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
     pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
@@ -229,9 +232,9 @@ impl FieldPoint {
         }
     }
 
-    /// Returns a point at `x_m` metres where I / `i_max_w` has a Beta distribution.
+    /// Returns a field point at `x_m`, m, for interference whose I / `i_max_w` has a Beta distribution.
     ///
-    /// `None` where [`beta_upsilon`](Self::beta_upsilon) is. Constant work.
+    /// `None` if [`beta_upsilon`](Self::beta_upsilon) is `None` for the same shapes and `i_max_w`. Constant work.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a field refuses what does not fit"

@@ -31,10 +31,11 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Allowed difference between the mission's distance and that of the sites, m. It covers the rounding of the sites and of f32.
+/// Maximum difference between the mission's distance and the distance of its sites, m. It covers the rounding of the
+/// sites and of f32.
 const TOLERANCE_M: f64 = 0.05;
 
-/// Reason why a pair of sites is rejected.
+/// Reason why the positions of transmitter and receiver define no line.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AxisError {
@@ -42,14 +43,14 @@ pub enum AxisError {
     Tx(Geodetic),
     /// The latitude or longitude of the receiver is not on earth.
     Rx(Geodetic),
-    /// The sites are less than 10 m apart.
+    /// The transmitter and the receiver are less than 10 m apart.
     TooShort {
-        /// Length of the chord between the sites, m.
+        /// Straight distance between transmitter and receiver, m.
         distance_m: f64,
     },
-    /// The sites are more than 100 km apart.
+    /// The transmitter and the receiver are more than 100 km apart.
     TooLong {
-        /// Length of the chord between the sites, m.
+        /// Straight distance between transmitter and receiver, m.
         distance_m: f64,
     },
 }
@@ -80,26 +81,26 @@ impl core::fmt::Display for AxisError {
 
 impl core::error::Error for AxisError {}
 
-/// The line from the transmitter's site to the receiver's.
+/// Line on earth from the transmitter to the receiver, with conversions from and to its coordinates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
     sites: Sites,
     middle: Vector,
-    /// Unit vectors toward the receiver, to the right, and up.
+    /// Unit vector toward the receiver, at the middle of the line. The next fields are those to the right and up.
     along: Vector,
     right: Vector,
     up: Vector,
-    /// Half the chord, and the radius of curvature, m.
+    /// Half the length of the chord from transmitter to receiver, m. The next field is the radius of curvature, m.
     half_chord_m: f64,
     radius_m: f64,
     distance_m: f64,
-    /// AMSL of the ground at either end, m.
+    /// Height of the ground above mean sea level at the transmitter and at the receiver, m.
     ends_amsl_m: [f64; 2],
 }
 
 impl Axis {
-    /// Maximum distance of a position beside the line, and before and beyond its ends, m.
+    /// Maximum distance from the line of a position in its coordinates, m: beside, before and beyond it.
     pub const AROUND_M: f32 = 5_000.0;
 
     /// Creates the line between two sites on the ground.
@@ -158,7 +159,7 @@ impl Axis {
         })
     }
 
-    /// Creates the line between both `sites`, see [`try_new`](Self::try_new).
+    /// Creates the line from the transmitter to the receiver of `sites`, see [`try_new`](Self::try_new).
     ///
     /// # Errors
     /// Same as for [`try_new`](Self::try_new).
@@ -167,7 +168,7 @@ impl Axis {
         Self::try_new(sites.tx, sites.rx)
     }
 
-    /// Returns the sites at the two ends.
+    /// Returns the positions of transmitter and receiver, the ends of the line.
     pub(super) const fn sites(&self) -> Sites {
         self.sites
     }
@@ -177,7 +178,7 @@ impl Axis {
         self.distance_m
     }
 
-    /// Returns true if `distance_m` matches the distance of the sites.
+    /// Returns true if `distance_m` is the line's length but for rounding.
     pub fn is_of(&self, distance_m: f32) -> bool {
         let rounded = f64::from(distance_m) * f64::from(f32::EPSILON);
         (f64::from(distance_m) - self.distance_m).abs() <= TOLERANCE_M + rounded
@@ -263,7 +264,7 @@ impl Axis {
         })
     }
 
-    /// Returns the point at height 0 that is `x` from the line's middle and `y` beside the line, m.
+    /// Returns the point at height 0 that is `x` m from the line's middle along it, and `y` m beside it.
     fn on_line(&self, x: f64, y: f64) -> Vector {
         let c = chord(x, self.radius_m);
         let sagitta =
@@ -285,12 +286,12 @@ impl Axis {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }
 
-    /// Returns the line's azimuth at `x_m` plus `aside_rad`, from -π to π. Constant work.
+    /// Returns the line's azimuth at `x_m` plus `aside_rad`, radians from -π to π. Constant work.
     pub(super) fn heading_rad(&self, x_m: f32, aside_rad: f32) -> f32 {
         turned(self.azimuth_rad(x_m) + aside_rad)
     }
 
-    /// Converts a velocity along x, y and h at `x_m` to north, east and down; all in m/s. Constant work.
+    /// Converts a velocity along x, y and up at `x_m` to a velocity north, east and down; all in m/s. Constant work.
     pub fn to_ned(&self, x_m: f32, velocity_m_s: [f32; 3]) -> [f32; 3] {
         let [x, y, h] = velocity_m_s.map(f64::from);
         let [north, east] = self.direction(x_m);
@@ -299,7 +300,7 @@ impl Axis {
         [x * north - y * east, x * east + y * north, -climb].map(narrow)
     }
 
-    /// Returns the north and east components of the line's direction at `x_m`.
+    /// Returns the north and east components of the line's direction at `x_m`, as a unit vector.
     fn direction(&self, x_m: f32) -> [f64; 2] {
         // The tangent turns with the earth's curvature by c / r.
         let c = chord(f64::from(x_m) - self.distance_m / 2.0, self.radius_m);
@@ -317,7 +318,7 @@ impl Axis {
         }
     }
 
-    /// Returns true if a position is finite and near the line.
+    /// Returns true if `place` is finite and near the line: at most [`AROUND_M`](Self::AROUND_M) away.
     #[inline(never)] // called from several places
     pub(super) fn is_around(&self, place: Placement) -> bool {
         let Placement {
@@ -342,7 +343,8 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Converts a distance from the middle along a chord to the distance along its arc.
+/// Returns the arc length that belongs to the length `chord` from the middle of a chord; all in m. `radius` is that
+/// of the arc.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)
@@ -353,15 +355,15 @@ fn chord(arc: f64, radius: f64) -> f64 {
     arc * (1.0 - q * q / 6.0)
 }
 
-/// Minimum length of a line, at which one unit of latitude turns it by a thousandth.
+/// Minimum length of a line from Tx to Rx, m. One unit of latitude turns it by a thousandth of a radian.
 #[doc(hidden)] // for the tests of this workspace
 pub const SHORTEST_M: f64 = 10.0;
 
-/// Maximum length of a line for which the accuracy is known.
+/// Maximum length of a line from Tx to Rx, m; up to it the accuracy is known.
 #[doc(hidden)] // for the tests of this workspace
 pub const LONGEST_M: f64 = 100_000.0;
 
-/// WGS84: semi-major axis, m, and squared eccentricity.
+/// Semi-major axis of the WGS84 ellipsoid, m. The next constant is its squared eccentricity.
 const A_M: f64 = 6_378_137.0;
 const E2: f64 = 6.694_379_990_141_316e-3;
 
@@ -381,7 +383,7 @@ impl Vector {
         z: 1.0,
     };
 
-    /// Returns the point with that latitude and longitude at height 0.
+    /// Returns the point of the WGS84 ellipsoid with the latitude and longitude of `point`, at height 0.
     pub(super) fn on_ellipsoid(point: Geodetic) -> Self {
         let [sin_lat, cos_lat] = sine_and_cosine(point.lat_e7);
         let [sin_lon, cos_lon] = sine_and_cosine(point.lon_e7);
@@ -401,7 +403,8 @@ impl Vector {
         .unit()
     }
 
-    /// Returns latitude and longitude of a point near the ellipsoid, rad. It takes one step of Bowring's method.
+    /// Returns latitude and longitude of this point, which is near the ellipsoid, radians. It takes one step of
+    /// Bowring's method.
     pub(super) fn latitude_and_longitude(self) -> [f64; 2] {
         let p = libm::sqrt(self.x * self.x + self.y * self.y);
         // b / a. The tangent of the parametric latitude is z / (p b / a).
@@ -457,7 +460,8 @@ impl Vector {
     }
 }
 
-/// Returns the ellipsoid's radius of curvature, m. Its normal is `normal`, and the direction is `along`.
+/// Returns the radius of curvature of the WGS84 ellipsoid, m, in the direction `along`. `normal` is the ellipsoid's
+/// normal there.
 pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     let sin2 = normal.z * normal.z;
     let cos2 = 1.0 - sin2;
@@ -473,7 +477,7 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     1.0 / (north2 / meridian + (1.0 - north2) / prime)
 }
 
-/// Radians in 10⁻⁷ degrees.
+/// Factor that converts units of 10⁻⁷ degrees to radians.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
 /// Returns sine and cosine of an angle in units of 10⁻⁷ degrees. The angle is reduced to an eighth of a turn exactly, in
@@ -509,7 +513,7 @@ pub(super) fn turned(angle: f32) -> f32 {
     }
 }
 
-/// Coefficients of fdlibm's series for up to an eighth of a turn, highest power first.
+/// Coefficients of fdlibm's sine series for up to an eighth of a turn, highest power first.
 const SINE: [f64; 6] = [
     1.589_690_995_211_55e-10,
     -2.505_076_025_340_686_3e-8,
@@ -527,7 +531,8 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Special cases of the line. Its ends, a pole, the antimeridian, and its rotation with the earth's curvature.
+/// Tests of special cases of a line on earth: its ends, a pole, the antimeridian, its rotation. It rotates with the
+/// earth's curvature.
 #[cfg(test)]
 mod tests {
     use super::{Axis, AxisError, LONGEST_M};

@@ -5,23 +5,23 @@ use super::axis::{Axis, AxisError};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 
-/// Line and speed that an autopilot uses.
+/// Line on earth and speed limit with which a drone flies a mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
-    /// The line from transmitter to receiver.
+    /// Line on earth from transmitter to receiver.
     pub axis: Axis,
-    /// Maximum speed of the drone.
+    /// Speed limit and acceleration of the drone.
     pub pace: Pace,
 }
 
-/// Reason why sites and mission do not fit.
+/// Reason why the positions of Tx and Rx do not fit the mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CourseError {
-    /// The sites do not define a line.
+    /// The positions of Tx and Rx do not define a line.
     Axis(AxisError),
-    /// The distance of the sites along the ground, m, differs from the mission's.
+    /// The distance of Tx and Rx along the ground, m, which differs from the mission's.
     Distance(f64),
 }
 

@@ -12,13 +12,14 @@ use crate::root::sqrt;
 #[cfg(test)]
 pub(crate) mod tests;
 
-/// Value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
+/// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Two f32 steps just below the distance, as a fraction of it. Positions this far apart near Rx remain distinct.
+/// Smallest step in x between two relays, as a fraction of the distance D: two f32 steps just below D. Positions this
+/// far apart remain distinct, also near Rx.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
-/// Maximum rounding error of a step between two positions, as a fraction of the distance.
+/// Maximum rounding error of a step in x between two positions, as a fraction of the distance D.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 /// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
@@ -38,28 +39,30 @@ pub struct MissionConfig {
     pub tx_power_w: f32,
     /// Altitude and power of every relay without a profile of its own.
     pub common: Profile,
-    /// Altitudes for methods that choose altitudes, within 0.1 to 1e5; includes `common.altitude_m`.
+    /// Range of altitudes, m, for methods that choose altitudes. Within 0.1 to 1e5; includes `common.altitude_m`.
     pub band: Band,
-    /// Lateral range y for the joint method, within -1e5 to 1e5; includes 0.
+    /// Range of lateral offsets y, m, for the joint method: within -1e5 to 1e5; includes 0.
     pub lateral: Band,
-    /// Path loss of the three kinds of link.
+    /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops.
+    /// Interference on the hops: a transmitter at a known or an unknown position, or a field.
     pub interference: Interference,
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
-    /// SIR that a hop needs on the way back from Rx to Tx, relative to that on the way there (r): 0 to 1. 0 is the paper, with one
-    /// direction; otherwise the worse of SIR and backward SIR / r counts. Above 0 it needs a known interferer.
+    /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 is one
+    /// direction only, as in the paper; above 0 the worse of the SIR and the backward SIR / r counts, and the
+    /// interferer must be known.
     pub reverse: f32,
-    /// Transmit power of the ground receiver on the way back, W: 1e-6 to 1e6. Without effect if `reverse` is 0.
+    /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
+    /// 0.
     pub rx_power_w: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,
 }
 
 impl MissionConfig {
-    /// Checks the number of relays, and that they fit into the distance.
+    /// Checks the number of relays, and that they fit into the distance with their minimum separation.
     pub(super) const fn room(&self) -> Result<(), MissionError> {
         if self.relays < 1 || self.relays > MAX_RELAYS {
             return Err(MissionError::Relays);
@@ -71,7 +74,7 @@ impl MissionConfig {
         Ok(())
     }
 
-    /// Checks the parameters of the way back.
+    /// Checks the parameters of the traffic from Rx to Tx: `reverse`, `rx_power_w`, and the interference.
     const fn way_back(&self) -> Result<(), MissionError> {
         if !within(self.reverse, 0.0, 1.0) {
             return Err(MissionError::Reverse);
@@ -100,7 +103,8 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays need more than `distance_m` with `min_separation_m` between them. A rounding of 5e-7 `distance_m` is included.
+    /// The relays, `min_separation_m` apart, need more than `distance_m`. A rounding of 5e-7 `distance_m` for each
+    /// relay is included.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -118,7 +122,7 @@ pub enum MissionError {
     Noise,
     /// `noise_w` is above 0, and the crate was built without its feature `noise`.
     NoiseFeature,
-    /// The crate was built without its feature `field`.
+    /// The interference is a field, and the crate was built without its feature `field`.
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
@@ -169,15 +173,15 @@ impl core::fmt::Display for MissionError {
 
 impl core::error::Error for MissionError {}
 
-/// The interferer (the paper's MSI), on the ground: a jammer, a base station, a licensed user.
+/// Interferer on the ground (the paper's MSI): a jammer, a base station, a licensed user.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interferer {
-    /// Transmit power, W.
+    /// Transmit power of the interferer, W.
     pub power_w: f32,
-    /// Position along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
+    /// Position of the interferer along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
     pub x_m: f32,
-    /// Distance from that line, m: to its right above 0, to its left below.
+    /// Lateral offset of the interferer from the line Tx to Rx, m: to its right above 0, to its left below.
     pub y_m: f32,
 }
 
@@ -190,21 +194,22 @@ impl Interferer {
         within(self.x_m, -1e7, 1e7) && within(self.y_m, -1e7, 1e7)
     }
 
-    /// Returns true if all values are within their ranges.
+    /// Returns true if the interferer's power and position are within their allowed ranges.
     pub const fn is_valid(&self) -> bool {
         self.is_powered() && self.is_placed()
     }
 }
 
-/// Interference on the hops.
+/// Kind of interference that degrades the hops of a mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Interference {
-    /// Single transmitter at a known position.
+    /// Single interfering transmitter at a known position.
     Source(Interferer),
-    /// Interference that is known as a distribution along x only.
+    /// Interference field: only the distribution of the interference along x is known.
     Field(Field),
-    /// Single transmitter at an unknown position. Relays spread evenly until they find it ([`crate::Settings::listen`]).
+    /// Single interfering transmitter at an unknown position. Relays spread evenly until they find it
+    /// ([`crate::Settings::listen`]).
     Unknown,
 }
 
@@ -212,9 +217,11 @@ pub enum Interference {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// Relay 1 first (Algorithm 1), with an interferer. The SIR of a hop determines the position of its *receiver*.
+    /// Relay 1 is placed first (Algorithm 1), with an interferer. The SIR of a hop determines the position of its
+    /// *receiver*.
     TowardRx,
-    /// Relay N first (Algorithm 4), in a field. The interference at the receiver determines the position of the *sender*.
+    /// Relay N is placed first (Algorithm 4), in a field. The interference at the receiver determines the position of
+    /// the *sender*.
     TowardTx,
 }
 
@@ -237,7 +244,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// Lateral range 0, as in the paper. Relays stay in the vertical plane through transmitter and receiver.
+    /// Lateral range of zero width, as in the paper: relays stay in the vertical plane through Tx and Rx.
     pub const NONE: Self = Self::at(0.0);
 
     /// Returns the band of a single value.
@@ -269,12 +276,12 @@ impl Band {
         !(self.least_m < self.most_m)
     }
 
-    /// Returns true if the limits are in order and within 0.1 to 1e5 m.
+    /// Returns true if this is a valid range of altitudes: limits in order and within 0.1 to 1e5 m.
     pub(super) const fn is_of_altitudes(self) -> bool {
         within(self.least_m, 0.1, 1e5) && within(self.most_m, self.least_m, 1e5)
     }
 
-    /// Returns true if the limits are in order, within -1e5 to 1e5 m, and include 0.
+    /// Returns true if this is a valid lateral range: limits in order, within -1e5 to 1e5 m, including 0.
     pub(super) const fn is_room_beside(self) -> bool {
         within(self.least_m, -1e5, 0.0) && within(self.most_m, 0.0, 1e5)
     }
@@ -291,12 +298,12 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Returns true if both values are within their ranges.
+    /// Returns true if the altitude and the transmit power are within their allowed ranges.
     pub const fn is_valid(&self) -> bool {
         within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
     }
 
-    /// Returns a relay with this profile right above the line.
+    /// Returns the profile of a relay right above the line Tx to Rx (y = 0), with this altitude and power.
     pub const fn on_line(self) -> Station {
         Station {
             cross_section: CrossSection::on_line(self.altitude_m),
@@ -309,20 +316,22 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
     value >= least && value <= most
 }
 
-/// Validated mission, with precomputed derived quantities.
+/// Validated mission: its parameters, and quantities derived from them.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a relay on a drone-to-drone hop per watt of transmit power, 1/W. eta / (`mu_los` `p_MSI`), in a field m^2/W:
-    /// `Upsilon_max` / `mu_los`.
+    /// Gain of a drone-to-drone hop per watt of the sender, 1/W. It is eta / (`mu_los` `p_MSI`), with path-loss
+    /// factors and the interferer's power; in a field `Upsilon_max` / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of a relay on the last hop per watt, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`.
+    /// Gain of the last hop per watt of its sender, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`.
     ///
-    /// In a field it is Upsilon(D) / eta. With noise it refers to the interference plus noise at Rx.
+    /// The SIR at Rx is this times the power over the squared distance. In a field it is Upsilon(D) / eta. With noise
+    /// it refers to the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
-    /// N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m. 0 without noise and in a field.
+    /// Noise nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m. 0 without
+    /// noise and in a field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -450,7 +459,7 @@ impl Mission {
         })
     }
 
-    /// Creates a mission that is a constant of the firmware; otherwise as [`Mission::try_new`].
+    /// Creates a mission in a `const`; an invalid parameter fails the build. Otherwise as [`Mission::try_new`].
     ///
     /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant; [`Channel::new`](crate::Channel::new), which
     /// takes the losses as factors, 10^(dB / 10), can:
@@ -533,7 +542,7 @@ impl Mission {
         }
     }
 
-    /// Returns the parameters.
+    /// Returns the parameters from which the mission was created.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
     }
@@ -543,12 +552,13 @@ impl Mission {
         self.config.relays
     }
 
-    /// Interference on the hops.
+    /// Returns the kind of interference on the hops.
     pub const fn interference(&self) -> &Interference {
         &self.config.interference
     }
 
-    /// Returns the interferer; `None` in a field. An unknown one is replaced by one far away, with equal interference everywhere.
+    /// Returns the interferer; `None` in a field. For an unknown interferer it returns a substitute far away, with
+    /// equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -557,7 +567,7 @@ impl Mission {
         }
     }
 
-    /// Returns the field, if there is one.
+    /// Returns the interference field, or `None` if the interference is a single transmitter.
     pub const fn field(&self) -> Option<&Field> {
         match &self.config.interference {
             Interference::Field(field) if cfg!(feature = "field") => Some(field),
@@ -565,7 +575,7 @@ impl Mission {
         }
     }
 
-    /// Returns the field with receiver noise, if there is one.
+    /// Returns the interference field combined with the receiver noise, or `None` without a field.
     pub(crate) const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
             Some(field) => Some(field.in_noise(self.config.noise_w)),
@@ -573,7 +583,7 @@ impl Mission {
         }
     }
 
-    /// nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m.
+    /// Noise nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m.
     ///
     /// 0 without noise and in a field, whose Upsilon includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
@@ -584,9 +594,9 @@ impl Mission {
         }
     }
 
-    /// r: the SIR that a hop needs on the way back, relative to that on the way there. 0 for one direction.
+    /// Ratio r: SIR that a hop needs from Rx to Tx, relative to that from Tx to Rx. 0 for one direction.
     ///
-    /// A constant without the feature `reverse`, so that the compiler drops what is for two directions.
+    /// A constant without the feature `reverse`, so that the compiler drops the code for two directions.
     pub const fn reverse(&self) -> f32 {
         if cfg!(feature = "reverse") {
             self.config.reverse
@@ -595,7 +605,7 @@ impl Mission {
         }
     }
 
-    /// Order in which the positions are computed.
+    /// Returns the order in which positions are computed: toward Rx, or toward Tx in a field.
     pub const fn heading(&self) -> Heading {
         match self.field() {
             None => Heading::TowardRx,
@@ -611,7 +621,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay after `index` in a pass; `None` after the last.
+    /// Returns the relay after `index` in the order of computation; `None` after the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -645,20 +655,22 @@ impl Mission {
 }
 
 impl Mission {
-    /// Gain of the first hop, the factor of [`crate::sir::quiet`] in its SIR. `p_t` / `p_MSI`, in a field `p_t` `Upsilon_max` /
-    /// eta.
+    /// Gain A of the first hop: its SIR is A [`crate::sir::quiet`] / squared length. A is `p_t` / `p_MSI`, the powers
+    /// of Tx and interferer; in a field `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Gain of a hop from a relay of `power_w` watts. (`p_u` / `p_MSI`)(eta / `mu_los`), in a field `p_u` `Upsilon_max` / `mu_los`.
+    /// Gain of a hop from a relay of `power_w` watts to another drone. It is (`p_u` / `p_MSI`)(eta / `mu_los`), with
+    /// the relay's power and the interferer's; in a field `p_u` `Upsilon_max` / `mu_los`.
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// K of the last hop, m^2. The SIR at the receiver is K / squared distance to the relay of `power_w` watts.
+    /// Factor K of the last hop, m^2. The SIR at Rx is K / squared distance from the last relay, which has `power_w`
+    /// watts.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -668,12 +680,13 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Last hop's K over the first hop's gain, m^2: (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2).
+    /// Ratio G = K / A of the last hop's K and the first hop's gain A, m^2. It is (`p_u` / `p_t`)(`mu_nlos` / eta)((X
+    /// - D)^2 + Y^2).
     pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
 
-    /// Received power of Tx's signal at a relay with the squared distance `squared_m2`, W.
+    /// Power that a relay at the squared distance `squared_m2` from Tx receives from Tx, W.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -685,8 +698,8 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x that keeps the separation of two neighbours. `across_squared`, m^2, is their squared distance
-    /// across the line.
+    /// Returns the minimum step in x, m, that keeps two neighbours at their minimum separation. `across_squared`,
+    /// m^2, is their squared distance across the line, in y and altitude.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -695,23 +708,24 @@ impl Mission {
         sqrt(apart * apart - across_squared)
     }
 
-    /// Returns [`Mission::least_step`] plus a margin for rounding.
+    /// Returns [`Mission::least_step`] plus a margin for rounding, m.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the last x in pass order that leaves the relays after `index` their minimum separation, m. `across_squared` is the
-    /// maximum squared distance across the line between two neighbours among them, m^2; it reduces the steps in x.
+    /// Returns the farthest x of relay `index` in the direction of a pass that leaves later relays room, m. They need
+    /// their minimum separation. `across_squared` is the maximum squared distance across the line between two
+    /// neighbours among them, m^2; it reduces the steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the last x in pass order if the relays after `index` need no separation, m.
+    /// Returns the farthest x of relay `index` in the direction of a pass, m, without a minimum separation.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Number of relays after `index` in pass order.
+    /// Number of relays that are computed after relay `index` in a pass along the chain.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -719,7 +733,7 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index` that leaves the relays between it and Rx their separation, m.
+    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -734,7 +748,7 @@ impl Mission {
         self.config.distance_m - after * self.step_of(least)
     }
 
-    /// Returns the minimum step of two relays `least` apart, plus a margin for rounding, m.
+    /// Returns the step in x, m, that keeps two relays at least `least` metres apart in spite of rounding.
     fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
         if least > 0.0 {
@@ -753,11 +767,11 @@ impl Mission {
     }
 }
 
-/// Ratio of gains that gives a hop half the length of the others: SIR is gain over squared length.
+/// Factor on the gain of a hop that halves its length, since SIR is gain over squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// Returns the interferer if it is known.
+    /// Returns the interferer if its position is known; `None` for an unknown one or a field.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -767,8 +781,8 @@ impl Mission {
 
     /// Returns the mission with another `interference`.
     ///
-    /// A `receiver_w` above 0 is its power at the ground receiver. With `halved` the first hop, or the last one, is half as
-    /// long as the others.
+    /// A `receiver_w` above 0 is the interference power at the ground receiver, W. `halved` is true for the first
+    /// hop, and for the last one, if that hop is to be half as long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -808,7 +822,8 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns the gains for an unknown interferer with relays of `power_w`. They give SIR = (D / d)^2 on every hop, so equal hops are best.
+/// Returns the gains for an unknown interferer: first hop, drone-to-drone hop per W, last hop per W. With relays of
+/// `power_w` they give SIR = (D / d)^2 on every hop of length d, so equal hops are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

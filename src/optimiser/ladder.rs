@@ -8,28 +8,30 @@
 use super::PerTarget;
 use crate::root::sqrt;
 
-/// Number of target SIRs in a full ladder.
+/// Number of target SIRs in a full ladder, the set of targets that one sweep along the chain tries.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps from the middle gap to either end of a full ladder, both included.
+/// Number of gaps between targets from the middle gap to either end of a full ladder, both included.
 const HALF: usize = TARGETS / 2;
 
-/// Target SIRs (linear, rising), as one target and two one-byte codes.
+/// Target SIRs (linear, rising) that one sweep along the chain tries. They are encoded as one target and two one-byte
+/// codes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Target below the middle gap.
+    /// Target just below the middle gap of the ladder, or its only target.
     anchor: f32,
-    /// Middle gap as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120. With 0 `anchor` is the only target.
+    /// Relative middle gap, as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120. With 0 `anchor` is the only
+    /// target.
     gap: u8,
-    /// Ratio of each gap to its inner neighbour: 1 + `growth` / 16.
+    /// Growth of the gaps outward: each is 1 + `growth` / 16 times its inner neighbour.
     growth: u8,
-    /// True for a plain pass, in which no relay holds back.
+    /// True for a plain pass, in which every relay is at its reach and none stops before it.
     plain: bool,
 }
 
 impl Ladder {
-    /// Returns the single target `target`, above 0; if the last relay finds it feasible, it commits it.
+    /// Returns a ladder of one target, above 0; the last relay commits it if it is feasible.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -39,17 +41,17 @@ impl Ladder {
         }
     }
 
-    /// Returns a ladder with the same targets, for a plain pass if `plain` is true.
+    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay is at its reach.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true for a plain pass, in which no relay holds back.
+    /// Returns true for a plain pass, in which every relay is at its reach and none before it.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
 
-    /// Returns targets with equal ratios, the lowest just below `low` and the highest just above `high`. 0 < `low` < `high`.
+    /// Returns a ladder of targets in equal ratios, from just below `low` to just above `high`. 0 < `low` < `high`.
     pub fn spanning(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -58,7 +60,7 @@ impl Ladder {
         )
     }
 
-    /// Returns targets with equal ratios strictly between the known `low` and `high`; 0 < `low` < `high`.
+    /// Returns a ladder of targets in equal ratios, strictly between `low` and `high`; 0 < `low` < `high`.
     pub fn between(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -67,8 +69,8 @@ impl Ladder {
         )
     }
 
-    /// Returns targets with `centre` in the middle of a gap of `gap` (relative). The gaps grow outward until the targets span
-    /// [`low`, `high`].
+    /// Returns a ladder that is dense around `centre`, in the middle of a gap of `gap` (relative). The gaps grow
+    /// outward until the targets span [`low`, `high`].
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
@@ -98,7 +100,8 @@ impl Ladder {
         }
     }
 
-    /// Decodes a ladder; `None` unless its targets are normal f32s above zero and its encoding is unique.
+    /// Decodes a ladder; `None` unless its targets are normal f32s above zero and its encoding is unique. A single
+    /// target (`gap` 0) must have `growth` 0.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -114,23 +117,23 @@ impl Ladder {
         (sound && unique).then_some(ladder)
     }
 
-    /// Returns anchor, gap code and growth code for [`Ladder::from_parts`].
+    /// Returns `anchor`, `gap` and `growth`, the encoding that [`Ladder::from_parts`] decodes.
     pub const fn parts(&self) -> (f32, u8, u8) {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true for a single target, which the last relay commits if it is feasible.
+    /// Returns true for a ladder of one target, which the last relay commits if it is feasible.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }
 
-    /// Number of targets, 1 or [`TARGETS`].
+    /// Number of targets in the ladder, 1 or [`TARGETS`].
     #[allow(clippy::len_without_is_empty, reason = "there is always a target")]
     pub const fn len(&self) -> usize {
         if self.is_single() { 1 } else { TARGETS }
     }
 
-    /// Returns the targets, rising.
+    /// Returns the target SIRs, linear, in ascending order.
     pub fn targets(&self) -> PerTarget {
         if self.is_single() {
             return PerTarget::from([self.anchor]);
@@ -163,7 +166,8 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the ratio of the highest target to the lower middle one. That of the higher middle one to the lowest is the same.
+/// Returns the ratio of the highest target to the lower of the two middle ones. The ratio of the higher middle one to
+/// the lowest target is the same.
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -178,12 +182,12 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns (1 + m / 8) 2^(e - 25): the bits of `code` as low exponent and high mantissa bits of an f32.
+/// Returns the gap of `code`, (1 + m / 8) 2^(e - 25). Its bits become low exponent and high mantissa bits of an f32.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }
 
-/// Returns the code whose value is nearest to `gap`, within 1 to 254.
+/// Returns the code of the representable gap nearest to `gap`, within 1 to 254.
 fn gap_code(gap: f32) -> u8 {
     let bits = gap.to_bits().saturating_sub(102 << 23);
     let rounded = bits.saturating_add(1 << 19) >> 20;

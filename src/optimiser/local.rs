@@ -15,22 +15,22 @@ use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
 use crate::sir::{in_noise, square};
 
-/// Altitudes in one round of the coarse-to-fine search.
+/// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
 const ROWS: u8 = 5;
 
-/// Rounds of the coarse-to-fine search; each halves the range.
+/// Number of rounds of the coarse-to-fine search; each halves the range of altitudes.
 const ROUNDS: u8 = 9;
 
-/// Bisection steps along x for each altitude.
+/// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
 const ROUNDING: f32 = 3e-7;
 
-/// Method of the local search.
+/// Method by which one relay searches its best position between its neighbours (Algorithm 2).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Coarse to fine: at most 1080 evaluations of both hops.
+    /// Search from coarse to fine altitudes: at most 1080 evaluations of both hops.
     #[default]
     Fine,
     /// The paper's grid, `columns` by `rows` evaluations.
@@ -42,33 +42,34 @@ pub enum Local {
     },
 }
 
-/// Neighbour of the relay, or the ground station in its place.
+/// Neighbour of the searching relay: another relay, or a ground station.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
-    /// Position; at altitude 0 for a ground station.
+    /// Position of the neighbour; at altitude 0 for a ground station.
     pub place: Placement,
     /// Minimum distance between the relay and this node, m; 0 for a ground station.
     pub apart_m: f32,
 }
 
-/// The two hops of a relay.
+/// Hops to and from one relay, whose SIRs the local search evaluates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
     gain_in: PowerRatio,
-    /// Gain of the relay: for a hop to a relay, or K in m^2 for the hop to Rx.
+    /// Gain of the hop from the relay: to another relay, or K in m^2 for the hop to Rx.
     gain_out: f32,
     to_rx: bool,
     interferer: Interferer,
-    /// nu = N eta / P, 1/m^2: 0 without noise.
+    /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
     noise: f32,
     /// Inverse interference at the next relay, by [`crate::sir::quiet`], m^2.
     quiet_after: f32,
 }
 
 impl Hops {
-    /// Returns the hops of a relay of `power_w` watts that receives with `gain_in`. `after` is `None` for relay N.
+    /// Returns both hops of a relay of `power_w` watts. `before` is its sender, whose hop has the gain `gain_in`;
+    /// `after` is its receiver, `None` for Rx.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -100,7 +101,7 @@ impl Hops {
         }
     }
 
-    /// Returns the SIRs of the hops to and from the relay at `at`, computed as in [`crate::sir`].
+    /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -117,13 +118,13 @@ impl Hops {
         (incoming, outgoing)
     }
 
-    /// Returns the smaller SIR: the paper's local SIR.
+    /// Returns the smaller SIR of both hops with the relay at `at`: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
     }
 
-    /// Returns true if the relay at `at` keeps its distance from both neighbours.
+    /// Returns true if the relay at `at` keeps its minimum distance from both neighbours.
     fn is_clear(&self, at: Placement) -> bool {
         let clear = |of: HopEnd| {
             square(at.x_m - of.place.x_m) + square(at.altitude_m - of.place.altitude_m)
@@ -140,22 +141,23 @@ pub struct LocalSearch {
     hops: Hops,
     bottom_m: f32,
     top_m: f32,
-    /// Lowest and highest altitude of the current round, m.
+    /// Lowest altitude of the current round, m. The next field is the highest one.
     low_m: f32,
     high_m: f32,
     round: u8,
     row: u8,
     column: u8,
-    /// Best row of the current round: its altitude and its worse SIR.
+    /// Best row of the current round: its altitude, m, and the SIR of its worse hop.
     best_row: (f32, f32),
     /// Best position found if it is better than the current position; `None` otherwise.
     found: Option<Placement>,
-    /// Worst-hop SIR of that position, or of the current one, linear.
+    /// Linear SIR of the worse hop at the position found, or at the current position if none is better.
     best_sir: f32,
 }
 
 impl LocalSearch {
-    /// Starts a search by a relay at `at`, up to `explore_m` above and below within [`band.0`, `band.1`].
+    /// Starts a search by a relay at `at`, up to `explore_m` above and below it. `band` is the lowest and the highest
+    /// allowed altitude, m.
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);
@@ -178,7 +180,7 @@ impl LocalSearch {
         }
     }
 
-    /// Searches for at most `budget` evaluations plus one row of 24.
+    /// Continues the search by at most `budget` evaluations of both hops, plus one row of 24.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -196,7 +198,8 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Records `at` if it is allowed and better than all before. Returns its worse SIR, or -1 if it is not allowed.
+    /// Records `at` as the best position if it is allowed and better than all before. Returns the SIR of its worse
+    /// hop, or -1 if it is not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
@@ -209,12 +212,14 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns the altitude at `part`, 0 to 1, of the current range. The clamp corrects rounding at the band's end.
+    /// Returns the altitude at the fraction `part`, 0 to 1, of the current range, m. The clamp corrects rounding at
+    /// the band's end.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the next altitude of the coarse-to-fine search. Returns the number of evaluations, `None` after the last round.
+    /// Searches the next altitude from coarse to fine. Returns the number of evaluations, `None` after the last
+    /// round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;
@@ -238,7 +243,8 @@ impl LocalSearch {
         Some(u16::from(HALVINGS) + 4)
     }
 
-    /// Searches a row for the x at which both hops have equal SIRs. Returns the best worst-hop SIR of the row.
+    /// Searches the x at `altitude_m` at which both hops have equal SIRs. Returns the SIR of the worse hop at the
+    /// best x found, or -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
@@ -266,7 +272,8 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Evaluates the next point of the grid, altitudes first; `None` after the last one.
+    /// Evaluates the next point of the grid, altitudes first. Returns the number of evaluations, 1, or `None` after
+    /// the last point.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;
@@ -295,7 +302,7 @@ mod tests {
     use crate::place::Placement;
     use crate::power_ratio::PowerRatio;
 
-    /// Returns a search by a relay at `altitude_m` in the middle of two that are 100 m apart at `beside_m`.
+    /// Returns a search by a relay at `altitude_m` between two at altitude `beside_m`, 100 m apart.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

@@ -20,5 +20,5 @@ pub mod reverse;
 pub mod search;
 pub mod spacing;
 
-/// Numbers for the targets of a ladder: reaches, slacks or the targets themselves.
+/// List with one number for each target SIR of a ladder: reach, slack (spare length), or target.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

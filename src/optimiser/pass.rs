@@ -22,24 +22,26 @@ use crate::place::Station;
 use crate::root::sqrt_in_place;
 use crate::sir::{Sender, square};
 
-/// Maximum number of positions at which the last relay tries to hold for the way back.
+/// Maximum number of positions that the last relay tries in order to receive Rx.
 const HOLDS: u8 = 4;
 
-/// Maximum number of field points per call, for as many targets as that allows, but at least one.
+/// Maximum number of field points evaluated per call. It limits the number of targets in a call, which is at least
+/// one.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Previous relay of a pass, as stated in its message.
+/// Previous relay in a pass along the chain, as described in its message.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
-    /// Cross-section and power.
+    /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
-    /// Upsilon measured at this relay, 1/W; `None` for that of the agreed field. Only passes toward Tx use it.
+    /// Upsilon = E[1/I] measured at the previous relay, 1/W; `None` to use the agreed field. Only passes toward Tx
+    /// use it.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a relay above the line that uses the agreed field.
+    /// Returns a previous relay above the line (y = 0) that uses the agreed field.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -48,31 +50,31 @@ impl Behind {
     }
 }
 
-/// Relay in a pass, as far as its reaches depend on it.
+/// Relay in a pass along the chain, with all parameters on which its reach for a target depends.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
-    /// Mission of the relay.
+    /// Mission of the chain.
     pub mission: &'a Mission,
     /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
     /// Index of the relay in the chain, 1 next to Tx.
     pub index: u16,
-    /// Cross-section and power of the relay.
+    /// Lateral offset, altitude and power of the relay.
     pub own: Station,
-    /// Upsilon measured by the relay, 1/W, if it uses that.
+    /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the agreed field.
     pub measured_per_w: Option<f32>,
-    /// True for a plain pass, in which no relay holds back.
+    /// True for a plain pass, in which every relay is at its reach and none stops before it.
     pub plain: bool,
-    /// Maximum x from the joint method, m; with it no relay holds back either.
+    /// Maximum x of the relay by the joint method, m; `None` with other methods.
     pub end_m: Option<f32>,
 }
 
-/// Returns the start of a pass as reaches: Tx, or Rx in a field, for every target.
+/// Returns the x at which a pass starts, for every target: that of Tx, or of Rx in a field, m.
 pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the start of a pass for one target, m.
+/// Returns the x at which a pass starts: that of Tx, or of Rx in a field, m.
 pub(crate) fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -81,10 +83,11 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 }
 
 impl Link<'_> {
-    /// Appends the reaches for the rising `targets` to `reaches`, which already has the first of them.
+    /// Appends this relay's reaches for the rising `targets` to `reaches`, after those already there.
     ///
-    /// It stops at the first target that cannot be met. `from` are the reaches of the relay before, m. Bounded by a reach per
-    /// target; in a field by three for each of its points.
+    /// A reach is the farthest x in the direction of the pass that meets a target. It stops at the first target that
+    /// cannot be met. `from` are the reaches of the relay before, m. Bounded by a reach per target; in a field by
+    /// three for each of its points.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -118,8 +121,8 @@ impl Link<'_> {
         }
     }
 
-    /// Appends as many more reaches as one call of a relay may compute; returns true if these are all. Bounded by 16 reaches; in
-    /// a field by 128 of its points, or by one target.
+    /// Appends as many more reaches as one call may compute; returns true once all are computed. Bounded by 16
+    /// reaches; in a field by 128 of its points, or by one target.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -174,7 +177,8 @@ impl Link<'_> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop that starts closest to Tx of all that end from `low` to `high`. On a plain pass, at `low`.
+    /// Returns the hop from this relay that starts closest to Tx of all that end from `low` to `high`, m. On a plain
+    /// pass it ends at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -195,11 +199,12 @@ impl Link<'_> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the slack of a chain for `target`, m, and this last relay's position. The position is in its range.
+    /// Returns the slack (spare length) of the chain for `target`, m, and the x of this last relay, m.
     ///
-    /// `reach` is the end of that range, and `from_m` that of the relay before. A slack of 0 or more means that the chain closes. `None` if Rx is out of reach from
-    /// everywhere. Toward Rx the slack is reach + `d_max` - D. Toward Tx it is the maximum length of the first hop minus the
-    /// position, at the position of the range that maximises it.
+    /// A slack of 0 or more means that the chain meets the target. `reach` is the end of this relay's range, and
+    /// `from_m` that of the relay before. `None` if Rx is out of reach from everywhere. Toward Rx the slack is reach
+    /// + `d_max` - D. Toward Tx it is the maximum length of the first hop minus the position, at the position of the
+    /// range that maximises it.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -236,7 +241,8 @@ impl Link<'_> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m` that this relay reaches from the one before, m.
+    /// Returns the largest x up to `most_m`, m, at which this relay receives the relay before it. The reach of that
+    /// relay is `from_m`. `None` if there is none.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -244,7 +250,8 @@ impl Link<'_> {
         }
     }
 
-    /// Returns [`Link::ending`] with a way back, over the last hop `hop`. `slack` is that of the way there at a position.
+    /// Returns [`Link::ending`] for traffic in both directions; `hop` leads from Rx to this last relay. `slack`
+    /// returns the slack toward Rx for this relay's x.
     fn held(
         &self,
         hop: &FromRx,
@@ -275,8 +282,8 @@ impl Link<'_> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the required position of the relay before, with this one at `place`. The reach of the relay before for `target` is
-    /// `from_m`.
+    /// Returns the x that the relay before must take if this one is at `place`, to meet `target`. The reach of the
+    /// relay before is `from_m`.
     ///
     /// `None` if there is none, because a range that was assumed to have no holes has one. Bounded by two reaches, in a field by
     /// three for each of its points.
@@ -331,7 +338,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the verdict of the last relay, `link`, which has these `reaches`. `from` are those of the relay before.
+/// Returns the result of a sweep at its last relay, `link`, which has these `reaches`. `from` are the reaches of the
+/// relay before, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -343,18 +351,20 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of the targets of one sweep.
+/// Result of one sweep along the chain: slack (spare length) of each target, and target to commit.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the committed target in the ladder; every relay then takes its position for it.
+    /// Index of the committed target in the ladder; `None` if the search goes on. After a commit every relay takes
+    /// its position for that target.
     pub commit: Option<u8>,
-    /// Slack for each target that every hop can meet, m: 0 or more if the chain closes.
+    /// Slack (spare length) of the chain for each target that every hop can meet, m. It is 0 or more if the chain
+    /// meets the target.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
-    /// Returns the verdict on a pass of `ladder` from the slacks of targets that every hop can meet. `targets` are those of the
-    /// ladder. A target is committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the
+    /// Returns the result of a sweep of `ladder`, whose `targets` have these `slacks` (spare lengths). A target is
+    /// committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the
     /// ladder has no other target: the step of the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
@@ -382,8 +392,9 @@ impl Verdict {
     }
 }
 
-/// Returns the index of the highest target that is met, plus one; 0 if none is. If every relay has the same altitude, all lower
-/// targets are met too. In a varying field, and with different altitudes, some may be missed, and the highest one still counts.
+/// Returns the index of the highest target that is met (slack of 0 or more), plus one; 0 if none is. If every relay
+/// has the same altitude, all lower targets are met too. In a varying field, and with different altitudes, some may
+/// be missed, and the highest one still counts.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -391,7 +402,8 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
         .map_or(0, |last| last + 1)
 }
 
-/// Whole chain for one target. Reaches from the leader to the last relay, and required positions on the way back.
+/// Whole chain for one target, without messages. It computes reaches from the leader to the last relay, and then the
+/// required positions in the opposite order.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
     pub(crate) target: f32,
@@ -413,7 +425,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes the reaches of all relays; returns the final slack and the last relay's position.
+    /// Computes the reaches of all relays; returns the chain's slack (spare length), m, and the last x, m. That x is
+    /// the last relay's. `visit` gets the index and the reach of each relay. `None` if a hop cannot meet the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();
@@ -429,7 +442,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns true if the chain closes. It does so on a plain pass, or with required positions that all relays can take.
+    /// Returns true if the chain meets its target. Either every relay can be at its reach, or all relays can take
+    /// their required positions.
     pub(crate) fn is_met(&self) -> bool {
         let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
         closes(self)
@@ -439,7 +453,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             }) || self.place(0).is_some())
     }
 
-    /// Returns the position of relay `index` if no relay has to hold back; 0 for any relay.
+    /// Returns the x of relay `index`, m, if every relay can be at its reach; else `None`. For the index 0 it returns
+    /// the x of some relay.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = Self {
             plain: true,
@@ -466,7 +481,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the reach of relay `index`, or the start of the pass for `None`.
+    /// Returns the reach of relay `index`, m, or for `None` the x at which the pass starts. `None` if a hop cannot
+    /// meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let mut from_m = origin(self.mission);
         let Some(index) = index else {
@@ -482,8 +498,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the x of relay `index`, m; `None` if a relay cannot take its required position. For an `index` of no relay, some
-    /// x.
+    /// Returns the x of relay `index`, m; `None` if a relay cannot take its required position. For an index that no
+    /// relay has, it returns some x.
     pub(crate) fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

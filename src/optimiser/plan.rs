@@ -10,28 +10,29 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target that the whole chain meets, as the ladder and the index that the last relay would commit.
+/// Target that the whole chain meets, as the last sweep's ladder and an index in it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
-    /// Ladder of the sweep that settles the chain.
+    /// Ladder of targets of the last sweep, in which the target is committed.
     pub ladder: Ladder,
-    /// Index of the committed target.
+    /// Index of the committed target in the ladder.
     pub commit: u8,
     /// Committed target, linear SIR.
     pub target: f32,
-    /// Lowest SIR that no chain at these altitudes has, linear. `None` with the paper's fixed step, which excludes some chains.
+    /// Upper bound: a SIR that no chain at these altitudes has, linear. `None` with the paper's fixed step, which
+    /// excludes some chains.
     pub most: Option<f32>,
-    /// Number of sweeps.
+    /// Number of sweeps along the chain that the search took.
     pub sweeps: u32,
 }
 
-/// Chain being solved, a few hops at a time. Its size does not depend on N.
+/// Solver of a chain without messages, a few hops at a time. Its size does not depend on N.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
     reaches: PerTarget,
-    /// Reaches of the current relay, as far as they are computed.
+    /// Reaches of the current relay for the ladder's targets, as far as they are computed, m.
     next: PerTarget,
     index: u16,
     behind: Option<Behind>,
@@ -64,10 +65,10 @@ impl Planner {
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
-    /// Computes at most `hops` hops; `Ok(Some(..))` once the chain is solved.
+    /// Computes at most `hops` hops of a sweep; `Ok(Some(..))` once the chain is solved.
     ///
-    /// A hop takes at most 16 reaches, in a field 128 of its points. `profile_of` returns the profile of relay 1..=N; it must be
-    /// constant.
+    /// A hop takes at most 16 reaches, in a field 128 of its points. `profile_of` returns the profile of relay 1..=N,
+    /// and must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left to try.
@@ -121,7 +122,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty sweeps over N hops with the bracketed schedule.
 ///
-/// If relays hold back, their positions are checked as in [`place`].
+/// If relays have to stop before their reach, their positions are checked as in [`place`].
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -157,7 +158,8 @@ pub fn solve(
     }
 }
 
-/// Returns the position of relay `index` for `target`, on a `plain` pass or not.
+/// Returns the position of relay `index` for `target`. `plain` is true if every relay must be at its reach. `None` if
+/// a relay has no position.
 fn placed(
     mission: &Mission,
     target: f32,
@@ -178,7 +180,8 @@ fn placed(
         .map(|x_m| profile_of(index).on_line().cross_section.at(x_m))
 }
 
-/// Returns the position of relay `index` for `target`, held back if that lets the other relays meet it.
+/// Returns the position of relay `index` for `target`. It is before the relay's reach if that lets other relays meet
+/// the target.
 ///
 /// `None` if the target cannot be met. At most N^2 reaches.
 pub fn place(

@@ -30,21 +30,21 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Hop to a known receiver, prepared for evaluation with many targets.
+/// Hop toward Rx in a field whose receiver's position is known, prepared for many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat {
-    /// Gain A of the module's documentation: without Upsilon, except for the hop to Rx.
+    /// Gain A of the hop, m^2: with the field's largest Upsilon = E[1/I], or at Rx for the hop to Rx.
     gain: f32,
-    /// (h - h0)^2, m^2.
+    /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest x of the sender, m.
+    /// Smallest x that the sender may take, m.
     end_m: f32,
     to_rx: bool,
 }
 
 impl Retreat {
-    /// Returns the hop from relay `index`, `own`, to a relay at `altitude_m`, or to Rx if that is `None`.
+    /// Returns the hop from relay `index`, `own`, to a relay at `altitude_m`, m; `None` stands for Rx.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb = own.cross_section.altitude_m - altitude_m.unwrap_or(0.0);
         Self {
@@ -63,7 +63,7 @@ impl Retreat {
         }
     }
 
-    /// Returns this hop with a range that reserves no separation for the relays between `index` and Tx.
+    /// Returns this hop without reserving a separation for the relays between `index` and Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -71,7 +71,7 @@ impl Retreat {
         }
     }
 
-    /// Returns the x closest to Tx at which the receiver leaves the sender room, m.
+    /// Returns the receiver's smallest x, m, that leaves the sender its minimum step.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -83,8 +83,8 @@ impl Retreat {
 
     /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], `quiet` Upsilon there over the field's largest,
-    /// above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
+    /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], and `quiet` the ratio of Upsilon
+    /// there to the field's largest, above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {
@@ -112,7 +112,8 @@ impl Retreat {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop that starts closest to Tx of all that end in [`low`, `high`]. `None` if there is none.
+    /// Returns the hop for `target` that starts closest to Tx of all that end from `low` to `high`, m. `None` if
+    /// there is none.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -130,7 +131,7 @@ impl Retreat {
     }
 }
 
-/// Hop as the x of its end and of its start.
+/// Hop as the x of its receiver and the x of its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
     /// x of the receiver, m.
@@ -139,17 +140,18 @@ pub struct Step {
     pub from_m: f32,
 }
 
-/// Interference at the receiver of a hop, by position.
+/// Interference at the receiver of a hop, as a function of the receiver's position.
 #[derive(Clone, Copy, Debug)]
 pub enum HopInterference<'a> {
-    /// Ratio of the receiver's measured Upsilon to the field's largest; the same at every position.
+    /// Ratio of the Upsilon that the receiver measured to the field's largest; the same at every position.
     Evenly(f32),
-    /// Agreed field.
+    /// Agreed field, with receiver noise.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the mission's field with noise, or the receiver's measurement, 1/W. The measurement includes the noise.
+    /// Returns the receiver's measured Upsilon, 1/W, if it is given, and otherwise the mission's field. Both include
+    /// the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -158,7 +160,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the ratio of Upsilon at `x_m` to the field's largest.
+    /// Returns the ratio of Upsilon = E[1/I] at `x_m` to the field's largest.
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
             Self::Evenly(quiet) => quiet,
@@ -167,9 +169,10 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Returns the minimum of `value` over y in [`low`, `high`], with the smallest y for equal values. `value` gets y and its quiet.
-/// It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the root is below the second minus
-/// the first. Work: at most three values for each field point in between that a hop could reach.
+/// Returns the receiver's y in [`low`, `high`] at which `value`, the sender's x, is smallest. The smallest y is taken
+/// for equal values. `value` gets y and `quiet`, the ratio of Upsilon at y to the field's largest. It is y - sqrt(`c`
+/// quiet - q) with q the first of `squares`, or `None` if the square under the root is below the second minus the
+/// first. Work: at most three values for each field point in between that a hop could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

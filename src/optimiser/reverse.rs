@@ -76,23 +76,24 @@ use crate::sir::{Sender, in_noise, square, transmitter_gain};
 /// Maximum squared length of a hop, m^2, so that no term is infinite.
 const MOST_SQUARED: f32 = 1e18;
 
-/// Hop on the way back, without its length.
+/// Hop in the direction from Rx to Tx, without its length.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// A' / r; at Tx `K_tx` / r, m^2.
+    /// Gain A' of the hop over r, the required ratio of backward to forward SIR; for Tx `K_tx` / r, m^2.
     gain: f32,
-    /// True if Tx receives it.
+    /// True if Tx receives this hop, false if a relay does.
     to_tx: bool,
-    /// X, m.
+    /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// (Y - y0)^2 + h0^2, m^2.
+    /// Squared distance of the receiver from the interferer across x, (Y - y0)^2 + h0^2, m^2.
     aside_squared: f32,
-    /// nu, 1/m^2.
+    /// Noise nu, 1/m^2: noise over the interferer's power received at 1 m.
     noise: f32,
 }
 
 impl Back {
-    /// Returns the hop from a relay of `power_w` watts to a relay in the cross-section `to`, or to Tx. `None` without a way back.
+    /// Returns the backward hop from a relay of `power_w` watts to a relay at `to`, or to Tx. `None` for a mission of
+    /// one direction.
     #[inline(never)] // keeps a sweep without a way back small
     pub(super) fn new(
         mission: &Mission,
@@ -119,7 +120,7 @@ impl Back {
         })
     }
 
-    /// Returns the squared length, m^2, at which a hop received at `x_m` has the target 1 on the way back.
+    /// Returns the squared length, m^2, of a hop received at `x_m` whose backward SIR over r is 1.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -128,14 +129,15 @@ impl Back {
         self.gain * in_noise(squared, self.noise)
     }
 
-    /// Returns the maximum length of the hop along x, m, if it is received at `x_m`. `across_squared`, m^2, is its squared length
-    /// across the line. `None` if no length meets the target.
+    /// Returns the maximum length of the backward hop along x, m, if it is received at `x_m`. `across_squared`, m^2,
+    /// is its squared length across the line. `None` if no length meets the target.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns the hop of `target` as seen from its sender on the way back at `x_m`, for [`closest`].
+    /// Returns the backward hop for `target` whose sender is at `x_m`, in the form that [`closest`] needs.
+    /// `across_squared`, m^2, is its squared length across the line.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -149,8 +151,8 @@ impl Back {
         }
     }
 
-    /// Returns the distance in x from the interferer, m, within which a hop of `squared` m^2 is too weak.
-    /// `None` if it is too weak everywhere.
+    /// Returns the distance in x from the interferer, m, within which a receiver misses `target`. `squared` is the
+    /// hop's squared length, m^2. `None` if every receiver misses it.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         let needed = target * squared / self.gain;
         let left = 1.0 - self.noise * needed;
@@ -160,14 +162,14 @@ impl Back {
 
 /// Hop from Rx to the last relay.
 pub(super) struct FromRx {
-    /// The hop as seen from Rx: x is the distance from Rx.
+    /// Hop as seen from Rx: x is the distance from Rx.
     hop: Hop,
     reverse: f32,
     distance_m: f32,
 }
 
 impl FromRx {
-    /// Returns the hop to the last relay, `own`. `None` without a way back.
+    /// Returns the hop from Rx to the last relay, `own`. `None` for a mission of one direction.
     pub(super) fn new(mission: &Mission, own: Station) -> Option<Self> {
         let (reverse, distance_m) = (mission.reverse(), mission.config().distance_m);
         if !(reverse > 0.0) {
@@ -196,7 +198,8 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin of the backward SIR at `x_m` as a fraction of the target, times D, m. It is continuous in the target.
+    /// Returns the margin of Rx's signal at the last relay, at `x_m`: (SIR / required SIR - 1) D, m. It is continuous
+    /// in the target.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -205,8 +208,8 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x, `least_m` to `x_m`, m, at which the last relay hears Rx; `None` if none. It does not at
-    /// `x_m`.
+    /// Returns the largest x from `least_m` to `x_m`, m, at which Rx's signal meets the target. `None` if there is
+    /// none. At `x_m` itself the last relay misses the target.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -215,7 +218,7 @@ impl FromRx {
     }
 }
 
-/// Returns `x_m` - `d`, rounded away from `x_m`.
+/// Returns `x_m` - `d`, rounded so that it is at least `d` from `x_m`.
 pub(super) fn before(x_m: f32, d: f32) -> f32 {
     let place = x_m - d;
     if x_m - place < d {
@@ -225,9 +228,9 @@ pub(super) fn before(x_m: f32, d: f32) -> f32 {
     }
 }
 
-/// Returns the smallest distance, `least` to `most` m, at which `hop` meets the target; `None` if none.
+/// Returns the shortest length from `least` to `most`, m, at which `hop` meets its target, or `None`.
 ///
-/// It does not meet it at `least`.
+/// The hop must not meet the target at `least`.
 pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     if !(hop.ratio <= MOST_RATIO) {
         return None;
@@ -244,7 +247,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the root at which f rises, m; `None` if there is none. It may be before Rx.
+/// Returns the hop length, m, beyond which a noise-free hop meets its target; `None` if there is none. It is the root
+/// of f at which f rises, and may be negative.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -268,7 +272,7 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Returns the smallest met distance of a fine scan.
+    /// Returns the smallest distance at which `hop` meets its target, by a scan in fine steps.
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;
         (0..=20_000_u16)
@@ -318,7 +322,7 @@ mod tests {
         assert!(found > 12, "{found}");
     }
 
-    /// A relay 100 m behind a strong interferer, as seen from Rx, hears Rx only from farther away.
+    /// Tests a relay 100 m behind a strong interferer, as seen from Rx. It receives Rx only from farther away.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -21,21 +21,23 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::{self, Sender};
 
-/// Selection of the targets that the leader tries.
+/// Schedule by which the leader selects the target SIRs of the next sweep.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets per sweep around the interpolated optimum. They end once the optimum is known to the mission's tolerance.
+    /// Sixteen targets per sweep around the interpolated optimum. The search ends once the optimum is known to the
+    /// mission's tolerance.
     #[default]
     Bracketed,
-    /// The paper's schedule: one target per sweep, from the ceiling downward.
+    /// A single target per sweep, from the upper bound downward in equal steps, as in the paper.
     FixedStep {
-        /// Epsilon, linear SIR, above 0. In f64, because it is subtracted up to ten thousand times from one start.
+        /// Step epsilon between two targets, linear SIR, above 0. In f64, because it is subtracted up to ten thousand
+        /// times from one start.
         step: f64,
     },
 }
 
-/// Error: no target above 1e-12 of the ceiling can be met.
+/// Error: the chain meets no target SIR above 1e-12 of its upper bound.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Infeasible;
@@ -50,24 +52,25 @@ impl core::error::Error for Infeasible {}
 
 const HIGHEST: f32 = 1e30;
 
-/// Target relative to the ceiling below which the search gives up.
+/// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of the roots of cubic and line for a smooth slack. It is a fraction of the gap between two targets.
+/// Maximum difference between the cubic's and the line's root at which the interpolation is used. It is a fraction of
+/// the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Minimum reduction of the bracket by a sweep after which the interpolation is used again.
+/// Ratio of the bracket's widths after and before a sweep above which interpolation is not used next.
 const PROGRESS: f32 = 0.25;
 
 /// Number of sweeps after which the search commits the best feasible target found.
 const MOST_SWEEPS: u32 = 48;
 
-/// State of a search: the current bracket and the next ladder.
+/// State of the leader's search for the highest target: the bracket and the next ladder of targets.
 #[derive(Clone, Debug)]
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound by the hop at the leader's end.
+    /// Upper bound of the SIR, linear: that of the hop between the leader and the nearer ground station.
     ceiling: f32,
     /// First target of the fixed-step schedule: the paper's gamma_0.
     start: f32,
@@ -77,13 +80,14 @@ pub struct Search {
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True for plain passes. In the paper's schedule, and after a chain with relays that hold back was refused.
+    /// True for plain passes, in which every relay is at its reach. They are used in the paper's schedule, and after
+    /// a relay refused a position before its reach.
     plain: bool,
     /// Lowest known target that no chain can meet.
     most: Option<f32>,
-    /// Bisection after a relay has refused its required position.
+    /// Bisection of targets after a relay has refused its required position; `None` before.
     trials: Option<StandTrials>,
-    /// True for a mission with a way back.
+    /// True for a mission with traffic in both directions.
     both_ways: bool,
 }
 
@@ -143,18 +147,20 @@ impl Search {
         })
     }
 
-    /// Returns the next ladder.
+    /// Returns the ladder of targets for the next sweep.
     pub const fn ladder(&self) -> &Ladder {
         &self.ladder
     }
 
-    /// Replaces the next ladder by the leader's prediction, for which it expects a commit. If it is plain, all later ones are.
+    /// Replaces the next ladder of targets by the leader's prediction of the one that ends with a commit. If it is
+    /// for a plain pass, all later ones are, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target that no chain can meet, after a pass with these `slacks`. `None` after plain passes only.
+    /// Returns the lowest target that no chain can meet, after a pass with these `slacks` (spare lengths). `None`
+    /// after plain passes only.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if cfg!(feature = "reverse") && self.both_ways {
             // Reaches and held positions of both directions are not proven to exclude no chain.
@@ -168,7 +174,8 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues with the slacks of [`Search::ladder`], m, for as many targets as every hop can meet.
+    /// Continues the search with the slacks (spare lengths, m) of those targets that every hop meets. The targets are
+    /// the first ones of [`Search::ladder`].
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
@@ -265,7 +272,8 @@ impl Search {
     }
 }
 
-/// Returns the bounds of the target, lowered to those of the way back: at Tx, and of relays at Rx.
+/// Returns the bounds `start` and `met` of the target SIR, lowered for traffic from Rx to Tx. The bounds are those of
+/// the hop received at Tx, and of the hop from Rx.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -286,8 +294,9 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target with zero slack, by a cubic of log target in the slack. The cubic passes through the four points about the
-/// sign change. `None` if the cubic and the straight line disagree: the slack jumps there, and neither root is meaningful.
+/// Returns the target at which the slack (spare length) is 0, by cubic interpolation of log target. The cubic passes
+/// through the four points about the sign change. `None` if the cubic and the straight line disagree: the slack jumps
+/// there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -307,7 +316,7 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Returns the value at 0 of the polynomial through `points` (abscissa, value). `None` unless the abscissae fall strictly.
+/// Returns the value at 0 of the polynomial through `points` (x, value). `None` unless their x strictly falls.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {
@@ -322,20 +331,21 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     points.first().map(|point| point.1)
 }
 
-/// Bisection of targets that are proposed to check that all relays can take their required positions.
+/// Bisection of targets that are proposed to the relays. A relay refuses a target if it cannot take its required
+/// position.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest accepted target, and its ladder.
+    /// Highest target that all relays accepted, and its ladder.
     best: Option<(f32, Ladder)>,
     /// True once the best target is final.
     over: bool,
 }
 
 impl Search {
-    /// Returns the target that was due to be committed, if a relay refused its required position.
+    /// Returns the target whose commit a relay prevented by refusing its required position, or `None`.
     ///
-    /// Then `verdict` commits nothing, although its slacks call for a commit.
+    /// `verdict` then commits nothing, although its slacks call for a commit.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
@@ -346,7 +356,7 @@ impl Search {
         targets.get(usize::from(due)).copied()
     }
 
-    /// Records an accepted target; returns true if the search is over.
+    /// Records that all relays accepted `target`; returns true if the search is over.
     pub fn accept(&mut self, target: f32) -> bool {
         let own = Ladder::single(target).plainly(self.plain);
         let Some(trials) = &mut self.trials else {
@@ -358,10 +368,10 @@ impl Search {
         last || self.try_next().is_err() || self.trials.is_some_and(|trials| trials.over)
     }
 
-    /// Continues after `target` was refused.
+    /// Continues after a relay refused its required position for `target`.
     ///
-    /// First a plain pass, in which no relay holds back, finds a target that no relay can refuse. The interval up to the refused
-    /// target is then bisected.
+    /// First a plain pass, in which every relay is at its reach, finds a target that no relay can refuse. The
+    /// interval up to the refused target is then bisected.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.
@@ -391,7 +401,7 @@ impl Search {
         Ok(())
     }
 
-    /// Selects the next target of the bisection. At the end the best one again, if it is not the current one.
+    /// Selects the next target of the bisection. At the end it is the best one again, if that is not the current one.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

@@ -79,17 +79,18 @@ use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Required position of the previous relay of the pass.
+/// Position that a relay requires of the previous relay of the pass, to meet the target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// Reach of that relay; or Tx or Rx, which do not move.
+    /// Previous relay at its reach; or Tx or Rx, which do not move.
     AtReach,
-    /// x, m.
+    /// Previous relay at this x, m.
     At(f32),
 }
 
-/// Maximum ratio of target and gain. Above it no hop is short enough, and below it every term of f is finite.
+/// Maximum ratio of target SIR and gain of a hop. Above it no hop is short enough, and below it every term of f is
+/// finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Hop toward Rx, prepared for evaluation with many targets.
@@ -98,31 +99,32 @@ pub(super) const MOST_RATIO: f32 = 1e18;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
-    /// Interferer's x: X, m.
+    /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// (Y - y)^2 + h^2, m^2.
+    /// Squared distance of the receiver from the interferer across x, (Y - y)^2 + h^2, m^2.
     aside_squared: f32,
-    /// (Y - y0) (Y + y0 - 2y) + h0 (2h - h0), m^2.
+    /// Term (Y - y0) (Y + y0 - 2y) + h0 (2h - h0) of the module's H, m^2. It does not depend on the target.
     base: f32,
-    /// (y - y0)^2 + (h - h0)^2, m^2.
+    /// Squared distance of receiver and sender across x, (y - y0)^2 + (h - h0)^2, m^2.
     across_squared: f32,
-    /// nu = N eta / P, 1/m^2: 0 without noise.
+    /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
     noise: f32,
     least_step: f32,
-    /// True if the sender is Tx, which cannot hold back.
+    /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
     /// Maximum x of the receiver, m.
     end_m: f32,
-    /// Maximum x of the receiver and of its sender that leaves the relays after each their separation, m.
+    /// Maximum x of the receiver, and of its sender, that leaves later relays their separation, m.
     gathered_m: [f32; 2],
-    /// The same hop on the way back; `None` for a chain of one direction.
+    /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,
 }
 
 impl Hop {
-    /// Returns the hop from `sender` to relay `index` at the cross-section `at`.
+    /// Returns the hop from `sender` to relay `index` at the lateral offset and altitude `at`.
     ///
-    /// `spread_squared` is the maximum squared distance across the line between neighbours among the relays after it, m^2.
+    /// `spread_squared` is the maximum squared distance across the line between two neighbours among the relays after
+    /// `index`, m^2.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -148,7 +150,8 @@ impl Hop {
         }
     }
 
-    /// Returns the hop from `sender` to a receiver at `at` without a minimum step, at most to `end_m`. `noise` is nu.
+    /// Returns the hop from `sender` to a receiver at `at`, with no minimum step and an x up to `end_m`. `noise` is
+    /// nu, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -182,7 +185,8 @@ impl Hop {
         }
     }
 
-    /// Returns this hop for a mission with a way back. `power_w` is the power of its receiver, W.
+    /// Returns this hop with its counterpart from Rx to Tx, if the mission has traffic in both directions. `power_w`
+    /// is the power of the relay that receives this hop, W.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {
@@ -191,7 +195,7 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a range that reserves no separation for the relays after `index`.
+    /// Returns this hop without reserving a separation for the relays after `index`.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -225,7 +229,8 @@ impl Hop {
         self.ending(place).onward(target, from_m)
     }
 
-    /// Returns the reach in the direction of Rx alone.
+    /// Returns the largest x at which the receiver meets `target`, m, for traffic toward Rx only. `None` if there is
+    /// none.
     fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -276,11 +281,11 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x at which the receiver meets `target`; `None` if there is none. Its sender is anywhere in [0,
-    /// `from_m`].
+    /// Returns the largest x, m, at which the receiver meets `target` with a sender in [0, `from_m`]. `None` if there
+    /// is none.
     ///
-    /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step before.
-    /// Constant work.
+    /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step
+    /// before. Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self
             .reach(target, from_m)
@@ -291,7 +296,8 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver for a sender up to `from_m`; `place` for the sender there.
+    /// Returns the receiver's largest x, m, for traffic in both directions and a sender up to `from_m`. `place` is
+    /// the largest x for a sender at `from_m`.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -321,7 +327,8 @@ impl Hop {
         low
     }
 
-    /// Returns the largest x up to `near` of the sender for a receiver at `place`, both ways; or `None`.
+    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. The receiver is at
+    /// `place`; `None` if there is no such x.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -374,7 +381,7 @@ impl Hop {
         (self.before(place) >= 0.0).then_some(place)
     }
 
-    /// Returns the largest x of a sender before `place`, m.
+    /// Returns the largest x, m, of a sender that keeps the minimum step before a receiver at `place`.
     fn before(&self, place: f32) -> f32 {
         let from = place - self.least_step;
         if place - from < self.least_step || from >= place {
@@ -384,7 +391,8 @@ impl Hop {
         }
     }
 
-    /// Returns the required position of the sender, with the receiver at `place`. The sender's reach for `target` is `from_m`.
+    /// Returns the required position of the sender if the receiver is at `place`. The sender's reach for `target` is
+    /// `from_m`.
     ///
     /// It is the closest allowed position, which has the best SIR; `None` if there is none.
     pub fn required_position(
@@ -430,8 +438,9 @@ impl Hop {
         })
     }
 
-    /// Returns the reach without a minimum step, as a smooth function of all parameters. `None` if there is none. It is before
-    /// `from_m` if the distance across the line is longer than the hop may be.
+    /// Returns the largest x, m, at which the receiver meets `target`, smooth in all parameters. It has no minimum
+    /// step; `None` if there is none. It is before `from_m` if the distance across the line is longer than the hop
+    /// may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -484,7 +493,8 @@ impl Hop {
 /// Relative rounding error of a hop's SIR at the limit of its target.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns the x `d` beyond `from_m`, rounded toward it. `None` for a hop too short for an f32: two relays never share an x.
+/// Returns the sum `from_m` + `d`, rounded toward `from_m`. `None` for a hop too short for an f32: two relays never
+/// share an x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -500,7 +510,7 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the maximum distance of a relay from the receiver for `target`, m along x. The paper's `d_max`.
+/// Returns the maximum distance along x, m, from which a relay meets `target` at Rx. The paper's `d_max`.
 ///
 /// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited to D, so
 /// that it is smooth in the target for the root search.
@@ -510,23 +520,24 @@ pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
 
-/// Newton steps on a concave interval. Four to eight are usual; near a double root each halves the error.
+/// Maximum number of Newton steps where g is concave. Four to eight are usual; near a double root each halves the
+/// error.
 const STEPS: u8 = 32;
 
-/// Steps on the convex interval; each at least halves it.
+/// Maximum number of steps where g is convex; each at least halves the interval.
 const HALVINGS: u8 = 32;
 
-/// Newton steps to the inflection point; the worst case is exact to an f32 after four.
+/// Number of Newton steps to the inflection point of g; the worst case is exact to an f32 after four.
 const TURNS: u8 = 5;
 
-/// Rounding error of g relative to rho l: a target that is missed by at most this counts as met.
+/// Rounding error of g(d), relative to rho l(d): a target that is missed by at most this counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// Step, relative to d, at which the iteration ends.
+/// Step of the root search, relative to the distance d, at which it ends.
 const CLOSE: f32 = 5e-7;
 
 impl Hop {
-    /// Returns true for a hop without noise and without a way back.
+    /// Returns true for a hop without noise, and with traffic toward Rx only.
     pub(super) fn is_simple(&self) -> bool {
         self.is_silent() && self.back().is_none()
     }
@@ -535,7 +546,8 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns nu, 1/m^2. A constant 0 without the feature `noise` removes the search in noise from the image.
+    /// Returns the noise nu, 1/m^2: the noise over the interferer's power received at 1 m. A constant 0 without the
+    /// feature `noise` removes the search in noise from the image.
     fn nu(&self) -> f32 {
         if cfg!(feature = "noise") {
             self.noise
@@ -544,7 +556,7 @@ impl Hop {
         }
     }
 
-    /// Returns [`Hop::reach`] with noise, which is at most that without it.
+    /// Returns [`Hop::reach`] with noise, which is at most the reach without noise.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;
@@ -574,7 +586,7 @@ impl Hop {
 pub(super) struct NoisyHop {
     /// Ratio rho = gamma / A of target and gain; the symbols are those of the module's documentation.
     pub(super) ratio: f32,
-    /// rho - 1.
+    /// Difference rho - 1, without cancellation.
     pub(super) excess: f32,
     /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
@@ -582,26 +594,27 @@ pub(super) struct NoisyHop {
     pub(super) aside_squared: f32,
     /// Squared distance b^2 of the receiver from the sender at d = 0, m^2.
     pub(super) across_squared: f32,
-    /// a^2 - b^2, without its cancellation, m^2.
+    /// Difference a^2 - b^2 of the receiver's squared distances, without cancellation, m^2.
     pub(super) base: f32,
-    /// nu, 1/m^2, above 0.
+    /// Noise nu, 1/m^2, above 0.
     pub(super) noise: f32,
 }
 
 impl NoisyHop {
-    /// Returns the maximum distance at which the signal exceeds the noise as required, m, at most 1e9. `None` if there is none.
+    /// Returns the maximum hop length along x, m, at which the SNR alone meets the target, at most 1e9. `None` if
+    /// there is none.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns true if the target is met at `d`, by the terms of the SINR.
+    /// Returns true if the target is met with the receiver `d` metres from the sender along x.
     pub(super) fn is_met(&self, d: f32) -> bool {
         let s = square(d - self.ahead) + self.aside_squared;
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns g, g' / 2, and the rounding error of g, at a `d` up to the limit by noise.
+    /// Returns g(d), g'(d) / 2, and the rounding error of g. `d` is at most the limit by the SNR, m.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -622,7 +635,8 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer at which g's curvature changes sign, m. `None` if g is concave.
+    /// Returns the distance from the interferer, m, at which the curvature of g changes its sign. `None` if g is
+    /// concave.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -636,8 +650,8 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// Returns the last d in [`low`, `high`] at which the target is met, m; `None` if there is none. `high` is at most the limit
-    /// by noise. Work: at most 96 evaluations of g, usually five.
+    /// Returns the largest d in [`low`, `high`] at which the target is met, m; `None` if there is none. `high` is at
+    /// most the limit by the SNR. Work: at most 96 evaluations of g, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -667,7 +681,8 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the last root in [`low`, `high`], where g is concave and below 0 at `high` but for rounding.
+    /// Returns the last root of g in [`low`, `high`], where g is concave; `None` if there is none. At `high` g is
+    /// below 0, but for rounding.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -690,7 +705,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the root of g in [`low`, `high`]; g is not negative at `low`, and negative at `high`.
+    /// Returns the root of g in [`low`, `high`], where g is convex. g is not negative at `low`, and negative at
+    /// `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {
@@ -746,9 +762,9 @@ mod tests {
         )
     }
 
-    /// An interferer behind the transmitter makes SIR_1 rise at first.
+    /// Tests the reach with an interferer behind the transmitter, where SIR_1 rises at first.
     ///
-    /// With one 10 m behind, SIR_1 rises from 1.04 above Tx to 1.22 at 45 m.
+    /// With the interferer 10 m behind Tx, SIR_1 rises from 1.04 above Tx to 1.22 at 45 m.
     #[test]
     fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
         // SIR_1 is at least 1.22 from 40.9 m to 50 m.

@@ -45,70 +45,74 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of consistent measurements, relative to the expected variance.
+/// Maximum variance of consistent measurements, relative to the variance that the operator expects.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum reduction of the misfit by an exclusion, in squared standard deviations.
+/// Minimum reduction of the residual by which excluding one relay identifies it as faulty. In squared standard
+/// deviations.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum misfit, and reduction by an exclusion: that of an error of some 15 % at one position.
+/// Minimum residual that starts a search for a faulty relay, and minimum reduction by its exclusion. An error of some
+/// 15 % at one position has this residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of the variances without the second suspect and without the faulty relay.
+/// Minimum ratio of the fits' variances without the second suspect and without the first one. With a smaller ratio
+/// the faulty relay counts as unknown.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of the relative errors of consistent measurements (some 1.5 dB).
+/// Maximum variance of the relative errors for measurements to count as consistent (some 1.5 dB).
 const OF_ONE_MIND: f64 = 0.1;
 
-/// Number of sensing passes from a failed trial to the next trial.
+/// Number of sensing passes after a failed search for the faulty relay before the next search.
 const REST: u8 = 4;
 
-/// Maximum squared difference at which an excluded relay fits again. In squared standard deviations, and absolutely.
+/// Limits of the difference at which an excluded relay fits the others again. The first is a multiple of the
+/// variance, the second a squared relative difference; the larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays for an identification. With four, an exclusion leaves three, and three unknowns fit any three
-/// measurements.
+/// Minimum number of relays to identify a faulty one. With four, an exclusion leaves three, and three unknowns fit
+/// any three measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum [`Sums::count`] of positions, after fading. With fewer, no faulty relay can be identified.
+/// Minimum number of measured positions ([`Sums::count`]), after fading, to identify a faulty relay.
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight to the weight of one position. Smaller weights are lost in the rounding of the sums.
+/// Maximum ratio of the mean weight to the weight of one position. The rounding of the sums hides smaller weights.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Usual,
-    /// Trial without this node.
+    /// Sensing pass without this node, to find out if the others' measurements are consistent.
     Trying(u16),
-    /// Notice that this node is excluded; `true` for the second one.
+    /// Sensing pass that tells this node that it is excluded; `true` for the second such pass.
     Telling(u16, bool),
 }
 
-/// Leader's search for the faulty relay.
+/// State of the leader's search for the relay with faulty measurements.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial {
     stage: Stage,
-    /// Passes until the next trial may start.
+    /// Number of sensing passes until the next search may start.
     rest: u8,
-    /// Node without which the other nodes' measurements fit best.
+    /// Node without which the other nodes' measurements fit best so far.
     best: u16,
-    /// Residual of the fit to all relays.
+    /// Residual of the fit to the measurements of all relays.
     seen: f32,
-    /// Residual of the fit without the node `best`.
+    /// Residual of the fit to the measurements without the node `best`.
     seen_best: f32,
-    /// Variance of the fit without the node `best`.
+    /// Variance of the fit to the measurements without the node `best`.
     least: f32,
-    /// Second smallest variance of the fits without one node.
+    /// Second smallest variance of the fits to the measurements without one node.
     second: f32,
 }
 
-/// Use of a pass in the search for a faulty relay.
+/// Use of a sensing pass's result during the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
-    /// Take the pass's result as the estimate.
+    /// Use the result of the pass for the interference estimate.
     Review,
-    /// Take the result although the measurements are inconsistent: the faulty relay is unknown.
+    /// Use the result of the pass although the measurements are inconsistent: the faulty relay is unknown.
     Unknown,
     /// Discard the result of this pass, and start another sensing pass soon.
     Again,
@@ -125,7 +129,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// Node excluded from the next pass, 0 for none.
+    /// Node whose measurements the next sensing pass excludes, 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Usual => 0,
@@ -133,7 +137,8 @@ impl Trial {
         }
     }
 
-    /// Evaluates the `sums` of a pass. The view has `relays` relays, whose node numbers are within 1 to `nodes`.
+    /// Evaluates the `sums` of a sensing pass in the search for a faulty relay. The view has `relays` relays, whose
+    /// node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -221,12 +226,12 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor between measurement and estimate above which a relay checks itself. Its weight is then so small that a trial would not
-/// find it, and it does not disturb the others.
+/// Factor between measurement and estimate above which a relay checks its own measurement. Its weight is then so
+/// small that the leader's search would not find it, and it does not disturb the others.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd. It is compared with the estimate `expected` and with the sums of all
-/// `others`.
+/// Returns true if the measurement at `place` is absurd: far off the estimate and off the other relays. `expected` is
+/// the estimate there, and `others` has the sums of the other relays' measurements.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -246,10 +251,11 @@ pub(crate) fn is_absurd(
         && Fit::of(others, relative_error).is_ok_and(of_one_mind)
 }
 
-/// Returns true if the measurement of an excluded relay still does not fit the others.
+/// Returns true if the measurement of an excluded relay still does not fit the other relays.
 ///
-/// The measured v at `place` is compared with e, the fit to the sums of all `others` there. Their difference is (v / e - e / v) /
-/// 2, which is symmetric in both. `expected` is v by the current estimate; it sets the measurement's weight.
+/// The measured v = 1e-12 W / I at `place` is compared with e, the fit to the sums of all `others` there. Their
+/// difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the current estimate; it sets
+/// the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -271,9 +277,10 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay without a measurable signal should receive several times the noise.
+/// Returns true if a relay that measures nothing should receive several times its noise `noise_w`, W.
 ///
-/// The other relays' repeated measurements show that.
+/// The other relays' repeated measurements, whose sums are `others`, show that. `there` has the terms of the relay's
+/// position.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -299,13 +306,15 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Minimum squared difference of an end that does not fit. In squared standard deviations, and absolutely (a factor of 1.5).
+/// Limits of the difference above which the level measured at Tx or Rx does not fit. The first is a multiple of the
+/// variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
-/// Minimum number of relays; with fewer and two ends, the faulty one is unknown.
+/// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
+/// faulty.
 const FEWEST_FOR_ENDS: u16 = 3;
 
-/// Ratio of a ground end's level to the expected level, and the ratio's relative variance.
+/// Ratio of the level measured at Tx or Rx to the expected level, and its relative variance.
 #[derive(Clone, Copy, Debug)]
 struct EndLevel {
     ratio: f64,
@@ -318,15 +327,16 @@ impl EndLevel {
     }
 }
 
-/// Returns v (see [`UNIT_W`]) of a ground end with `level`, by the mission's path loss over the ground.
+/// Returns v = [`UNIT_W`] / I, as a drone would measure it, from the `level` measured at Tx or Rx. It uses the
+/// mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Compares the levels of the ground ends with `fit`; returns the ends that do not fit.
+/// Compares the levels measured at Tx and Rx with `fit`; returns which of the two do not fit.
 ///
-/// `fit` is that of the relays' measurements.
+/// `fit` is the fit to the relays' measurements.
 pub(super) fn judge_ends(
     mission: &Mission,
     fit: &Fit,

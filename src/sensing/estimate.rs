@@ -23,26 +23,29 @@ use crate::place::Placement;
 use crate::sensing::Listen;
 use crate::time::{Duration, Instant};
 
-/// Interference estimate of the chain.
+/// Estimate of the interference that all relays of the chain use.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum InterferenceEstimate {
-    /// Interference of the mission.
+    /// Interference as the mission configures it.
     #[default]
     Mission,
     /// Unknown interference; the relays spread along the line to measure.
     Unknown(Spread),
-    /// Single source.
+    /// Single interfering transmitter on the ground.
     Source {
-        /// Position and power of the source.
+        /// Estimated position and power of the interfering transmitter.
         source: Interferer,
-        /// Interference power at the receiver, W. 0 if it has not measured: then the source's path loss over the ground is used.
+        /// Interference power at the ground receiver, W. 0 if it has not measured: then the source's path loss over
+        /// the ground is used.
         receiver_w: f32,
     },
 }
 
 impl InterferenceEstimate {
-    /// Returns `mission` with this interference, or with `own` if the estimate refers to the mission.
+    /// Returns `mission` with this interference estimate.
+    ///
+    /// `own` is the mission's own interference, for the estimate [`Mission`](Self::Mission).
     ///
     /// # Errors
     /// [`MissionError`] if the estimated interference is out of range.
@@ -63,16 +66,16 @@ impl InterferenceEstimate {
     }
 }
 
-/// Spacing of relays without an estimate.
+/// Spacing of the relays while the interferer is unknown.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Spread {
-    /// Equal hops.
+    /// Equal length of all hops.
     #[default]
     Even,
-    /// First hop half as long as the other hops.
+    /// First hop, from Tx, half as long as the other hops.
     TowardTx,
-    /// Last hop half as long as the other hops.
+    /// Last hop, to Rx, half as long as the other hops.
     TowardRx,
 }
 
@@ -86,57 +89,62 @@ impl Spread {
     }
 }
 
-/// Estimate with its sequence number, which the leader increments and which wraps.
+/// Interference estimate with its sequence number, which the leader increments and which wraps.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NumberedEstimate {
-    /// Sequence number, 0 for the initial estimate.
+    /// Sequence number of the estimate, 0 for the initial one.
     pub number: u16,
     /// Interference estimate.
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change that is not worth an agreement, even with more information.
+/// Difference of two estimates up to which the newer one is never worth an agreement. It is a mean square relative
+/// difference.
 const WORTH: f64 = 1e-5;
 
-/// Mean square relative change that counts as a change of the interference.
+/// Difference of two estimates above which the interference may have changed. It is a mean square relative
+/// difference.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of a change to the expected variance, for a stationary and for a moving interferer.
+/// Minimum ratio of a change of the interference to its variance, without a moving interferer. The next constant is
+/// the ratio for a moving one.
 const BEYOND_CHANCE: f64 = 8.0;
 const FOLLOWED: f64 = 1.5;
 
-/// Ratio above which a settled chain assumes another interferer and starts the estimation again.
+/// Minimum ratio of a change to its variance once a chain has settled: there is another interferer. The estimation
+/// then starts again.
 const ANOTHER: f64 = 64.0;
 
-/// `CHANGE` for the receiver's own measurement.
+/// Squared relative change of the level measured at Rx that counts as a change of the interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of the track from the fit, relative to the expected variance.
+/// Maximum squared deviation of a moving interferer's track from the fit, over the fit's variance.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth of the information for a refinement, and maximum number of refinements. A chain has then settled and stops
-/// sending new estimates of a stationary interferer.
+/// Minimum growth of the information for a refined estimate. The next constant is the maximum number of refinements:
+/// then a chain has settled and sends no new estimates of a stationary interferer.
 const LEARNED: f64 = 1.1;
 const REFINED: u8 = 4;
 
-/// Time in which drones follow by a few metres.
+/// Time in which drones fly a few metres to new positions. The prediction of a moving interferer includes it.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Mean square relative error above which the measurements contradict an estimate.
+/// Mean square relative error above which the measurements contradict an estimated source.
 const CONTRADICTED: f64 = 0.25;
 
-/// Contradiction limit for the mission's interference, relative to the variance of a measurement.
+/// Mean square error, over a measurement's variance, that contradicts the mission's interference.
 const GUESSED: f64 = 16.0;
 
-/// Information at the time at which an estimate was adopted.
+/// Quality of the current estimate at the time of its adoption, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Number of positions over the variance of one.
+    /// Information of the measurements: number of measured positions over the variance of one.
     information: f64,
     /// Expected mean square relative error of the estimate.
     chance: f64,
-    /// Number of refinements for the same interferer. For a moving interferer, only refinements by more information.
+    /// Number of times that the estimate was refined for the same interferer. For a moving interferer, only
+    /// refinements by more information count.
     refined: u8,
     track: Track,
 }
@@ -159,8 +167,9 @@ pub(crate) struct Review {
     pub(crate) ends: EndsOff,
 }
 
-/// Reviews the estimate `estimate` with the chain's `sums` and the `levels` of its ends. `mission` is based on `estimate`. `before` is
-/// the information when `estimate` was adopted.
+/// Decides if a new estimate replaces the current `estimate`. `mission` is based on the current one. `sums` has the
+/// relays' measurements, and `levels` those of transmitter and receiver. `before` is the information when `estimate`
+/// was adopted.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -256,7 +265,8 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit of all measurements and its source; `levels` of ends that do not fit are cleared.
+/// Returns the fit to all measurements, and its source. The `levels` of transmitter or receiver are cleared if they
+/// do not fit.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -283,7 +293,8 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns the position of a moving interferer when the drones will have moved. `heard` is the mean time of the measurements.
+/// Returns a moving interferer at the position where it will be when the drones have moved. `None` if it does not
+/// move. `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -306,8 +317,8 @@ fn followed(
     None
 }
 
-/// Returns the fit with the end at `x_m` as an additional position, if its level fits the others. Only then does the path loss
-/// over the ground agree with the mission's.
+/// Returns `fit` with the measurement of Tx or Rx, at `x_m`, added if its level fits the others. Only then does the
+/// path loss over the ground agree with the mission's.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -339,8 +350,8 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at the receiver, W; 0 without a measurement. It is the mean of the receiver's level and the
-/// source's power over the ground, if the two agree, weighted by their variances.
+/// Returns the interference power at the ground receiver Rx, W; 0 without a measurement. It is the mean of the level
+/// that Rx measures and of the source's power over the ground, if the two agree, weighted by their variances.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -410,16 +421,16 @@ fn at_a_loss(
     }
 }
 
-/// Initial standard deviation of the velocity, m/s.
+/// Initial standard deviation of the interferer's velocity along one axis, m/s.
 const SPEED: f32 = 10.0;
 
-/// Minimum squared velocity of a moving interferer, relative to its variance.
+/// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Squared deviation, relative to the variance, from which on a fit belongs to another interferer.
+/// Minimum squared deviation, relative to its variance, of a fit that belongs to another interferer.
 const ELSEWHERE: f32 = 49.0;
 
-/// Position and velocity along one axis, m and m/s, and their covariance.
+/// Kalman filter along one axis: the interferer's position, m, and velocity, m/s, with covariance.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     at: f32,
@@ -436,7 +447,7 @@ impl Axis {
         }
     }
 
-    /// Predicts the state `seconds` later; the velocity's variance grows by `walk` m^2/s^3.
+    /// Predicts the state `seconds` later. The variance of the velocity grows by `walk` per second, in m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
         let [at, both, speed] = &mut self.variance;
@@ -445,7 +456,7 @@ impl Axis {
         *speed += walk * seconds;
     }
 
-    /// Updates the state with a position of the given variance.
+    /// Updates the state with the position `found`, m, which has the variance `variance`, m^2.
     fn take(&mut self, found: f32, variance: f32) {
         let [at, both, speed] = self.variance;
         let sum = at + variance;
@@ -480,7 +491,7 @@ impl Axis {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Track {
     axes: [Axis; 2],
-    /// Time of the state; `None` before the first fit.
+    /// Time to which position and velocity refer; `None` before the first fit.
     at: Option<Instant>,
 }
 
@@ -490,7 +501,8 @@ impl Track {
         at: None,
     };
 
-    /// Updates the track with a fit of measurements at `at`, with this half-life.
+    /// Updates the track with a source found from measurements with the mean time `at`. `half_life` is that of the
+    /// measurements' weight.
     pub(crate) fn update(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]
@@ -517,7 +529,8 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the last and the predicted position at `then`, m along the line and to its right. `None` while it does not move.
+    /// Returns the last position and the predicted one at `then`, (x, y) in m. `None` while the interferer does not
+    /// move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;

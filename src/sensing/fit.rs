@@ -13,52 +13,54 @@
 use super::sums::{Sums, Terms, coefficients, expected_v, strength, value};
 use crate::mission::{Interferer, Mission};
 
-/// Reason why the measurements give no source.
+/// Reason why the measurements give no single source of interference.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Unfit {
-    /// Number or distance of positions too small to extrapolate.
+    /// Measured positions too few or too close together to extrapolate from them.
     Places,
     /// The measurements fit no single source on the ground.
     NoSource,
-    /// The measurements are inconsistent, and the faulty one is unknown. With four relays or fewer, with more than one faulty
-    /// relay, or if the path loss between the interferer and an end differs from the mission's.
+    /// The measurements are inconsistent, and the faulty one is unknown. This happens with four relays or fewer, with
+    /// more than one faulty relay, or if the path loss between the interferer and Tx or Rx differs from the
+    /// mission's.
     Contradiction,
 }
 
 /// Weight of the operator's expected error in the fit's variance, as a number of measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of the positions' t (2 y / D) that tells the two sides of the line apart.
+/// Minimum variance of the measured positions' t (2 y / D) to tell the two sides of the line apart.
 const SIDES: f64 = 2.5e-5;
 
-/// Estimated source.
+/// Source of interference estimated from the measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FoundSource {
-    /// Position and power.
+    /// Position and power of the source.
     pub source: Interferer,
-    /// Variance of the position along the line and to its right, m^2.
+    /// Variance of the source's x and y, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source; otherwise `source` fits best, and `variance_m2` is 0.
+    /// True if the measurements fit a single source; otherwise `source` is the closest one. `variance_m2` is 0 then.
     pub is_one: bool,
 }
 
-/// L D L^T factors in the order of the terms: L below its diagonal, and D.
+/// Factors L D L^T of the fit's symmetric 4 x 4 matrix: L below its diagonal, and D.
 #[derive(Clone, Copy, Debug)]
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the system is solved for all unknowns; false if the last unknown is left out.
+    /// True if the system is solved for all four unknowns; false if the last unknown is left out.
     whole: bool,
 }
 
-/// Minimum pivot relative to the first: seven digits of an f32, for sums of some hundred positions.
+/// Minimum pivot of the factorisation, relative to the first: seven digits of an f32. That suffices for sums of some
+/// hundred positions.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
-    /// Factors the products of [`Sums`]; `None` if the first three unknowns cannot be separated. The last
+    /// Factorises the matrix of products in [`Sums`]. `None` if it cannot separate the first three unknowns. The last
     /// unknown is omitted if its pivot is not above `least`.
     fn new(products: [f64; 10], least: f64) -> Option<Self> {
         let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd] = products;
@@ -108,13 +110,13 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the last unknown: the inverse of its variance, in units of that of one position.
+    /// Pivot of the last unknown: the inverse of its variance, in units of one position's variance.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last
     }
 
-    /// Returns r^T G^-1 r: the variance of the fit at the terms r, in units of that of one position.
+    /// Returns r^T G^-1 r: the variance of the fit at the `terms` r, in units of one position's variance.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -123,25 +125,25 @@ impl Factor {
     }
 }
 
-/// Fit of the four coefficients.
+/// Least-squares fit of the four coefficients that describe a source to the measurements.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     coefficients: [f64; 4],
     products: [f64; 10],
     right: [f64; 4],
     factor: Factor,
-    /// Variance of the relative error of one position.
+    /// Estimated variance of the relative error of one measured position.
     variance: f64,
-    /// Expected value of `variance`.
+    /// Variance of one position's relative error that the operator expects.
     expected: f64,
-    /// Residual of the sums, and the number of positions beyond the unknowns.
+    /// Residual of the fit. The next field is the number of measured positions beyond the number of unknowns.
     seen: f64,
     beyond: f64,
     count: f64,
 }
 
 impl Fit {
-    /// Fits `sums`, with an expected relative error per position of `relative_error`.
+    /// Fits a source to `sums`; `relative_error` is the expected relative error of one measurement.
     ///
     /// About 6 000 instructions on a Cortex-M4F, in software f64.
     ///
@@ -201,7 +203,8 @@ impl Fit {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "checked")]
-    /// Returns the most likely power of a source at this position, W: k = m g / (g G g), as in `nearest`.
+    /// Returns the most likely power of a source at (`x_m`, `y_m`), W; `None` outside of 1e-6 to 1e9 W. With k = m g
+    /// / (g G g), as in `nearest`.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {
             power_w: mission.config().common.power_w,
@@ -216,7 +219,7 @@ impl Fit {
         (1e-6..=1e9).contains(&power_w).then_some(power_w)
     }
 
-    /// Returns the relative variance of [`Fit::value`].
+    /// Returns the variance of [`Fit::value`] at a position with these `terms`, relative to its square.
     pub(crate) fn relative_variance(&self, terms: &Terms) -> f64 {
         let heard = self.value(terms);
         self.variance * self.factor.variance(terms.map(f64::from)) / (heard * heard)
@@ -230,29 +233,31 @@ impl Fit {
         self.expected
     }
 
-    /// Residual: the sum of the squared relative errors of all positions.
+    /// Residual of the fit: the sum of the squared relative errors of all measured positions.
     pub(crate) const fn seen(&self) -> f64 {
         self.seen
     }
 
-    /// Returns true if there are more positions than unknowns, and their errors are as small as expected.
+    /// Returns true if the fit has more positions than unknowns, and their errors are as small as expected.
     pub(crate) fn is_of_one_mind(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Information of the sums: number of positions over the variance of one.
+    /// Information of the measurements: number of measured positions over the variance of one.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }
 
-    /// Returns the mean square relative difference of two sets of coefficients over the fitted positions.
+    /// Returns the mean square relative difference of two sources at the fitted positions. Each source is given by
+    /// its four coefficients.
     pub(crate) fn off(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference of `others` from the fit.
+    /// Returns the mean square relative difference between the fit and the source `others`. That source is given by
+    /// its four coefficients.
     pub(crate) fn off_by(&self, others: &[f64; 4]) -> f64 {
         self.off(&self.coefficients, others)
     }
@@ -263,7 +268,7 @@ impl Fit {
         unknowns * self.variance / self.count
     }
 
-    /// Returns the source.
+    /// Returns the source of interference that fits the measurements, or the closest one.
     ///
     /// `side_m` selects its side of the line if the positions do not determine it.
     ///
@@ -328,7 +333,7 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative residual of `sums` for these coefficients.
+/// Returns the mean square relative residual of `sums` for a source with these `coefficients`.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [
         aa,
@@ -364,7 +369,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns v of the mission's source by terms. `None` without a known source, or outside of the measurable range.
+/// Returns a function from a position's terms to v = 1e-12 W / I of the mission's interferer. It gives `None` without
+/// a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -372,20 +378,22 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the area searched for sources, in units of D / 2. It reaches D before Tx and beyond Rx, and 1.5 D to each side.
+/// Half width of the area searched for a source, in units of D / 2. It reaches D before Tx and beyond Rx, and 1.5 D
+/// to each side.
 const FARTHEST: f32 = 3.0;
 
-/// Grid steps from the middle to the edge of the first grid.
+/// Grid steps from the middle to the edge of the first grid of the search for a source.
 const COARSE: i8 = 8;
 
-/// Grid steps from the middle to the edge of each finer grid.
+/// Grid steps from the middle to the edge of each finer grid of the search for a source.
 const FINE: i8 = 2;
 
-/// Number of finer grids; the steps of each are 0.4 times the steps of the previous grid.
+/// Number of finer grids in the search for a source. The steps of each are 0.4 times those of the previous grid.
 const FINER: u8 = 5;
 
-/// Returns X', Y' and k of the best-fitting source on one side of the line of positions. `None` if none fits. `sign` is 1 or -1
-/// for the side of `side`. 414 positions, some 16 000 instructions on a Cortex-M4F.
+/// Returns X', Y' and k of the best-fitting source, by a search on grids; `None` if none fits. The search covers the
+/// side of the line of positions that `sign` selects, 1 or -1; `side` is the Y' of that line. 414 positions, some 16
+/// 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

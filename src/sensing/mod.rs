@@ -39,7 +39,7 @@ pub use fit::Unfit;
 
 use crate::time::Duration;
 
-/// Estimation of an unknown interferer from the relays' measurements.
+/// Settings for the estimation of an unknown interferer from the relays' measurements.
 ///
 /// ```
 /// use uav_relay::{Listen, Settings};
@@ -63,7 +63,8 @@ pub struct Listen {
 }
 
 impl Default for Listen {
-    /// Every 5 s, half-life 60 s, error 3 % (a thousand samples).
+    /// Returns settings for a stationary interferer: every 5 s, half-life 60 s, error 3 %. The error is that of a
+    /// thousand samples.
     fn default() -> Self {
         Self {
             every: Duration::from_millis(5_000),
@@ -74,7 +75,7 @@ impl Default for Listen {
 }
 
 impl Listen {
-    /// Returns settings for a moving interferer: every second, with a half-life of 0.1 s + 16 s / `relays`.
+    /// Returns settings for a moving interferer: every second, half-life 0.1 s + 16 s / `relays`.
     pub const fn following(relays: u16) -> Self {
         let relays = if relays > 0 { relays as u64 } else { 1 };
         Self {
@@ -89,7 +90,7 @@ impl Listen {
         self.half_life.as_micros() / 10 >= self.every.as_micros()
     }
 
-    /// Returns true if all values are within their ranges.
+    /// Returns true if interval, half-life and relative error are within their allowed ranges.
     pub fn is_valid(&self) -> bool {
         let timed = self.every.as_micros() > 0 && self.half_life.as_micros() > 0;
         timed && (1e-3..=1.0).contains(&self.relative_error)

@@ -10,26 +10,27 @@ use crate::root::sqrt;
 use crate::sir::square;
 use crate::time::{Duration, Instant};
 
-/// Measurable range of interference, W, without the receiver's noise.
+/// Range of measurable interference power, W, without the receiver's noise.
 ///
-/// The square of a value and of the ratio of any two is finite in the units of [`sensing`](crate::sensing); others are rejected.
+/// Powers outside of the range are rejected. Within it, the square of a value, and of the ratio of any two, is finite
+/// in the units of [`sensing`](crate::sensing).
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
-/// Interference level at an end.
+/// Interference level measured at Tx or at Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Level {
     /// Mean interference, W; 0 without a measurement.
     pub power_w: f32,
-    /// Number of measurements, after fading.
+    /// Number of measurements in the mean; older ones count less.
     pub count: f32,
 }
 
-/// Ends whose measurements do not fit.
+/// Ends of the chain, Tx and Rx, whose measurements do not fit those of the relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// True if the two ends' measurements contradict each other, so that the faulty end is unknown.
+    /// True if the measurements of Tx and Rx contradict each other, so that the faulty one is unknown.
     pub(crate) unknown: bool,
 }
 
@@ -41,7 +42,8 @@ impl EndsOff {
     };
 }
 
-/// Levels of both ends, and the ends that did not fit before.
+/// Interference levels measured at Tx and Rx, and which of them did not fit before. They are compared with the
+/// relays' measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
     pub(crate) transmitter: Level,
@@ -59,33 +61,35 @@ impl Level {
     }
 }
 
-/// Returns true if `power_w` is a valid level, W; 0 means no measurement.
+/// Returns true if `power_w` is a valid interference level, W; 0 means no measurement.
 pub(crate) fn is_power(power_w: f32) -> bool {
     power_w.to_bits() == 0 || is_level(power_w)
 }
 
-/// Returns true if `power_w` is in the measurable range, W.
+/// Returns true if `power_w` is in the measurable range of interference, W.
 pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Terms 1, u, u^2 - 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D and z = 2 h / D.
+/// Terms 1, u, u^2 - 1/3 + t^2 + z^2 and t of a position; u = 2 x / D - 1, t = 2 y / D, z = 2 h / D. The inverse
+/// interference is a linear combination of them.
 pub(crate) type Terms = [f32; 4];
 
-/// Returns the terms at a position, for a line of `distance_m`.
+/// Returns the four terms of the position `at`, for a distance `distance_m` from Tx to Rx.
 pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     let half = 0.5 * distance_m;
     let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Interference of v = 1, W. The middle of the measurable range, so that no square of a v leaves an f32.
+/// Unit of interference power, W: v = 1e-12 W / I. It is the middle of the measurable range, so that no square of a v
+/// leaves an f32.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
-/// Range of v for the measurable range, [`MEASURED_W`].
+/// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
 const V: (f32, f32) = (1e-18, 1e18);
 
-/// Converts an expected v to f32; `None` outside of the measurable range.
+/// Converts an expected v = 1e-12 W / I to f32; `None` outside of the measurable range.
 pub(crate) fn expected_v(v: f64) -> Option<f32> {
     let (least, most) = (f64::from(V.0), f64::from(V.1));
     #[expect(
@@ -95,14 +99,16 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Returns k = eta D^2 [`UNIT_W`] / (4 P) of a source of `power_w`; its own inverse: the power for k.
+/// Returns k = eta D^2 [`UNIT_W`] / (4 P) of a source of P = `power_w` watts; for k it returns P. The function is its
+/// own inverse.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
     0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
-/// Returns the coefficients of `source`: k (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
+/// Returns the coefficients of `source`, by which the terms of a position give v = 1e-12 W / I there. They are k
+/// (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -125,21 +131,23 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Length of [`Sums`]. Products of the terms, terms times v, v squared, number of positions, of measurements, and their age.
+/// Number of sums in [`Sums`]. They are products of terms, terms times v, v squared, number of positions, number of
+/// measurements, and age.
 pub const SUMS: usize = 18;
 
-/// Weighted sums over positions.
+/// Weighted sums over the measured positions, from which the interferer is estimated.
 ///
-/// For each position: w a b for every two of the four terms, w a v, w v^2, its share, its number of measurements, and its share
-/// times its age in seconds. w is 2 (v / e)^(1/2) / (v^2 + e^2) with v measured and e expected. It is 1 / e^2 if both agree, and
-/// gives errors that are equal in decibels equal weights, and no position more than all the others.
+/// For each position: w a b for every two of the four terms, w a v, w v^2, its share, its number of measurements, and
+/// its share times its age in seconds. w is 2 (v / e)^(1/2) / (v^2 + e^2) with v measured and e expected. It is 1 /
+/// e^2 if both agree, and gives errors that are equal in decibels equal weights, and no position more than all the
+/// others.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sums {
     pub(crate) numbers: [f32; SUMS],
 }
 
-/// Limit of a sum, so that it stays finite. No measurement within 2 D of the line comes near it.
+/// Limit of each sum, so that it stays finite. No measurement within 2 D of the line comes near it.
 const MOST: f32 = 1e38;
 
 fn within(sum: f32) -> f32 {
@@ -152,8 +160,8 @@ impl Sums {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a position with its `terms`, measured v and `expected` v, both above 0. It counts `share`, with `measured`
-    /// measurements. At most 60 instructions.
+    /// Adds a measured position with its `terms`, the measured `v` and the `expected` v, both above 0. Its weight is
+    /// multiplied by `share`, and it stands for `measured` measurements. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
@@ -189,7 +197,7 @@ impl Sums {
         }
     }
 
-    /// Ages the sums by `seconds` and multiplies their weight by `share`.
+    /// Ages the sums by `seconds` and multiplies their weight by the factor `share`.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
         *age += *count * seconds;
@@ -198,13 +206,13 @@ impl Sums {
         }
     }
 
-    /// Number of positions, after fading.
+    /// Number of measured positions in the sums; older ones count less.
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count
     }
 
-    /// Mean number of measurements per position.
+    /// Mean number of measurements per measured position.
     pub(crate) fn measured(&self) -> f32 {
         let [.., count, measured, _] = self.numbers;
         if count > 0.0 { measured / count } else { 0.0 }
@@ -215,7 +223,7 @@ impl Sums {
         weight
     }
 
-    /// Mean age, s.
+    /// Mean age of the measurements, s.
     pub fn age_s(&self) -> f32 {
         let [.., count, _, age] = self.numbers;
         if count > 0.0 { age / count } else { 0.0 }
@@ -243,18 +251,18 @@ impl Sums {
 /// Minimum distance between two positions that count as different, as a fraction of D.
 const APART: f32 = 1.0 / 200.0;
 
-/// Measurements of one relay. 120 bytes.
+/// Measurements of one relay: the mean at its position, and the sums of earlier positions. 120 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Listener {
     half_life: Duration,
     past: Sums,
     faded: Instant,
-    /// Current position of the relay, and the average there, in units of `UNIT_W`.
+    /// Current position of the relay. The next field is the mean interference measured there, in units of `UNIT_W`.
     at: Placement,
     heard: Average,
 }
 
-/// Current position of a listener and its measurement.
+/// Terms of a relay's current position, and v = 1e-12 W / I measured there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,
@@ -276,7 +284,8 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measurement `heard` above 0 at `at`; `expected` returns v of the estimate by terms.
+    /// Adds a measured power `heard`, in units of [`UNIT_W`], above 0, at the position `at`. `expected` returns v of
+    /// the current estimate for the terms of a position.
     pub(crate) fn add(
         &mut self,
         now: Instant,
@@ -308,7 +317,8 @@ impl Listener {
         })
     }
 
-    /// Returns the sums of all measurements as of `now`.
+    /// Returns the sums of all measurements, faded and aged to `now`. `expected` returns v of the current estimate
+    /// for the terms of a position.
     pub(crate) fn sums(
         &self,
         now: Instant,
@@ -333,25 +343,25 @@ impl Listener {
         sums.fade(left(age, self.half_life), seconds);
     }
 
-    /// Discards the measurements at earlier positions.
+    /// Discards the sums of measurements at earlier positions.
     pub(crate) const fn forget_past(&mut self) {
         self.past = Sums::NONE;
     }
 }
 
-/// Returns the fraction that remains after `age`.
+/// Returns the fraction of a measurement's weight that remains after `age`.
 pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
     libm::exp2f(-(age.as_micros() as f32 / half_life.as_micros() as f32))
 }
 
-/// Exponentially weighted mean of measurements, with a half-life.
+/// Exponentially weighted mean of measurements, whose weight halves in each half-life.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Average {
     /// Mean; 0 without a measurement.
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,
-    /// Mean age of the measurements at `last`, s.
+    /// Mean age of the measurements at the time `last`, s.
     pub(crate) behind_s: f32,
 }
 

@@ -6,26 +6,27 @@
 
 use super::blake2s::mac;
 
-/// Length of a tag, bytes.
+/// Length of a frame's authentication tag, bytes.
 pub const TAG: usize = 8;
 
-/// True with the feature `auth`; without it no node has credentials and no frame has a tag.
+/// True with the feature `auth`, authentication of frames; without it no frame has a tag.
 pub(crate) const AUTH: bool = cfg!(feature = "auth");
 
-/// Room for a tag in a frame, bytes; 0 without the feature `auth`.
+/// Number of bytes reserved in a frame for an authentication tag; 0 without the feature `auth`.
 pub(crate) const TAG_ROOM: usize = if AUTH { TAG } else { 0 };
 
-/// Secret key that the members of a network share.
+/// Secret key that the nodes of a network share, for the authentication of frames.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key([u8; 32]);
 
 impl Key {
-    /// Creates a key of 256 random bits. Do not use a password.
+    /// Creates a key from `bytes`, 256 random bits. Do not use a password.
     pub const fn new(bytes: [u8; 32]) -> Self {
         Self(bytes)
     }
 
-    /// Returns the tag of `signed` for the nonces of its sender and its receiver. `signed` is the header and body of a frame.
+    /// Returns the authentication tag of `signed`, the header and body of a frame. `sender` and `receiver` are the
+    /// nonces of the frame's sender and receiver.
     ///
     /// Work: two to five blocks of BLAKE2s.
     pub fn tag(&self, sender: u64, receiver: u64, signed: &[u8]) -> [u8; TAG] {
@@ -35,7 +36,7 @@ impl Key {
 }
 
 impl core::fmt::Debug for Key {
-    /// Omits the bytes, since keys must not appear in logs.
+    /// Formats the key without its bytes, since keys must not appear in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Key(..)")
     }
@@ -76,7 +77,8 @@ impl Auth {
     }
 }
 
-/// Credentials; uninhabited without the feature `auth`, so that the compiler drops all that signs.
+/// Credentials of a relay. The type is uninhabited without the feature `auth`, so that the compiler drops all code
+/// that signs.
 #[cfg(not(feature = "auth"))]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -89,11 +91,12 @@ impl Auth {
     }
 }
 
-/// Nonces of the two ends of a link. An epoch, and below it a link number that starts at the relay's claim number.
+/// Nonces of the sender and the receiver of a frame. The upper half is the node's epoch; the lower half is a number
+/// that counts up from its claim number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
-    /// 0 in a handshake if the sender does not know it yet.
+    /// Nonce of the receiver; 0 in a handshake whose sender does not know it yet.
     pub(crate) receiver: u64,
 }
 
@@ -106,7 +109,7 @@ impl Nonces {
     }
 }
 
-/// Key and nonces for the tags of the frames from one node to another.
+/// Key and nonces with which one node authenticates its frames to another.
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
     pub(crate) key: &'a Key,
@@ -120,23 +123,24 @@ impl Signer<'_> {
     }
 }
 
-/// Compares two tags in constant time.
+/// Returns true if two authentication tags are equal, in constant time.
 pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Sliding window of the accepted counters of one sender: the newest, and those up to 63 below it.
+/// Window of accepted frame counters of one sender, against replays: the newest and the 63 below it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
-    /// Largest accepted counter plus one.
+    /// Largest accepted frame counter plus one.
     next: u32,
-    /// Bit i: `next` - 1 - i has been accepted.
+    /// Bit set of accepted frame counters: bit i stands for `next` - 1 - i.
     taken: u64,
 }
 
 impl Window {
-    /// Accepts `counter` once; false if it was accepted before or is too old to know. `u32::MAX` is never accepted.
+    /// Accepts a frame's `counter` once; false if it was accepted before or is too old to know. `u32::MAX` is never
+    /// accepted.
     pub(crate) const fn accept(&mut self, counter: u32) -> bool {
         let Some(next) = counter.checked_add(1) else {
             return false;

@@ -8,7 +8,7 @@
 
 const BLOCK: usize = 64;
 
-/// Initial state: the square roots of the first eight primes.
+/// Initial state of BLAKE2s: 32 bits of the fractional part of the first eight primes' square roots.
 const START: [u32; 8] = [
     0x6A09_E667,
     0xBB67_AE85,
@@ -20,7 +20,7 @@ const START: [u32; 8] = [
     0x5BE0_CD19,
 ];
 
-/// Message words of each round: for columns, then for diagonals, two for each.
+/// Order of the message words in each round of BLAKE2s: for columns, then for diagonals, two for each.
 const ORDER: [[[u8; 8]; 2]; 10] = [
     [[0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15]],
     [[14, 10, 4, 8, 9, 15, 13, 6], [1, 12, 0, 2, 11, 7, 5, 3]],
@@ -34,8 +34,8 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
     [[10, 2, 8, 4, 7, 6, 1, 5], [15, 11, 9, 14, 3, 12, 13, 0]],
 ];
 
-/// Returns an eight-byte digest of `first` followed by `second`, fewer than 2^32 bytes, under `key`. Work: one block for the key,
-/// and one per 64 bytes.
+/// Returns the eight-byte keyed BLAKE2s digest of `first` followed by `second`, fewer than 2^32 bytes. Work: one
+/// block for the key, and one per 64 bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;
@@ -63,7 +63,8 @@ pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     (u64::from(high) << 32 | u64::from(low)).to_le_bytes()
 }
 
-/// Compresses a block into the state; `count` is the number of bytes including this block.
+/// Compresses one block into the state; `count` is the number of bytes so far, including this block. `last` is true
+/// for the last block.
 #[inline(never)]
 fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     let mut words = [0; 16];
@@ -98,7 +99,7 @@ fn compress(state: &mut [u32; 8], block: &[u8; BLOCK], count: u32, last: bool) {
     }
 }
 
-/// Applies the RFC's function G to four columns, with two words for each.
+/// Applies the function G of RFC 7693 to four columns, with two message words for each.
 #[inline(never)]
 fn mix(rows: &mut [[u32; 4]; 4], words: &[u32; 16], order: [u8; 8]) {
     let [a, b, c, d] = rows;
@@ -117,7 +118,7 @@ fn mix(rows: &mut [[u32; 4]; 4], words: &[u32; 16], order: [u8; 8]) {
     }
 }
 
-/// Rotates the diagonals into columns.
+/// Rotates the rows of the state so that its diagonals become columns.
 fn turn([_, b, c, d]: &mut [[u32; 4]; 4]) {
     *b = [b[1], b[2], b[3], b[0]];
     *c = [c[2], c[3], c[0], c[1]];
@@ -137,7 +138,7 @@ mod tests {
     use blake2::digest::consts::U8;
     use blake2::digest::{FixedOutput, Mac};
 
-    /// Frames of every length, split at any position.
+    /// Compares the digests with those of the crate `blake2`, for lengths up to 299 bytes and any split.
     #[test]
     fn it_is_the_published_one() {
         let mut state = 1_u32;

@@ -13,9 +13,9 @@ use super::frame::MAX_DECODED;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// Number of bytes above the maximum length of a frame.
+    /// Length above the maximum length of a frame.
     Oversized,
-    /// Delimiter inside a COBS run.
+    /// Delimiter inside a COBS block: the end of the frame is missing.
     Truncated,
 }
 
@@ -30,20 +30,20 @@ impl core::fmt::Display for DeframeError {
 
 impl core::error::Error for DeframeError {}
 
-/// Decoder of frames from a byte stream.
+/// Decoder that splits a byte stream into frames and undoes their COBS encoding.
 #[derive(Clone, Debug)]
 pub struct Deframer {
     plain: [u8; MAX_DECODED],
     len: usize,
-    /// Remaining bytes of the current COBS run; 0 if a code byte is next.
+    /// Remaining bytes of the current COBS block; 0 if a code byte is next.
     run: u8,
-    /// True if the decoder has to insert a zero after the current run, unless the frame ends.
+    /// True if the decoder has to insert a zero after the current COBS block, unless the frame ends.
     zero_after: bool,
     oversized: bool,
 }
 
 impl Deframer {
-    /// Creates a deframer at the start of a frame.
+    /// Creates a decoder that expects the first byte of a frame.
     pub const fn new() -> Self {
         Self {
             plain: [0; MAX_DECODED],
@@ -77,7 +77,7 @@ impl Deframer {
         None
     }
 
-    /// Decodes the bytes up to the end of the current COBS run or a delimiter, and returns the rest.
+    /// Decodes bytes up to the end of the current COBS block or a delimiter; returns the remaining ones.
     ///
     /// Equivalent to [`push`](Self::push) for each of them, in a quarter of the instructions.
     pub fn push_run<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {

@@ -74,8 +74,8 @@ fn add(crc: &mut Digest<'_, u32, Table<1>>, bytes: &[u8]) {
     crc.update(bytes);
 }
 
-/// Returns `digest` combined with the sites of an upload, or `digest` itself without sites. Other sites thus make another
-/// mission.
+/// Returns `digest` combined with the `sites` of an uploaded mission, or `digest` itself without sites. Missions with
+/// other sites thus have other digests.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();
@@ -89,15 +89,15 @@ const fn low_half(crc: u32) -> u16 {
     u16::from_le_bytes([a, b])
 }
 
-/// Identifier of a mission: the newest upload, or the mission loaded before flight.
+/// Identifier of a mission: of an uploaded one, or of the mission loaded before flight.
 ///
 /// Ordered by version; of two missions with the same version, the one with the larger digest counts as newer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MissionId {
-    /// Operator's number of an uploaded mission, from 1; 0 for the mission loaded before flight.
+    /// Version that the operator gave to an upload, from 1; 0 for the mission loaded before flight.
     pub version: u16,
-    /// Digest of the mission, with all its relays.
+    /// Digest of the mission with all its relays, not only those in the current view.
     pub digest: u16,
 }
 

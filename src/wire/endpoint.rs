@@ -10,27 +10,28 @@ use super::session::{Checked, Session};
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 
-/// A frame to send.
+/// Frame to send: its destination and its length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
-    /// Node number of the receiver.
+    /// Node number of the destination.
     pub(crate) to: u16,
-    /// Length in bytes.
+    /// Length of the frame, bytes.
     pub(crate) len: usize,
 }
 
-/// Identity, frame counter and sessions of one node.
+/// Link end of one node: its identity, its frame counter, and its authentication sessions.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
     network: u16,
     node: u16,
     counter: u32,
-    /// Sessions with other nodes. `None` if this node does not sign; without the feature `auth` the type is uninhabited.
+    /// Authentication sessions with other nodes. `None` if this node does not sign; without the feature `auth` the
+    /// type is uninhabited.
     session: [Option<Session>; AUTH as usize],
 }
 
 impl Endpoint {
-    /// Node `node` of `network`, which does not sign.
+    /// Creates the link end of node `node` in the network `network`, which does not sign.
     pub(crate) fn new(network: u16, node: u16) -> Self {
         Self {
             network,
@@ -40,14 +41,16 @@ impl Endpoint {
         }
     }
 
-    /// Signs from now on, with the claim number `claim`. The session of a node that is silent for `gone_after` ends.
+    /// Authenticates all frames from now on with `auth`, from the claim number `claim`. The session of a node that is
+    /// silent for `gone_after` ends.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
         }
     }
 
-    /// Opens what the deframer gives. Returns an intact frame of this network; anything else is counted in `stats`.
+    /// Parses a frame that the deframer has decoded. Returns an intact frame of this network; anything else is
+    /// counted in `stats`.
     pub(crate) fn open<'a>(
         &self,
         decoded: Result<&'a [u8], DeframeError>,
@@ -66,7 +69,8 @@ impl Endpoint {
         None
     }
 
-    /// Checks the tag of `frame` and counts every result but a fresh message. `None` if this node does not sign.
+    /// Checks the authentication tag of `frame` and counts every result but a fresh message. `None` if this node does
+    /// not sign.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -85,14 +89,14 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once no more frames can be sent. A signed counter is used once, and after four billion frames a new epoch is
-    /// due.
+    /// Returns true once no more frames can be sent. A signed frame counter is used once, and after four billion
+    /// frames a new epoch is due.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Writes `message` to node `to`. If that node could not check its tag yet, writes a handshake in its place: the message is due again
-    /// later.
+    /// Writes `message` to node `to` into `frame`. If that node could not check its tag yet, writes a handshake in
+    /// its place; the caller sends the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,
@@ -112,7 +116,7 @@ impl Endpoint {
         Some(self.sent(to, len, stats))
     }
 
-    /// Writes the next pending handshake.
+    /// Writes the next pending handshake into `frame`; `None` if no handshake is pending.
     #[inline(never)] // called from two places
     pub(crate) fn transmit_handshake(
         &mut self,
@@ -143,7 +147,7 @@ impl Endpoint {
         Sent { to, len }
     }
 
-    /// Returns the sessions with other nodes; `None` if this node does not sign.
+    /// Returns the authentication sessions with other nodes; `None` if this node does not sign.
     pub(crate) const fn session(&self) -> Option<&Session> {
         match self.session.first() {
             Some(session) => session.as_ref(),
@@ -158,14 +162,14 @@ impl Endpoint {
         }
     }
 
-    /// Schedules a handshake to node `to`.
+    /// Schedules an authentication handshake to node `to`.
     pub(crate) fn greet(&mut self, to: u16) {
         if let Some(session) = self.session_mut() {
             session.greet(to);
         }
     }
 
-    /// Returns true if node `to` can check this node's tags, as far as is known.
+    /// Returns true if node `to` can check this node's authentication tags, as far as is known.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.session().is_some_and(|session| session.knows(to))
     }

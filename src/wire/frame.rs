@@ -5,10 +5,10 @@ use super::auth::{AUTH, Signer, TAG, TAG_ROOM};
 use super::message::{MAX_BODY, Message, MessageError};
 pub use super::{MAX_NODE, MAX_SWEEP};
 
-/// Version of the format, in the top four bits of the first word.
+/// Version of the frame format, in the top four bits of a frame's first 16-bit word.
 pub const VERSION: u8 = 1;
 
-/// Length of the header, bytes.
+/// Length of a frame's header, bytes.
 pub const HEADER: usize = 10;
 
 const CHECK: usize = 4;
@@ -16,29 +16,29 @@ const CHECK: usize = 4;
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
-/// Maximum length of a frame on the wire. COBS adds one byte below 254 bytes, the delimiter another one.
+/// Maximum length of a frame on the wire, bytes. COBS adds one byte below 254 bytes, the delimiter another one.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
-/// Flag: a tag follows the body.
+/// Header flag: an authentication tag follows the body.
 const SIGNED: u16 = 0x1000;
 
-/// Flag: the body is a handshake; valid with a tag only.
+/// Header flag: the body is an authentication handshake. It is valid with a tag only.
 const HANDSHAKE: u16 = 0x2000;
 
-/// Buffer for one encoded frame.
+/// Buffer for one encoded frame, of the maximum length.
 pub type FrameBuf = [u8; MAX_FRAME];
 
 /// Header of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Network number.
+    /// Number of the network, which separates chains that receive each other.
     pub network: u16,
     /// Node number of the sender: 0 is Tx, 1 to N the relays, N + 1 Rx.
     pub sender: u16,
     /// Node number of the destination.
     pub destination: u16,
-    /// Frame counter of the sender, wrapping.
+    /// Number of frames that the sender sent before this one, wrapping.
     pub counter: u32,
 }
 
@@ -47,13 +47,13 @@ pub struct Header {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FrameError {
-    /// Length below that of a header and a CRC.
+    /// The frame is shorter than a header and a CRC.
     Short,
-    /// The CRC does not match.
+    /// The CRC at the end of the frame does not match.
     Crc,
-    /// Another version of the format, or unknown flags.
+    /// The frame has another version of the format, or unknown flags.
     Version,
-    /// Invalid message in the body.
+    /// The message in the frame's body is invalid.
     Message(MessageError),
 }
 
@@ -102,12 +102,13 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the place of the body. The first byte and the last are for COBS and the delimiter.
+/// Returns the part of the buffer for a frame's body. The first byte and the last are for COBS and the delimiter.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
 
-/// Completes a frame with the given length of its body.
+/// Completes a frame around its body of `body` bytes: header, tag, CRC, COBS. Returns the frame's length, or 0 if
+/// `body` is `None` or an address is too large.
 fn close(
     header: Header,
     flags: u16,
@@ -140,7 +141,7 @@ fn close(
     stuff(out, len)
 }
 
-/// Writes `bytes` at `at`, and returns their end.
+/// Writes `bytes` into `plain` at the offset `at`, and returns the offset of their end.
 fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
     if let Some(place) = plain.get_mut(at..at + N) {
         place.copy_from_slice(&bytes);
@@ -151,15 +152,15 @@ fn put<const N: usize>(plain: &mut [u8], at: usize, bytes: [u8; N]) -> usize {
 /// Parsed intact frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Opened<'a> {
-    /// Addresses and counter.
+    /// Header of the frame: addresses and counter.
     pub header: Header,
-    /// Body: a message unless the frame is a handshake.
+    /// Body of the frame: a message, or an authentication handshake.
     pub body: &'a [u8],
-    /// Signed bytes: header and body.
+    /// Bytes that the authentication tag covers: header and body.
     pub signed: &'a [u8],
-    /// Unverified tag, if there is one.
+    /// Authentication tag, not verified; `None` for a frame without one.
     pub tag: Option<[u8; TAG]>,
-    /// True if the body is a handshake.
+    /// True if the body is an authentication handshake and not a message.
     pub handshake: bool,
 }
 
@@ -206,7 +207,7 @@ pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     })
 }
 
-/// Decodes header and message: [`open`], then [`Message::decode`]. The tag is not verified.
+/// Decodes header and message of a frame: [`open`], then [`Message::decode`]. The tag is not verified.
 ///
 /// # Errors
 /// [`FrameError`]; a handshake is not a message.
@@ -224,8 +225,8 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// Encodes COBS in place: the `len` bytes from the second one on, fewer than 254, then the delimiter. Returns the total length. The
-/// encoders of `cobs` need a second buffer.
+/// Encodes a frame by COBS in place, and appends the delimiter. Returns the total length. The frame is the `len`
+/// bytes from the second one on, fewer than 254. The encoders of `cobs` need a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;

@@ -30,50 +30,52 @@ use super::frame::Opened;
 use crate::node::duplicate::{RAISED, Rival, Sender};
 use crate::time::{Duration, Instant};
 
-/// Length of a handshake's body, bytes.
+/// Length of an authentication handshake's body, bytes.
 pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the counters in two nonces that one node uses in an epoch.
+/// Maximum difference between the lower halves of two nonces that one node uses in an epoch.
 const NEAR: u32 = 1 << 12;
 
-/// Number of consecutive handshakes of an older epoch after which they cannot be delayed frames.
+/// Number of consecutive handshakes of an older epoch after which the node's epoch has gone back. Fewer can be
+/// delayed frames.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// True if a handshake is pending.
+    /// True if a handshake to the node is to be sent.
     handshake: bool,
-    /// True if the handshake requests a reply although the node is proven.
+    /// True if that handshake requests a reply although the node is proven to be present.
     asks: bool,
-    /// True if the node has shown this relay's nonce: it is present, and both know each other.
+    /// True if the node has repeated this relay's nonce: it is present, and both know each other's nonce.
     proven: bool,
-    /// Time of the last use, on the session's own clock.
+    /// Time of the entry's last use, on the session's own counter `clock`.
     used: u32,
     /// Time of the node's last proof of presence, or of its first frame with a larger nonce.
     heard: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own: u32,
-    /// Largest nonce that the node has shown; 0 before any.
+    /// Largest nonce that the node has sent; 0 before any.
     other: u64,
     taken: Window,
     older: Older,
 }
 
-/// Handshakes of an older epoch, or of a restart in the same epoch.
+/// Counter of a node's handshakes with an older epoch, or after a restart in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Older {
     epoch: u32,
-    /// Counter of the last such handshake, plus one.
+    /// Frame counter of the last such handshake, plus one.
     next: u32,
-    /// Number of handshakes in a row with rising counters.
+    /// Number of such handshakes in a row with rising frame counters.
     times: u8,
 }
 
 impl Older {
-    /// Counts a handshake; returns true at the `WENT_BACK`th. A replay of the same frame does not count.
+    /// Counts a handshake of an older epoch; returns true at the `WENT_BACK`th. A replay of the same frame does not
+    /// count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -107,23 +109,23 @@ pub(crate) struct Session {
     epoch: u32,
     /// Silence of the known node after which another node with the same number is accepted.
     gone_after: Duration,
-    /// Claim number of this relay. The lower halves of this relay's nonces are larger.
+    /// Claim number of this relay. The lower halves of this relay's nonces are above it.
     claim: u32,
-    /// Lower half of the last created nonce.
+    /// Lower half of the last nonce that this relay has created.
     made: u32,
-    /// Claim of another node to this relay's number, from the last handshake with one.
+    /// Claim of another node to this relay's number, from the last handshake that had one.
     rival: Option<Rival>,
-    /// Counter of uses of entries, wrapping.
+    /// Counter of all uses of the table's entries, wrapping; it orders them by age.
     clock: u32,
-    /// Nodes whose entries are not replaced.
+    /// Nodes whose entries are never replaced: the current neighbours.
     pinned: [Option<u16>; 2],
     peers: heapless::Vec<Peer, PEERS>,
 }
 
-/// Result of a frame's authentication.
+/// Result of the authentication of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// Valid new frame of a member; `first` if it is the first proof that the node is present.
+    /// Valid new message of a member; `first` if it is the first proof that the node is present.
     Fresh { first: bool },
     /// New handshake that proves that the node is present; `first` if it is the first proof.
     Handshake { first: bool },
@@ -131,17 +133,17 @@ pub(crate) enum Checked {
     Unproven,
     /// Frame without a tag.
     Unsigned,
-    /// Frame whose tag is wrong, at least for these nonces.
+    /// Frame with a wrong tag, at least for the nonces of the current session.
     Forged,
     /// Frame of a member that was received before or is too old to check.
     Replayed,
-    /// Replayed handshake, and the last of a row that shows that the node itself uses an older epoch.
+    /// Replayed handshake, the last in a row that shows that the node itself uses an older epoch.
     WentBack,
 }
 
 impl Session {
-    /// Creates a session without known nodes for a node with claim number `claim`. A node that is silent for `gone_after` is
-    /// replaced by another one with its number.
+    /// Creates a session table without nodes for a node with claim number `claim`. A node that is silent for
+    /// `gone_after` is replaced by another one with its number.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -157,7 +159,7 @@ impl Session {
         }
     }
 
-    /// Pins the entries of `nodes`, the current neighbours. Schedules handshakes to those without an entry.
+    /// Protects the entries of `nodes`, the current neighbours. Schedules handshakes to those without an entry.
     pub(crate) fn pin(&mut self, nodes: [Option<u16>; 2]) {
         self.pinned = nodes;
         for node in nodes.into_iter().flatten() {
@@ -176,7 +178,7 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes. New nonces count from `claim`, if it is above all nonces of this epoch so far.
+    /// Forgets all nodes. New nonces count up from `claim`, if it is above all nonces of this epoch so far.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.made {
             self.claim = claim;
@@ -185,14 +187,15 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`. Other nodes of this relay's number receive it, too.
+    /// Schedules a handshake to the known node `to`. It shows this relay's nonces to other nodes of this relay's
+    /// number, too.
     pub(crate) fn show(&mut self, to: u16) {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             peer.handshake = true;
         }
     }
 
-    /// Schedules a handshake to node `to` that requests a reply, by which both ends learn their nonces.
+    /// Schedules a handshake to node `to` that requests a reply, so that each learns the other's nonce.
     pub(crate) fn ask(&mut self, to: u16) {
         self.make(to);
         if let Some(peer) = self.touch(to) {
@@ -201,9 +204,10 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake that requests a reply to a silent node, unless it restarted with a used nonce.
+    /// Schedules a handshake with a request to the silent node `to`, unless it restarted with a used nonce.
     ///
-    /// A reply that contains its nonce would let that node continue as its earlier start, and use nonces and counters twice.
+    /// A node that has restarted with a used nonce gets none: with a handshake that contains its nonce it could
+    /// continue as its earlier start, and use nonces and counters twice.
     pub(crate) fn ask_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.other >> 32;
@@ -212,19 +216,19 @@ impl Session {
         }
     }
 
-    /// Returns another node's claim to this relay's number from a handshake, once.
+    /// Takes the claim of another node to this relay's number that a handshake contained, or `None`.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()
     }
 
-    /// Returns a node with a pending handshake, and marks it as sent.
+    /// Returns a node to which a handshake is due, and marks the handshake as sent.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;
         Some(peer.node)
     }
 
-    /// Returns true if node `to` can verify this relay's frames.
+    /// Returns true if node `to` can verify the tags of this relay's frames.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.find(to).is_some_and(|peer| peer.proven)
     }
@@ -260,7 +264,7 @@ impl Session {
         }
     }
 
-    /// Authenticates an intact frame with the sender address `sender`. Work: that of one tag.
+    /// Authenticates an intact frame from node `sender`. Work: the computation of one tag.
     pub(crate) fn check(&mut self, now: Instant, sender: u16, frame: &Opened<'_>) -> Checked {
         let Some(tag) = frame.tag else {
             return Checked::Unsigned;
@@ -350,7 +354,7 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns the sender of `frame`, which has this relay's own number. Work: that of one tag.
+    /// Returns the node that sent `frame`, which bears this relay's own number. Work: the computation of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
@@ -364,7 +368,8 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns the node of this relay's number that has `nonce`; unknown for 0 or an older epoch.
+    /// Returns the node with this relay's number that has `nonce`: this relay or another one. Unknown for 0 or an
+    /// older epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {
@@ -386,7 +391,7 @@ impl Session {
         self.peers.iter().find(|peer| peer.node == node)
     }
 
-    /// Returns the entry of `node`, and updates its time of use.
+    /// Returns the table's entry of `node`, and updates its time of use; `None` if it has none.
     fn touch(&mut self, node: u16) -> Option<&mut Peer> {
         self.clock = self.clock.wrapping_add(1);
         let peer = self.peers.iter_mut().find(|peer| peer.node == node)?;
@@ -394,8 +399,9 @@ impl Session {
         Some(peer)
     }
 
-    /// Creates an entry for `node` if it has none. A full table replaces an entry that is not pinned, preferably an unproven one,
-    /// and of those the least recently used. After four billion entries no more are created: a nonce is never used twice.
+    /// Creates a table entry for `node` if it has none. A full table replaces an entry that is not pinned, preferably
+    /// an unproven one, and of those the least recently used. After four billion entries no more are created: a nonce
+    /// is never used twice.
     fn make(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
@@ -430,7 +436,7 @@ impl Session {
     }
 }
 
-/// Splits a nonce into number and epoch.
+/// Returns the lower half of a nonce, a number, and its upper half, the epoch.
 const fn halves(nonce: u64) -> [u32; 2] {
     let [a, b, c, d, e, f, g, h] = nonce.to_le_bytes();
     [

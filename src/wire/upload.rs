@@ -12,10 +12,10 @@ use crate::geodetic::{LineError, Sites};
 use crate::mission::{Interference, Mission};
 use crate::mission::{MissionConfig, MissionError};
 
-/// True with the feature `upload`; without it no upload exists and none is accepted.
+/// True with the feature `upload`; without it no mission can be uploaded.
 pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
 
-/// Mission with a version.
+/// Mission uploaded by the operator, with a version. It replaces the one loaded before flight.
 #[cfg(feature = "upload")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -24,30 +24,31 @@ pub struct Upload {
     base: u16,
     /// Checked parameters of a mission with one interferer.
     config: MissionConfig,
-    /// Sites of the mission's line, if not the configured sites. Valid positions; every relay checks that they fit the mission.
+    /// Positions of Tx and Rx, the ends of the mission's line; `None` for the configured ones. They are valid
+    /// positions; every relay checks that they fit the mission.
     sites: Option<Sites>,
 }
 
-/// Reason why an upload is rejected.
+/// Reason why an uploaded mission is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum UploadError {
-    /// The version is 0, which identifies the mission loaded before flight.
+    /// The version of the upload is 0, which identifies the mission loaded before flight.
     Version,
-    /// The number of relays differs from that of the base.
+    /// The number of relays differs from that of the mission loaded before flight.
     Relays,
-    /// The base or the new mission is in a field.
+    /// The mission loaded before flight, or the new one, has an interference field.
     Field,
-    /// `reverse` of the base or of the new mission is above 0.
+    /// The mission loaded before flight, or the new one, is for traffic in both directions (`reverse`).
     Reverse,
-    /// A parameter is outside its range.
+    /// A parameter of the new mission is outside its range.
     Mission(MissionError),
-    /// The upload is for relays with another base.
+    /// The upload is for relays that loaded another mission before flight.
     Base,
-    /// The mission does not fit its line on earth.
+    /// The mission does not fit its line from Tx to Rx on earth, or the geofence.
     Line(LineError),
-    /// The relay already has this mission or a newer mission.
+    /// The relay already has this mission or a newer one.
     Old,
     /// Frames are not signed, because `Settings::auth` is not set.
     Unsigned,
@@ -82,7 +83,7 @@ impl core::error::Error for UploadError {}
 
 #[cfg(feature = "upload")]
 impl Upload {
-    /// Creates an upload of `config` with `version`, 1 to 65535, for relays with the mission `base`.
+    /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
     /// If rounding has put eta of its channel outside of the other two factors, it is clamped to the nearer one.
     ///
@@ -108,7 +109,8 @@ impl Upload {
         Self::checked(version, digest(base), config, None)
     }
 
-    /// Adds the sites between which the mission is flown. Relays then use the line between them for latitudes and longitudes.
+    /// Adds the positions of Tx and Rx between which the mission is flown. Relays then use the line between them for
+    /// latitudes and longitudes.
     ///
     /// An upload without sites is flown between the configured ones, wherever the relays flew since.
     ///
@@ -148,7 +150,7 @@ impl Upload {
         })
     }
 
-    /// Version, from 1; the larger one is newer.
+    /// Version of the upload, from 1; the larger one is newer.
     pub const fn version(&self) -> u16 {
         self.version
     }
@@ -158,17 +160,17 @@ impl Upload {
         self.base
     }
 
-    /// Returns the mission's parameters, which [`Mission::try_new`] accepts.
+    /// Returns the uploaded mission's parameters, which [`Mission::try_new`] accepts.
     pub const fn config(&self) -> &MissionConfig {
         &self.config
     }
 
-    /// Sites of the mission's line; `None` for the configured ones.
+    /// Positions of Tx and Rx, the ends of the mission's line; `None` for the configured ones.
     pub const fn sites(&self) -> Option<Sites> {
         self.sites
     }
 
-    /// Identifier of the mission.
+    /// Identifier of the uploaded mission: its version and its digest.
     pub fn id(&self) -> MissionId {
         MissionId {
             version: self.version,
@@ -177,8 +179,8 @@ impl Upload {
     }
 }
 
-/// Mission with a version. The type is uninhabited without the feature `upload`, so that the compiler drops all code that handles
-/// one.
+/// Mission uploaded by the operator. The type is uninhabited without the feature `upload`, so that the compiler drops
+/// all code that handles one.
 #[cfg(not(feature = "upload"))]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Upload {}
@@ -203,8 +205,8 @@ impl Upload {
     }
 }
 
-/// Checks that a mission over `distance_m` metres fits the distance between `sites`. A relay without the feature `flight` has no line
-/// on earth, and accepts every mission.
+/// Checks that the mission's distance, `distance_m`, is that between `sites`, Tx and Rx. A relay without the feature
+/// `flight` has no line on earth, and accepts every mission with valid sites.
 pub(crate) fn check_line(sites: Sites, distance_m: f32) -> Result<(), LineError> {
     #[cfg(feature = "flight")]
     let fits = crate::flight::axis::Axis::between(sites)

@@ -14,51 +14,54 @@ use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// Distance from the setpoint below which the carrot has arrived, m.
+/// Distance from the setpoint, m, below which the carrot (the autopilot's moving target) has arrived.
 const THERE_M: f32 = 0.01;
 
-/// Ratio k of speed to remaining distance near the setpoint, 1/s.
+/// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s.
 const END_PER_S: f32 = 0.5;
 
-/// Minimum speed near the setpoint, m/s.
+/// Minimum speed of the moving target near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
-/// Rate at which autopilots catch up with a target, 1/s.
+/// Rate at which an autopilot reduces its lag behind a moving target, 1/s.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// Fraction of the speed limit that the carrot uses. The rest is for a drone that accelerates and overshoots.
+/// Fraction of the speed limit that the moving target uses. The rest is for a drone that accelerates and overshoots.
 const CARROT_PART: f32 = 0.96;
 
-/// Rate of approach to the maximum speed, 1/s. The approach is smooth, since an accelerating drone goes on accelerating for a
-/// moment.
+/// Rate at which the moving target approaches its maximum speed, 1/s. The approach is smooth, since an accelerating
+/// drone goes on accelerating for a moment.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum fraction of the speed for a carrot whose drone lags behind, so that it never stops for good.
+/// Minimum fraction of the speed for a moving target whose drone lags behind. So the target never stops for good.
 const LEAST_PART: f32 = 0.1;
 
-/// Deceleration of the velocity away from a new setpoint, as a multiple of the acceleration. That velocity is gone within
-/// [`Pace::stopping_time`]. A drone would overshoot a carrot that turns at once, and come back.
+/// Deceleration of the moving target's velocity across the direction of a new setpoint. It is a multiple of the
+/// acceleration. That velocity is gone within [`Pace::stopping_time`]. A drone would overshoot a target that turns at
+/// once, and come back.
 const TURN_PART: f32 = 2.0;
 
-/// Remaining distance at which the target counts as stopped, m. The drone, which lags behind, then has up to 0.5 m left.
+/// Remaining distance at which the moving target counts as stopped, m. The drone, which lags behind, then has up to
+/// 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
-/// Time from a new setpoint until the drone reacts. 0.2 s to the flight controller, and 1 s of lag behind its target.
+/// Time from a new setpoint until the drone reacts, ms: 200 to the flight controller, and 1000 of lag.
 const BEHIND_MS: u64 = 1_200;
 
-/// Half-life of the speed near the end, ms: ln 2 / k.
+/// Half-life of the moving target's speed near the setpoint, ms: ln 2 / k with k = 0.5 /s.
 const HALVES_MS: u64 = 1_387;
 
-/// Maximum number of half-lives until the drone has stopped. The drone starts 20 m away at the maximum acceleration.
+/// Maximum number of half-lives in [`Pace::stopping_time`]. They suffice from 20 m, the distance at the maximum
+/// acceleration.
 const MOST_HALVES: u32 = 8;
 
-/// Maximum time back for which an earlier carrot position is extrapolated.
+/// Maximum time by which an earlier position of the moving target is extrapolated back.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
-/// Maximum time step. After a longer gap the carrot continues from its position.
+/// Maximum time step of the moving target. After a longer gap it continues from its position.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
 
-/// Speed limit and acceleration of targets.
+/// Speed limit and acceleration of the targets that are sent to an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pace {
@@ -69,7 +72,7 @@ pub struct Pace {
 }
 
 impl Default for Pace {
-    /// Creates the default: 5 m/s and 1 m/s².
+    /// Creates the default pace: 5 m/s and 1 m/s².
     fn default() -> Self {
         Self {
             speed_m_s: 5.0,
@@ -88,7 +91,7 @@ impl Pace {
         pace
     }
 
-    /// Returns the maximum speed, m/s, at the distance `left_m` from the position where the carrot stops.
+    /// Returns the target's maximum speed, m/s, at the distance `left_m`, m, before it stops.
     fn speed_before_m_s(self, left_m: f32) -> f32 {
         let a = self.acceleration_m_s2;
         // Here the two parts meet, both at the speed a / k.
@@ -100,7 +103,7 @@ impl Pace {
         }
     }
 
-    /// Returns the stopping distance, m, from the speed `speed_m_s`.
+    /// Returns the distance, m, in which the moving target stops from the speed `speed_m_s`.
     fn stopping_m(self, speed_m_s: f32) -> f32 {
         let a = self.acceleration_m_s2;
         if speed_m_s > a / END_PER_S {
@@ -138,7 +141,7 @@ impl Pace {
         Duration::from_millis(time_ms)
     }
 
-    /// Returns true if both values are within their ranges.
+    /// Returns true if speed and acceleration are within their allowed ranges.
     pub fn is_valid(self) -> bool {
         (0.1..=20.0).contains(&self.speed_m_s) && (0.1..=5.0).contains(&self.acceleration_m_s2)
     }
@@ -147,7 +150,7 @@ impl Pace {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Carrot {
     pub(super) place: Placement,
-    /// Velocity along x, y and up, m/s.
+    /// Velocity of the moving target along x, y and up, m/s.
     pub(super) velocity_m_s: [f32; 3],
     is_standing: bool,
     moved_at: Instant,
@@ -169,7 +172,7 @@ impl Carrot {
         self.is_standing
     }
 
-    /// Returns the carrot's position `ago` before its last step, extrapolated back by its velocity.
+    /// Returns the moving target's position `ago` before its last step, extrapolated back by its velocity.
     fn before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -285,20 +288,22 @@ fn length(a: [f32; 3]) -> f32 {
     libm::sqrtf(dot(a, a))
 }
 
-/// Intervals between targets, while the carrot moves and while it stands. A PX4 leaves its mode after a second without a target.
+/// Interval between targets while the target moves. The next constant is the interval while it stands: a PX4 leaves
+/// its mode after a second without a target.
 const MOVING: Duration = Duration::from_millis(100);
 const STANDING: Duration = Duration::from_millis(200);
 
-/// Interval between repetitions to an ArduCopter until it has reported the target. More frequent repetition makes it wobble.
+/// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
+/// repetition makes it wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Consecutive reports of another target before an event is raised. An ArduCopter reports its target twice a second; the target
-/// must also have been sent for as long.
+/// Number of consecutive reports of another target before an event is raised. An ArduCopter reports its target twice
+/// a second. The target must also have been sent for the time in the next constant.
 const REFUSED_AFTER: u8 = 6;
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
-/// Tolerance between the target that an ArduCopter reports and the carrot. A standing carrot: units of 1e-7 degrees. A moving
-/// carrot: [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
+/// Tolerance between the target that an ArduCopter reports and a standing target, 1e-7 degrees. For a moving target
+/// it is [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
 const TAKEN_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
@@ -306,18 +311,18 @@ const NEAR_S: f32 = 1.0;
 /// Number of repetitions of a standing target to an autopilot that never reports its target.
 const UNCONFIRMED: u8 = 10;
 
-/// Target that is sent to the autopilot.
+/// Target that is sent to the autopilot, with its schedule and the autopilot's confirmation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// Number of times that the final position has been sent.
+    /// Number of times that the standing target has been sent.
     times_sent: u8,
-    /// True once the autopilot has reported this target.
+    /// True once the autopilot has reported this target as its own.
     is_taken: bool,
-    /// Time since which targets are sent.
+    /// Time since which targets have been sent without a break.
     since: Instant,
-    /// Number of consecutive reports of another target.
+    /// Number of consecutive reports in which the autopilot names another target.
     elsewhere: u8,
     /// True once the autopilot has reported any target.
     is_said: bool,
@@ -337,14 +342,15 @@ impl Target {
         }
     }
 
-    /// Restarts the counts after a change of the final position, which has not been sent.
+    /// Restarts the schedule after a change of the setpoint, whose position has not been sent yet.
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
         self.times_sent = 0;
         self.is_taken = false;
     }
 
-    /// Compares the autopilot's reported target. Returns true, once, if it differs although the target was sent long enough.
+    /// Compares the autopilot's reported target with the one sent; returns true, once, if they differ. They count as
+    /// different only after the target was sent for some time, and several reports differ.
     ///
     /// While the target moves, the report may lag behind it by the time between two messages.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
@@ -387,7 +393,7 @@ impl Target {
         self.due = now + STANDING;
     }
 
-    /// Returns true if the due target has to be sent at `now`, and schedules the next target.
+    /// Returns true if the target is to be sent at `now`, and schedules the next transmission.
     pub(super) fn should_send(&mut self, now: Instant, kind: Kind) -> bool {
         let is_standing = self.carrot.is_standing();
         self.due = now
@@ -418,7 +424,7 @@ mod tests {
     use crate::place::Placement;
     use crate::time::{Duration, Instant};
 
-    /// Returns the positions and speeds of a carrot, every 100 ms, until it stands.
+    /// Returns the positions and speeds of a moving target, every 100 ms, until it stands.
     fn fly(from: Placement, to: Placement, pace: Pace) -> Vec<(Placement, f32), 512> {
         let mut carrot = Carrot::at(from, Instant::ZERO);
         let mut way = Vec::new();
@@ -505,7 +511,8 @@ mod tests {
         }
     }
 
-    /// Checks at every moment of a flight that the deceleration is within its limit. The setpoint is never overshot.
+    /// Withdraws the setpoint at every moment of a flight: the deceleration is within its limit. The setpoint is
+    /// never overshot.
     #[test]
     fn it_stops_gently_wherever_it_is_withdrawn() {
         let to = Placement::on_line(60.0, 20.0);
@@ -543,7 +550,8 @@ mod tests {
         );
     }
 
-    /// Checks setpoints in every other direction. The velocity does not jump, and the old direction is left within 3 s.
+    /// Sets a new setpoint in every other direction: the velocity does not jump. The old direction is left within 3
+    /// s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

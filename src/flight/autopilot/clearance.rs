@@ -17,14 +17,14 @@ use crate::event::Event;
 use crate::flight::mavlink::frame::Address;
 use crate::side::Side;
 
-/// Command number, MAV_CMD_USER_1.
+/// Number of the MAVLink command that clears lost relays, MAV_CMD_USER_1.
 pub(super) const CLEAR_LOST: u16 = 31_010;
 
-/// Values of `MAV_RESULT`.
+/// Value of `MAV_RESULT` for an accepted command; the next constant is for a denied one.
 const ACCEPTED: u8 = 0;
 const DENIED: u8 = 2;
 
-/// Lost relays of one side.
+/// Lost relays on one side of this relay, upstream or downstream.
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
@@ -32,16 +32,16 @@ struct LostSide {
     is_full: bool,
 }
 
-/// Lost relays of both sides, and the answer to the last command.
+/// Lost relays on both sides, and the answer to the operator's last command to clear them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// Last accepted command.
+    /// Last accepted command to clear lost relays: its sender and the relays that it names.
     accepted: Option<(Address, RelayNumbers)>,
-    /// Pending answer: its receiver, and its `MAV_RESULT`.
+    /// Pending answer to a command: its addressee, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays this relay has to clear.
+    /// Side whose lost relays the operator has cleared, until the relay is told.
     cleared: Option<Side>,
 }
 
@@ -53,7 +53,7 @@ impl Clearance {
         }
     }
 
-    /// Updates the lost relays by an event of the relay.
+    /// Updates the lists of lost relays by an event of the relay.
     pub(super) fn hear(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { side, node } => {
@@ -69,7 +69,8 @@ impl Clearance {
         }
     }
 
-    /// Processes a command with these parameters; returns the event for the firmware.
+    /// Processes the operator's command to clear lost relays; returns the event for the firmware. `from` is its
+    /// sender, and `parameters` are the numbers of the relays.
     pub(super) fn command(
         &mut self,
         from: Address,
@@ -98,12 +99,12 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true until the answer to the last command and its side have been taken.
+    /// Returns true until both the answer to the last command and the cleared side have been taken.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }
 
-    /// Removes the answer that is due.
+    /// Removes and returns the pending answer to a command: its addressee, and its `MAV_RESULT`.
     pub(super) const fn take_answer(&mut self) -> Option<(Address, u8)> {
         self.answer.take()
     }
@@ -115,7 +116,7 @@ impl Clearance {
 }
 
 impl LostSide {
-    /// Returns true if these are exactly the lost relays of this side, and at least one.
+    /// Returns true if `named` are exactly the lost relays of this side, and at least one.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);
@@ -126,7 +127,7 @@ impl LostSide {
     }
 }
 
-/// Returns the relay number in a parameter; 0 for an invalid one.
+/// Returns the relay number in a command's parameter; 0 for an invalid one.
 fn number(parameter: f32) -> u16 {
     #[expect(
         clippy::cast_possible_truncation,

@@ -33,15 +33,16 @@ use crate::flight::mavlink::signing::Signing;
 /// Component number of an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
-/// Sender's system number before the autopilot's is known: the default of autopilots.
+/// MAVLink system number of this component until the autopilot's is known: the default of autopilots.
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Delay of a target after which a PX4 may be in its failsafe.
+/// Delay of a due target after which a PX4 may be in its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
-/// Time of regular positions after which a blind link recovers. It is longer if the link was blind a short time ago.
+/// Time for which positions must be received regularly before a blind link recovers. The next constants: the longer
+/// time if the link was blind a short time ago, and that short time.
 const RECOVERY: Duration = Duration::from_millis(1_000);
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
@@ -49,14 +50,15 @@ const SHORT_TIME: Duration = Duration::from_millis(60_000);
 /// Time within which an ArduCopter reports its fence after a mode change caused by a breach.
 const FENCE_TOLD: Duration = Duration::from_millis(1_300);
 
-/// Time after which a new reason to wait is reported, and the minimum time since the last report.
+/// Time for which a reason not to engage the drone must last before it is reported. The next constant is the minimum
+/// time since the last report.
 const SETTLED: Duration = Duration::from_millis(1_000);
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time after which a reason of the guard is reported.
+/// Time for which a reason of the guard to hold the drone must last before it is reported.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
-/// The link to one autopilot.
+/// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
 ///
 /// # Contract
 /// - *Inputs* take anything, never fail and do a bounded amount of work.
@@ -67,7 +69,7 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     pub(super) axis: Axis,
-    /// Sites of the line that the link was created with, where a mission can bring others.
+    /// Positions of Tx and Rx with which the link was created. Stored only if uploaded missions can replace them.
     loaded: [Sites; UPLOAD as usize],
     pace: Pace,
     clock: MonotonicClock,
@@ -80,23 +82,25 @@ pub struct Autopilot {
     setpoint: Option<Placement>,
     look: Option<Bearing>,
     target: Option<Target>,
-    /// Stopping position of the carrot after the setpoint was withdrawn.
+    /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
-    /// Time at which the link became blind, and time since which positions are received again.
+    /// Time at which the drone's position was last lost. The next field is the time since which positions are
+    /// received again.
     blind_at: Option<Instant>,
     located_at: Option<Instant>,
-    /// Time of regular positions that ends the blind state.
+    /// Time for which positions must be received regularly to end the state [`State::Blind`].
     recovery: Duration,
-    /// Release that has not been reported, and the time to report it.
+    /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason for which the drone cannot be engaged, and its start. Then the last reported reason, and its time.
+    /// Reason for which the drone cannot be engaged, and its start. The next field is the last reported reason, and
+    /// its time.
     wait: (Option<WaitReason>, Instant),
     reported_wait: Option<(Option<WaitReason>, Instant)>,
-    /// False while the relay must not be engaged.
+    /// True while the relay is ready to be engaged.
     ready: bool,
-    /// Reasons of the guard that were reported to the operator, upstream and downstream.
+    /// Reasons of the guard to hold the drone, as last reported to the operator: upstream, downstream.
     hold: [Option<HoldReason>; 2],
-    /// Newest reasons of the guard, and the time since which they are unchanged.
+    /// Newest reasons of the guard to hold the drone, and the time since which they are unchanged.
     newest_hold: ([Option<HoldReason>; 2], Instant),
     /// True from a new view until its positions are agreed.
     is_new_view: bool,
@@ -104,7 +108,7 @@ pub struct Autopilot {
     position: Option<Position>,
     astray: Astray,
     clearance: Clearance,
-    /// Noise reported by a SiK radio, and the drone's position, W.
+    /// Newest noise measurement of a SiK radio, with the drone's position.
     noise: RadioNoise,
     events: Events,
     sequence: u8,
@@ -150,14 +154,14 @@ impl Autopilot {
         }
     }
 
-    /// Sets a number that differs at each start of the companion: a chip's random number, the relay's seed. Without it, answers
-    /// buffered in a cable since before a restart may be taken for answers to this link, and so may a choice of the mode made
-    /// before.
+    /// Sets a number that differs at each start of the companion, such as the relay's seed. Without it, answers
+    /// buffered in a cable since before a restart may be taken for answers to this link, and so may a choice of the
+    /// mode made before.
     pub const fn set_seed(&mut self, seed: u32) {
         self.vehicle.echo.seed(seed);
     }
 
-    /// Processes bytes from the autopilot, any number of them.
+    /// Processes any number of bytes received from the autopilot.
     pub fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let now = self.clock.advance(now);
         for byte in bytes {
@@ -245,9 +249,10 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Sets the line on which the drone flies: between the sites of a new mission. Call it when `Relay::sites` has changed, before
-    /// the next [`handle_setpoint`](Self::handle_setpoint). The drone holds its position until the next setpoint, because the
-    /// present one belongs to the previous line. Constant work; the same line again has no effect.
+    /// Sets the line from Tx to Rx along which the drone flies, if a new mission has other sites. Call it when
+    /// `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds its
+    /// position until the next setpoint, because the present one belongs to the previous line. Constant work; the
+    /// same line again has no effect.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
         let now = self.clock.advance(now);
         if axis == self.axis {
@@ -269,8 +274,8 @@ impl Autopilot {
         }
     }
 
-    /// Sets the setpoint, from `Relay::setpoint`. `None`, or a setpoint that is not finite or not near the line, holds the
-    /// position.
+    /// Sets the setpoint, from `Relay::setpoint`. With `None`, or a setpoint that is not finite or not near the line,
+    /// the drone holds its position.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
         let now = self.clock.advance(now);
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
@@ -292,15 +297,14 @@ impl Autopilot {
         self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
-    /// Sets the numbers sent to the operator once a second. They are the SIR of the hop to this relay, in decibels, and its place
-    /// along the chain.
+    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the drone's setpoint.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
-    /// Sets whether the relay may be engaged; true at the start. While it is false, a PX4 in [`State::Standby`] receives no
-    /// targets, so that it refuses OFFBOARD. Nothing else changes: an engaged drone stays engaged, and an ArduCopter accepts GUIDED
-    /// all the same.
+    /// Sets the relay's readiness to be engaged; true at the start. While it is false, a PX4 in [`State::Standby`]
+    /// receives no targets, so that it refuses OFFBOARD. Nothing else changes: an engaged drone stays engaged, and an
+    /// ArduCopter accepts GUIDED all the same.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
@@ -339,15 +343,15 @@ impl Autopilot {
         }
     }
 
-    /// Queues a text of at most 50 bytes for the operator; returns true if there was room. Three texts fit. Equal texts are sent at
-    /// least 10 s apart.
+    /// Queues a text of at most 50 bytes for the operator; returns true if there was room. At most three texts can
+    /// wait. Equal texts are sent at least 10 s apart.
     pub fn say(&mut self, text: &str) -> bool {
         self.report.say(text)
     }
 
-    /// Processes an event of the relay; events that matter in flight are sent to the operator as a text. A new view is one line, on
-    /// an engaged drone. Reasons that keep a drone from its place are reported by [`handle_hold`](Self::handle_hold) and as reasons
-    /// not to engage it.
+    /// Processes an event of the relay. Events that matter in flight are sent to the operator as a text. A new view
+    /// is one line, on an engaged drone. Reasons that keep a drone from its place are reported by
+    /// [`handle_hold`](Self::handle_hold) and as reasons not to engage it.
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.hear(event);
         match event {
@@ -373,7 +377,7 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Updates the state from the observations at `now`.
+    /// Updates the control state from the observations of the autopilot at `now`.
     fn review(&mut self, now: Instant) {
         self.vehicle.review_choice(now);
         let before = self.state;
@@ -423,7 +427,7 @@ impl Autopilot {
         self.report.tell(Line::info(Topic::Control, line));
     }
 
-    /// Reports a release once its cause is known.
+    /// Reports a pending release of control once its cause is known.
     fn review_release(&mut self, now: Instant) {
         let Some((mut release, until)) = self.release else {
             return;
@@ -441,8 +445,8 @@ impl Autopilot {
         self.report.tell(line);
     }
 
-    /// Keeps a blind link blind until positions are regular for a while. The state then does not alternate with every other
-    /// position.
+    /// Keeps the state [`State::Blind`] until positions have been received regularly for some time. The state then
+    /// does not alternate with every other position.
     fn recover(&mut self, now: Instant, observed: &mut Observed) {
         if self.state != State::Blind {
             self.located_at = None;
@@ -458,7 +462,7 @@ impl Autopilot {
             .is_some_and(|at| now.since(at) >= self.recovery);
     }
 
-    /// Returns the release that has just happened.
+    /// Returns the cause of the present release of control, and the autopilot's mode.
     fn release(&self) -> Release {
         let vehicle = &self.vehicle;
         let mode = vehicle.mode().unwrap_or(FlightMode::Other);
@@ -474,7 +478,7 @@ impl Autopilot {
         Release { cause, mode }
     }
 
-    /// Returns the reason for which the pilot cannot engage the drone now.
+    /// Returns the reason for which the pilot cannot engage the drone now, or `None`.
     fn wait_reason(&self, now: Instant) -> Option<WaitReason> {
         let vehicle = &self.vehicle;
         let is_px4 = vehicle.kind() == Some(Kind::Px4);
@@ -524,7 +528,7 @@ impl Autopilot {
         self.report.tell(line);
     }
 
-    /// Returns the time at which the reason to wait is reported; `None` if it has been.
+    /// Returns the time at which the reason not to engage the drone is reported; `None` if nothing is due.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -593,7 +597,7 @@ impl Autopilot {
         Some(frame)
     }
 
-    /// Returns the due target.
+    /// Returns the frame with the next target if one is due.
     fn next_target(&mut self, now: Instant) -> Option<FrameBytes> {
         let kind = self.vehicle.kind()?;
         let is_overdue = |target: Target| now.since(target.due) > OVERDUE;
@@ -636,7 +640,7 @@ impl Autopilot {
         self.target_frame(now, &target.carrot)
     }
 
-    /// Returns the frame that sets the autopilot's target.
+    /// Returns the frame that sets the autopilot's target to the position of `carrot`, the moving target.
     fn target_frame(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
         let at: Geodetic = self.axis.point(carrot.place)?;
         let x_m = carrot.place.x_m;
@@ -659,7 +663,8 @@ impl Autopilot {
         message.encode(self.own(), self.peer(), sequence)
     }
 
-    /// Returns the address of this component. It has the system number of its autopilot, since it is a part of the vehicle.
+    /// Returns the MAVLink address of this component. It has the system number of its autopilot, since it is a part
+    /// of the vehicle.
     fn own(&self) -> Address {
         Address {
             component: COMPONENT,
@@ -678,15 +683,15 @@ impl Autopilot {
         millis(now.since(self.began).as_micros())
     }
 
-    /// Returns the newest measured position since the last call. It has its time, and is meant for `Relay::handle_position`.
+    /// Returns the newest measured position, with its time, once. It is meant for `Relay::handle_position`.
     pub fn poll_position(&mut self) -> Option<Position> {
         let position = self.position.take()?;
         let at = self.clock.external(position.at);
         Some(Position { at, ..position })
     }
 
-    /// Returns the distance of a drone that is too far from its line to have a place along it. `None` if it has one, or without a
-    /// position for 3 s. Constant work.
+    /// Returns the position of a drone that is too far from its line, and its distance; else `None`. Such a drone has
+    /// no position in the mission's coordinates. `None`, too, without a position for 3 s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
         let at = self.astray.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)
@@ -732,7 +737,7 @@ impl Autopilot {
         self.clock.external(due)
     }
 
-    /// Returns the control state.
+    /// Returns the control state of the drone.
     pub const fn state(&self) -> State {
         self.state
     }
@@ -747,8 +752,8 @@ impl Autopilot {
         self.parser.counters()
     }
 
-    /// Signs all frames with this key, and accepts only frames signed with it and RADIO_STATUS. A ground station sets the
-    /// autopilot's key (SETUP_SIGNING).
+    /// Signs all frames with the key of `signing`, and accepts only frames signed with it and RADIO_STATUS. A ground
+    /// station sets the autopilot's key (SETUP_SIGNING).
     #[cfg(feature = "mavlink-signing")]
     pub const fn sign(&mut self, signing: Signing) {
         self.trust.sign_with(signing);
@@ -846,7 +851,7 @@ impl Autopilot {
         (is_news, position)
     }
 
-    /// Switches to the line between the sites of the relay's mission.
+    /// Switches to the line between the sites (Tx and Rx) of the relay's mission, if they have changed.
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();

@@ -16,35 +16,35 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Minimum time between two equal lines.
+/// Minimum time between two equal lines of text to the operator.
 const SPACING: Duration = Duration::from_millis(10_000);
 
-/// Maximum number of different lines sent within [`SPACING`].
+/// Maximum number of different lines of text sent within [`SPACING`].
 const RECENT: usize = 16;
 
-/// Capacity of the queue of the link's own lines, and of the queue of the firmware's lines.
+/// Capacity of the queue of the link's own lines. The next constant is that of the queue of the firmware's lines.
 const LINES: usize = 6;
 const TEXTS: usize = 3;
 
-/// Interval between two rounds of numbers.
+/// Interval at which the numbers (SIR and position) are sent to the operator.
 const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 
-/// Topic of a line. A newer line replaces a waiting one of its topic.
+/// Topic of a line of text to the operator. A newer line replaces a waiting one of its topic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
-    /// Control of the drone.
+    /// Engagement or release of the drone by the relay.
     Control,
-    /// Reason for which the mode is not used.
+    /// Reason for which the pilot cannot engage the drone.
     Wait,
-    /// Reason for which the guard holds the drone back, upstream.
+    /// Reason for which the guard holds the drone, concerning its upstream neighbour.
     Upstream,
-    /// Reason for which the guard holds the drone back, downstream.
+    /// Reason for which the guard holds the drone, concerning its downstream neighbour.
     Downstream,
-    /// Event of the relay.
+    /// Event of the relay, such as a lost neighbour.
     Relay,
-    /// Lines about the autopilot's fence.
+    /// Breach of the autopilot's own fence.
     Fence,
     /// Command of the operator to clear lost relays.
     Clearance,
@@ -54,7 +54,7 @@ impl Topic {
     const COUNT: usize = 7;
 }
 
-/// Line of text, in two parts.
+/// Line of text for the operator, stored in two parts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Line {
     topic: Topic,
@@ -79,7 +79,8 @@ impl Line {
         }
     }
 
-    /// Returns the line for a new reason of the guard to hold the relay back on that side.
+    /// Returns the line for the guard's new reason to hold the drone because of its neighbour on `side`. `None` is
+    /// the end of a reason.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
             Side::Upstream => (Topic::Upstream, " the previous drone"),
@@ -113,13 +114,13 @@ impl Line {
         Some(Self::info(Topic::Relay, text))
     }
 
-    /// Returns the line's FNV-1a hash.
+    /// Returns the FNV-1a hash of the line's text, by which equal lines are recognised.
     fn hash(&self) -> u32 {
         hash(self.text)
     }
 }
 
-/// Returns the FNV-1a hash of both parts.
+/// Returns the FNV-1a hash of both parts of a text.
 fn hash(text: [&str; 2]) -> u32 {
     let bytes = text.into_iter().flat_map(str::bytes);
     bytes.fold(0x811C_9DC5, |hash, byte| {
@@ -127,7 +128,7 @@ fn hash(text: [&str; 2]) -> u32 {
     })
 }
 
-/// Pending lines and numbers.
+/// Queue of texts and numbers for the operator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
@@ -137,13 +138,13 @@ pub(super) struct Report {
     /// Last line sent on each topic.
     newest_sent: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
-    /// Number of values sent in this round.
+    /// Number of values already sent in the current round.
     sent: usize,
     again_at: Option<Instant>,
 }
 
 impl Report {
-    /// Queues a line. A full queue drops its oldest line.
+    /// Queues a line for the operator. A full queue drops its oldest line.
     pub(super) fn tell(&mut self, line: Line) {
         let newest = self.lines.iter().rfind(|other| other.topic == line.topic);
         if newest == Some(&line) {
@@ -174,7 +175,7 @@ impl Report {
             && self.recent.push((hash, now + SPACING)).is_ok()
     }
 
-    /// Removes a line; unlike `Vec::remove`, without a panic if there is none.
+    /// Removes the line at index `at`; unlike `Vec::remove`, without a panic if there is none.
     fn remove_line(&mut self, at: usize) {
         let mut index = 0;
         self.lines.retain(|_| {
@@ -183,7 +184,7 @@ impl Report {
         });
     }
 
-    /// Removes the next line that may be sent at `now`.
+    /// Removes and returns the next line that may be sent at `now`, with its severity, or `None`.
     fn next_line(&mut self, now: Instant) -> Option<(u8, String<50>)> {
         let mut at = 0;
         while let Some(line) = self.lines.get(at).copied() {
@@ -220,7 +221,7 @@ impl Report {
         None
     }
 
-    /// Sets the numbers to send.
+    /// Sets the numbers to send to the operator: the SIR, dB, and the position; `None` for unknown ones.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -232,7 +233,7 @@ impl Report {
         }
     }
 
-    /// Removes the next number for the operator, and returns it as encoded by `encode`.
+    /// Removes the next text or number that is due, and returns it as encoded by `encode`. `None` if nothing is due.
     pub(super) fn take<T>(
         &mut self,
         now: Instant,
@@ -264,7 +265,7 @@ impl Report {
         None
     }
 
-    /// Returns the time of the next line or number.
+    /// Returns the time at which the next line or number is due.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let waits = !(self.lines.is_empty() && self.texts.is_empty());
         let lines = self.recent.iter().map(|(_, until)| *until);
@@ -273,13 +274,13 @@ impl Report {
     }
 }
 
-/// Maximum number of relays that one command can name.
+/// Maximum number of relays that one command to clear lost relays can name.
 pub(super) const MOST: usize = 7;
 
-/// Relays named in a command, 0 for none.
+/// Numbers of the relays that a command names; unused entries are 0.
 pub type RelayNumbers = [u16; MOST];
 
-/// An event of the link to an autopilot.
+/// Event of the link to an autopilot, for the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum AutopilotEvent {
@@ -287,22 +288,22 @@ pub enum AutopilotEvent {
     Found(Kind),
     /// Restart of the autopilot.
     Restarted,
-    /// Change of the state: see [`State`].
+    /// Change of the control state to this one: see [`State`].
     State(State),
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
     Released(Release),
     /// Reason for which the drone cannot be engaged, or is not engaged in the companion's mode.
     Waits(WaitReason),
-    /// Readiness: the pilot may choose the mode.
+    /// Readiness: the pilot may now engage the drone by choosing the companion's mode.
     Ready,
     /// Refused target: for 3 s the autopilot has reported another target than it was sent. The position is outside its own fence,
     /// or another companion controls it.
     Refused,
     /// Report of the autopilot that it is outside of its fence.
     FenceBreached,
-    /// Drone so far from its line that it has no place along it. Check that these are the sites of this flight. Reported once on
-    /// the ground and at most once in 10 s in the air.
+    /// Drone so far from its line that it has no position in the mission's coordinates. Check that the sites are
+    /// those of this flight. Reported once on the ground and at most once in 10 s in the air.
     OffLine(OffLine),
     /// Command of the operator over MAVLink that clears all lost relays of one side.
     /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
@@ -314,9 +315,9 @@ pub enum AutopilotEvent {
         /// Sender of the command.
         from: Address,
     },
-    /// Denied command of the operator to clear lost relays. It does not name exactly the lost relays of one side.
+    /// Denied command of the operator to clear lost relays: it does not name exactly those of one side.
     ClearRefused {
-        /// Numbers of the relays that it names, padded with zeros.
+        /// Numbers of the relays that the command names, padded with zeros.
         relays: RelayNumbers,
         /// Sender of the command.
         from: Address,
@@ -325,24 +326,24 @@ pub enum AutopilotEvent {
     Mistrusted(Mistrust),
 }
 
-/// Pending events.
+/// Events of the link that the firmware has not polled yet.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Events {
     pub(super) found: Option<Kind>,
     pub(super) restarted: bool,
     pub(super) released: Option<Release>,
     pub(super) state: Option<State>,
-    /// Either [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`].
+    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], whichever is newer.
     pub(super) waits: Option<AutopilotEvent>,
     pub(super) breached: bool,
     pub(super) refused: bool,
     pub(super) off_line: Option<OffLine>,
-    /// Either [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
+    /// Pending [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
     pub(super) clearance: Option<AutopilotEvent>,
 }
 
 impl Events {
-    /// Removes the next event.
+    /// Removes and returns the next pending event.
     pub(super) fn take(&mut self) -> Option<AutopilotEvent> {
         if let Some(kind) = self.found.take() {
             return Some(AutopilotEvent::Found(kind));

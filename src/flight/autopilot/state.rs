@@ -19,10 +19,10 @@
 //! mode first, and receives that as the reason. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
 //! and no message of a neighbour.
 
-/// Control state of the drone.
+/// Control state of the drone: what the link to its autopilot does.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum State {
-    /// No autopilot is received.
+    /// No autopilot is received on the link.
     #[default]
     Silent,
     /// The drone is on the ground, or not armed.
@@ -35,7 +35,7 @@ pub enum State {
     Blind,
 }
 
-/// Observations that determine the state.
+/// Observations of the autopilot that determine the control state.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "what is seen of an autopilot, each for itself"
@@ -48,12 +48,12 @@ pub(super) struct Observed {
     pub(super) flying: bool,
     /// True if the pilot has chosen the mode in which a companion sets the target. The choice was made since this link started.
     pub(super) granted: bool,
-    /// True if the position is known.
+    /// True if the drone's position is known.
     pub(super) located: bool,
 }
 
 impl State {
-    /// Returns the state after `observed`.
+    /// Returns the control state that follows this one after `observed`.
     pub(super) const fn next(self, observed: Observed) -> Self {
         let Observed {
             there,
@@ -86,14 +86,14 @@ const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 /// Kind of autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// PX4: OFFBOARD grants control, for as long as targets are streamed.
+    /// PX4: the mode OFFBOARD grants control, for as long as targets are streamed.
     Px4,
-    /// ArduCopter: GUIDED grants control, and a target holds for good.
+    /// ArduCopter: the mode GUIDED grants control, and a target holds until the next one.
     ArduCopter,
 }
 
 impl Kind {
-    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`.
+    /// Returns the kind for these values of `MAV_AUTOPILOT` and `MAV_TYPE`; `None` for an unsupported one.
     pub(super) fn of(autopilot: u8, vehicle: u8) -> Option<Self> {
         match autopilot {
             12 => Some(Self::Px4),
@@ -115,16 +115,16 @@ pub enum FlightMode {
     Hold,
     /// BRAKE: the drone stops and holds its position.
     Brake,
-    /// RTL or SMART_RTL: the drone returns.
+    /// RTL or SMART_RTL: the drone returns to its launch position.
     Return,
-    /// Landing mode.
+    /// Landing mode: the drone descends and lands.
     Land,
-    /// Another mode: a mission, a take-off.
+    /// Any other mode, such as a mission or a take-off.
     Other,
 }
 
 impl FlightMode {
-    /// Returns the mode by its number.
+    /// Returns the flight mode with the number `custom_mode` of this kind of autopilot.
     pub(super) const fn of(kind: Kind, custom_mode: u32) -> Self {
         match kind {
             Kind::Px4 => match (custom_mode >> 16 & 0xFF, custom_mode >> 24) {
@@ -154,15 +154,16 @@ impl FlightMode {
 pub enum ReleaseCause {
     /// Another mode was chosen, by the pilot or by a ground station.
     Chosen,
-    /// The autopilot's failsafe.
+    /// The autopilot entered its failsafe.
     Failsafe,
     /// The autopilot's fence was breached.
     Fence,
-    /// Interrupted or late link. A PX4 may be in its failsafe, which a stream of targets would end.
+    /// The link to the autopilot was interrupted or late. A PX4 may be in its failsafe, which a stream of targets
+    /// would end.
     Link,
 }
 
-/// Release of control: its cause, and the present mode of the autopilot.
+/// Release of the drone's control: its cause, and the present mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Release {
     /// Cause of the release.
@@ -172,7 +173,7 @@ pub struct Release {
 }
 
 impl Release {
-    /// Returns the line for the operator, in two parts.
+    /// Returns the text about the release for the operator, in two parts.
     pub(super) const fn text(self) -> [&'static str; 2] {
         let mode = match self.mode {
             FlightMode::Companion => "relay: released",
@@ -199,20 +200,20 @@ impl Release {
 pub enum WaitReason {
     /// The autopilot is in its failsafe. It ends when the pilot chooses a mode.
     Failsafe,
-    /// Bytes from the autopilot arrive late.
+    /// Messages from the autopilot arrive late.
     Link,
     /// OFFBOARD or GUIDED was chosen before this link started. Another mode has to be chosen first.
     Found,
-    /// No mode chosen by the pilot was observed yet.
+    /// The pilot has not yet been seen to choose a mode.
     Unseen,
-    /// No position is known, or none near the line.
+    /// The drone's position is unknown, or not near the line.
     Position,
     /// The relay is not ready ([`handle_ready`](super::Autopilot::handle_ready)).
     NotReady,
 }
 
 impl WaitReason {
-    /// Returns the line for the operator.
+    /// Returns the text about this reason for the operator.
     pub(super) const fn text(self) -> &'static str {
         match self {
             Self::Failsafe => "relay: waits, autopilot in failsafe",

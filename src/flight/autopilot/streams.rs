@@ -8,24 +8,24 @@ use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time for which messages are counted before requests are repeated.
+/// Time for which received messages are counted before their rates are checked and requested again.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
-/// Maximum time until the answer to a request.
+/// Maximum time from a request for a message to its answer.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Unanswered requests for a message before they end. For a message without which the drone cannot fly they are repeated every 16
-/// windows instead.
+/// Number of [`WINDOW`]s without a message after which requests for it end. A message without which the drone cannot
+/// fly is requested every 16 windows instead: the next constant.
 const IN_VAIN: u8 = 4;
 const SELDOM: u8 = 16;
 
-/// Requests without any answer after which the autopilot does not receive the link.
+/// Number of unanswered requests after which the autopilot seems not to receive the link's frames.
 const UNANSWERED: u8 = 2;
 
-/// Values of `MAV_RESULT` after which another request has no use.
+/// Values of `MAV_RESULT` with which the autopilot denies a request for good.
 const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 
-/// Requested message and its interval.
+/// Message that the link requests from the autopilot, and its interval.
 struct Asked {
     id: u32,
     interval: Duration,
@@ -57,22 +57,22 @@ const ASKED: [Asked; 4] = [
     },
 ];
 
-/// State of the request for one message.
+/// State of the request for one message of the autopilot.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     asks: bool,
     came: u32,
-    /// Consecutive windows without the message, though it was requested.
+    /// Number of consecutive windows in which the requested message was not received.
     in_vain: u8,
     is_denied: bool,
 }
 
-/// Requests for all messages, and the answers.
+/// Requests for all messages that the link needs, and the autopilot's answers.
 #[derive(Clone, Debug)]
 pub(super) struct Streams {
     all: [Stream; ASKED.len()],
     since: Instant,
-    /// Index and time of the outstanding request.
+    /// Index of the message of the outstanding request, and the request's time.
     under_way: Option<(usize, Instant)>,
     unanswered: u8,
     is_answered: bool,
@@ -95,7 +95,7 @@ impl Streams {
         }
     }
 
-    /// Counts a message.
+    /// Counts a received message with the number `id`.
     pub(super) fn hear(&mut self, id: u32) {
         for (stream, asked) in self.all.iter_mut().zip(ASKED) {
             if asked.id == id {
@@ -104,7 +104,7 @@ impl Streams {
         }
     }
 
-    /// Processes the answer to a request.
+    /// Processes the autopilot's answer to the outstanding request; `result` is its `MAV_RESULT`.
     pub(super) fn answer(&mut self, result: u8) {
         self.is_answered = true;
         if let Some((which, _)) = self.under_way.take()
@@ -150,7 +150,7 @@ impl Streams {
         self.since = now;
     }
 
-    /// Requests the reported target again: an ArduCopter sends it only in the companion's mode.
+    /// Requests the message with the autopilot's target again. An ArduCopter sends it only in the companion's mode.
     pub(super) fn renew(&mut self) {
         for (stream, asked) in self.all.iter_mut().zip(ASKED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;
@@ -168,7 +168,7 @@ impl Streams {
             .map_or(window, |at| at.min(window))
     }
 
-    /// Returns the next message to request, and its interval in µs.
+    /// Returns the next message to request, and its interval in µs; `None` if no request is due.
     pub(super) fn take(&mut self, now: Instant, kind: Kind) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.under_way {
             if now.since(at) < ANSWER {

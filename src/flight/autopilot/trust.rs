@@ -12,29 +12,30 @@ use crate::flight::mavlink::outgoing::FrameBytes;
 use crate::flight::mavlink::signing::{Flaw, Signing};
 use crate::time::Instant;
 
-/// Consecutive mismatches before a mismatch is reported.
+/// Number of consecutive heartbeats with a signature mismatch before the mismatch is reported.
 const IN_A_ROW: u8 = 3;
 
 /// Mismatch between the signatures of an autopilot and of the link.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Mistrust {
-    /// Signed autopilot, link without a key, no request answered. The autopilot seems to ignore unsigned frames.
+    /// The autopilot signs, the link has no key, and no request is answered. The autopilot seems to ignore unsigned
+    /// frames.
     NoKey,
-    /// Signed autopilot, link without a key, requests answered all the same.
+    /// The autopilot signs, the link has no key, but requests are answered all the same.
     SignsOnly,
-    /// Link with a key, unsigned autopilot, whose frames are therefore ignored.
+    /// The link has a key, and the autopilot does not sign. Its frames are therefore ignored.
     Unsigned,
-    /// Different keys of autopilot and link.
+    /// The autopilot and the link sign with different keys.
     OtherKey,
-    /// Old frames of the autopilot: its clock has gone back, or a recording is replayed.
+    /// The autopilot's signed frames are old: its clock has gone back, or a recording is replayed.
     Old,
 }
 
 impl Mistrust {
     const ALL: [Self; 4] = [Self::NoKey, Self::Unsigned, Self::OtherKey, Self::Old];
 
-    /// Returns the bit of this kind.
+    /// Returns the bit that stands for this kind of mismatch.
     const fn bit(self) -> u8 {
         1 << self as u8
     }
@@ -51,21 +52,21 @@ impl From<Flaw> for Mistrust {
     }
 }
 
-/// Key of the link, and the mismatches found.
+/// Signing key of the link, and the signature mismatches found.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trust {
     #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
-    /// Kind of mismatch of the last heartbeats, and their number in a row.
+    /// Kind of signature mismatch of the last heartbeats, and their number in a row.
     row: Option<(Mistrust, u8)>,
-    /// Bits of pending reports, and of kinds already found.
+    /// Bits of the mismatches to be reported. The next field has the bits of all kinds found so far.
     due: u8,
     found: u8,
 }
 
 impl Trust {
-    /// Returns the next received message that is accepted.
+    /// Returns the next received message whose signature is acceptable; `None` if there is none.
     pub(super) fn next_received(&mut self, now: Instant, parser: &mut Parser) -> Option<Received> {
         loop {
             let taken = parser.next_frame(|received, frame| {
@@ -77,7 +78,7 @@ impl Trust {
         }
     }
 
-    /// Returns true if the frame is accepted.
+    /// Returns true if the signature of the frame, or its absence, is acceptable.
     fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         let (takes, wrong) = self.judge(now, received, frame);
         if !takes {
@@ -122,13 +123,13 @@ impl Trust {
         (true, no_key(received))
     }
 
-    /// Signs and checks with this key from now on.
+    /// Signs all frames and checks received ones with the key of `signing` from now on.
     #[cfg(feature = "mavlink-signing")]
     pub(super) const fn sign_with(&mut self, signing: Signing) {
         self.signing = Some(signing);
     }
 
-    /// Returns the number of rejected frames.
+    /// Returns the number of frames rejected because of their signatures.
     pub(super) const fn refused(&self) -> u32 {
         self.refused
     }
@@ -144,7 +145,8 @@ impl Trust {
         frame
     }
 
-    /// Returns the next mismatch to report. `hears` is true if the autopilot answers requests, `None` while that is unknown.
+    /// Returns the next signature mismatch to report, once. `hears` is true if the autopilot answers requests, `None`
+    /// while that is unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL

@@ -11,10 +11,10 @@ use crate::node::sample::Sample;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// Silence after which the autopilot counts as gone.
+/// Time without a heartbeat after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Maximum age of a position that is used.
+/// Age of a position of the drone from which on it is not used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
 /// Silence of the link that may have caused a failsafe of a PX4. A PX4 enters its failsafe after a second without a target, and a
@@ -24,22 +24,22 @@ const GAP: Duration = Duration::from_millis(800);
 /// Maximum time between the measurement of a position and its message.
 const MEASURED: Duration = Duration::from_millis(300);
 
-/// Component number of the autopilot.
+/// MAVLink component number of an autopilot.
 pub(super) const AUTOPILOT: u8 = 1;
 
-/// Flags of `MAV_MODE_FLAG`.
+/// Flag of `MAV_MODE_FLAG`: the custom mode is valid. The next constant: the vehicle is armed.
 const CUSTOM_MODE: u8 = 1;
 const ARMED: u8 = 128;
 
-/// Values of `MAV_LANDED_STATE`.
+/// Value of `MAV_LANDED_STATE` for a vehicle in the air; the next constant is for a landing one.
 const IN_AIR: u8 = 2;
 const LANDING: u8 = 4;
 
-/// Values of `MAV_STATE`: a PX4 outside of a failsafe, and in one.
+/// Value of `MAV_STATE` for a PX4 outside of a failsafe; the next constant is for one in a failsafe.
 const ACTIVE: u8 = 4;
 const CRITICAL: u8 = 5;
 
-/// Measured position of the drone, and its time.
+/// Measured position and velocity of the drone, and the time of the measurement.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Position {
@@ -51,28 +51,28 @@ pub struct Position {
     pub velocity_m_s: [f32; 3],
 }
 
-/// Result of a received message.
+/// Consequence of a received MAVLink message for the link.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum VehicleUpdate {
     /// Message of another sender, or without new information.
     Nothing,
-    /// First message of an autopilot.
+    /// First message of an autopilot on this link.
     Found,
-    /// Restart of the autopilot.
+    /// Message that shows a restart of the autopilot.
     Restarted,
-    /// New information that changes the state.
+    /// New information that may change the control state.
     News,
-    /// Position of the drone.
+    /// New position of the drone, in the mission's coordinates.
     Position(Position),
-    /// Position of the drone, too far from the line for a place along it.
+    /// New position of the drone that is too far from the line for the mission's coordinates.
     OffLine(Geodetic),
-    /// Target that the autopilot reports.
+    /// Target that the autopilot reports: latitude and longitude, 1e-7 degrees.
     Target(i32, i32),
     /// Answer to a request for a message, with its `MAV_RESULT`.
     Answer(u8),
 }
 
-/// Known state of the autopilot.
+/// State of the autopilot and the drone, as known from received messages.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "observations that are independent of each other"
@@ -81,14 +81,14 @@ pub(super) enum VehicleUpdate {
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
-    /// Time of the last message of any kind.
+    /// Time of the autopilot's last message of any kind.
     frame_at: Option<Instant>,
     mode: u32,
     /// True while the mode is OFFBOARD or GUIDED.
     granted: bool,
-    /// Last `MAV_STATE`.
+    /// Value of `MAV_STATE` in the last heartbeat.
     status: u8,
-    /// True once the mode may be granted: see [`Self::review_choice`].
+    /// True if OFFBOARD or GUIDED, once entered, counts as the pilot's choice: see [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
@@ -96,14 +96,14 @@ pub(super) struct Vehicle {
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// Measurement time of the last position, near the line or not.
+    /// Measurement time of the last position, also of one far from the line.
     measured_at: Option<Instant>,
     position: Option<Position>,
 }
 
 impl Vehicle {
-    /// Processes a message. The first sender that identifies itself as an autopilot is kept for good, since other vehicles may be
-    /// received through it.
+    /// Processes a received message. The first sender that identifies itself as an autopilot is kept for good, since
+    /// other vehicles may be received through it.
     pub(super) fn hear(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
@@ -298,7 +298,7 @@ impl Vehicle {
         self.position = None;
     }
 
-    /// Converts the positions to another line.
+    /// Converts the stored position by `moved` to another line; drops it if that returns `None`.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -320,7 +320,7 @@ impl Vehicle {
             .filter(|position| now.since(position.at) < STALE && !self.echo.is_late(now))
     }
 
-    /// Returns the observations that determine the state.
+    /// Returns the observations that determine the control state at `now`.
     pub(super) fn observed(&self, now: Instant) -> Observed {
         Observed {
             there: self.heard_at.is_some_and(|at| now.since(at) < SILENT),
@@ -336,7 +336,7 @@ impl Vehicle {
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the time at which the known values expire without new messages.
+    /// Returns the time at which the next known value becomes too old without a new message.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -352,14 +352,14 @@ impl Vehicle {
 /// True if this crate was built with the feature `sensing`.
 const SENSING: bool = cfg!(feature = "sensing");
 
-/// Newest noise measurement that was not taken yet.
+/// Newest noise measurement of a SiK radio, until the relay takes it: drone's position, noise in W.
 #[derive(Clone, Debug)]
 pub(super) struct RadioNoise(Option<(Placement, f32)>);
 
 impl RadioNoise {
     pub(super) const NONE: Self = Self(None);
 
-    /// Records the noise of a RADIO_STATUS message.
+    /// Records the noise of a RADIO_STATUS message if the drone is in the air at a known position.
     pub(super) fn hear(&mut self, now: Instant, received: &Received, vehicle: &Vehicle) {
         if SENSING && let Some(Incoming::RadioStatus { noise, .. }) = received.message {
             let heard = vehicle.place_in_air(now).zip(noise_w(noise));
@@ -367,7 +367,7 @@ impl RadioNoise {
         }
     }
 
-    /// Removes the measurement, for the relay.
+    /// Removes and returns the noise measurement, for the relay; `None` if there is no new one.
     pub(super) fn take(&mut self) -> Option<Sample> {
         let (at, power_w) = self.0.take()?;
         Some(Sample::Heard { at, power_w })
@@ -376,19 +376,20 @@ impl RadioNoise {
 
 const PERIOD: Duration = Duration::from_millis(500);
 
-/// Maximum age of the newest answered question; beyond it the link counts as late.
+/// Maximum age of the newest answered TIMESYNC question; beyond it the link counts as late.
 const LATE: Duration = Duration::from_millis(1_500);
 
 const GIVES_UP: Duration = Duration::from_millis(10_000);
 
-/// Maximum age of a question whose answer counts.
+/// Maximum age of a TIMESYNC question whose answer counts.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// Low bits of a question that hold the link's tag. The higher bits hold µs, for 200 days. The autopilot only returns them.
+/// Number of low bits of a TIMESYNC question that hold the link's tag. The higher bits hold µs, for 200 days. The
+/// autopilot only returns them. The next constant is the tag without a seed.
 const SHIFT: u32 = 20;
 const TAG: u32 = 0xA_52A5;
 
-/// Echoes (TIMESYNC): upper bound of a message's age, by the link itself and without a common clock.
+/// Measurement of the link's delay by echoes (TIMESYNC): an upper bound of a message's age.
 ///
 /// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock may lose
 /// time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in order: a message
@@ -401,12 +402,12 @@ const TAG: u32 = 0xA_52A5;
 /// counts as late whenever it does not answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Low bits of every question.
+    /// Tag in the low bits of every question, by which this link recognises its own answers.
     tag: u32,
     due: Option<Instant>,
-    /// Time of the first question.
+    /// Time of the first TIMESYNC question.
     begun_at: Option<Instant>,
-    /// Time of the newest answered question.
+    /// Time of the newest TIMESYNC question that was answered.
     asked_at: Option<Instant>,
 }
 
@@ -422,12 +423,12 @@ impl Default for Echo {
 }
 
 impl Echo {
-    /// Draws the tag from `seed`.
+    /// Derives the tag of this link's TIMESYNC questions from `seed`.
     pub(super) const fn seed(&mut self, seed: u32) {
         self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
     }
 
-    /// Forgets all questions and answers.
+    /// Forgets all TIMESYNC questions and answers.
     pub(super) fn restart(&mut self) {
         *self = Self {
             tag: self.tag,
@@ -435,7 +436,7 @@ impl Echo {
         };
     }
 
-    /// Returns the question to send at `now`.
+    /// Returns the TIMESYNC question to send at `now`; `None` if none is due.
     pub(super) fn take(&mut self, now: Instant) -> Option<u64> {
         if self.due.is_some_and(|due| due > now) {
             return None;
@@ -445,7 +446,7 @@ impl Echo {
         Some(now.as_micros() << SHIFT | u64::from(self.tag))
     }
 
-    /// Processes an answer.
+    /// Processes an answer to a TIMESYNC question, which contains the `question`.
     pub(super) fn hear(&mut self, now: Instant, question: u64) {
         let asked_at = Instant::from_micros(question >> SHIFT);
         let is_own = question & ((1 << SHIFT) - 1) == u64::from(self.tag) && asked_at <= now;
@@ -468,7 +469,7 @@ impl Echo {
         }
     }
 
-    /// Returns the time of the next question or check.
+    /// Returns the time at which the next question is due or the link becomes late.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let late = self.asked_at.map(|at| at + LATE).filter(|at| *at > now);
         let all = [self.due, late, self.begun_at.map(|at| at + GIVES_UP)];
@@ -476,23 +477,27 @@ impl Echo {
     }
 }
 
-/// Backward step of the autopilot's clock that shows a restart.
+/// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the window of the anchor, which is the minimum delay of the last one to two halves.
+/// Half of the window over which the minimum delay of messages is taken. The minimum covers the last one to two
+/// halves.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half. A gap and the burst after it then do not move the anchor.
+/// Minimum number of messages in each half of the window for the minimum delay. A gap and the burst after it then do
+/// not change that delay.
 const LEAST: u8 = 8;
 
-/// Assumed maximum drift of the clocks: one part in 2^10. With more drift the anchor lags behind by the drift of two halves.
+/// Assumed maximum drift between the clocks of relay and autopilot: one part in 2^10. With more drift the minimum
+/// delay lags behind by the drift of two halves.
 const DRIFT: u32 = 10;
 
-/// Minimum difference between the relay's clock and the autopilot's, µs. It is that of the message with the minimum delay.
+/// Conversion from the autopilot's clock to the relay's, by the message with the minimum delay.
 ///
-/// A message can be late because the link is slow, and it can seem late because the autopilot's clock has lost time. An anchor that
-/// is never renewed takes the second for the first for good. An anchor that is renewed within 4 s to 8 s of messages corrects this,
-/// and a late message then counts as late for that long.
+/// It uses the minimum difference between the two clocks. A message can be late because the link is slow, and it can
+/// seem late because the autopilot's clock has lost time. A minimum that is never renewed takes the second for the
+/// first for good. A minimum that is renewed within 4 s to 8 s of messages corrects this, and a late message then
+/// counts as late for that long.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RemoteClock {
     known: Option<Known>,
@@ -500,7 +505,7 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    /// Minimum difference in the previous half, and in the present one.
+    /// Minimum difference between the clocks, µs: in the previous half of the window, and the present one.
     least: [i64; 2],
     since: Instant,
     messages: u8,
@@ -549,8 +554,8 @@ impl RemoteClock {
     }
 }
 
-/// Returns milliseconds, which wrap after 49 days as the autopilot's do. The division has two steps with instructions of the
-/// target: a 64-bit division takes a kilobyte of flash.
+/// Returns `micros` in milliseconds, which wrap after 49 days as the autopilot's do. The division has two steps with
+/// instructions of the target: a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
@@ -558,24 +563,25 @@ pub(super) const fn millis(micros: u64) -> u32 {
     ((high / 1_000) << 16).wrapping_add(low / 1_000)
 }
 
-/// Minimum time between two reports of a position off the line.
+/// Minimum time between two reports that the drone is far from its line.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// Maximum age of the last position off the line.
+/// Age from which on the last position far from the line is not returned any more.
 const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 
-/// Position of a drone that has no place along its line.
+/// Position of a drone that is too far from its line for the mission's coordinates, and its distance.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OffLine {
     /// Position that the autopilot reports.
     pub at: Geodetic,
-    /// Distance along the ground to the nearest point of the line, m.
+    /// Distance along the ground to the nearest point of the line Tx to Rx, m.
     pub away_m: u32,
 }
 
 impl OffLine {
-    /// Returns the distance of a drone at `at` from the line `axis`. `None` for a place that is not on earth. Constant work.
+    /// Returns the position `at` with its distance from the line `axis`. `None` for a place that is not on earth.
+    /// Constant work.
     pub fn new(at: Geodetic, axis: &Axis) -> Option<Self> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -587,7 +593,7 @@ impl OffLine {
     }
 }
 
-/// Detection of a drone so far from its line that it has no place along it.
+/// Detection of a drone that is too far from its line for the mission's coordinates.
 ///
 /// Sites with latitude and longitude swapped are valid places, and nothing else shows the mistake.
 ///
@@ -600,12 +606,12 @@ impl OffLine {
 pub(super) struct Astray {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
-    /// True once the position off the line was reported while the drone was on the ground.
+    /// True once a position far from the line was reported while the drone was on the ground.
     reported_on_ground: bool,
 }
 
 impl Astray {
-    /// Records a position off the line; returns true if it has to be reported.
+    /// Records a position far from the line; returns true if it has to be reported.
     pub(super) fn hear(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;
@@ -624,7 +630,7 @@ impl Astray {
         self.reported_on_ground = false;
     }
 
-    /// Returns the newest position if it was off the line.
+    /// Returns the newest position, if it was far from the line and less than 3 s ago.
     pub(super) fn newest(&self, now: Instant) -> Option<Geodetic> {
         let fresh = self
             .newest
@@ -667,8 +673,8 @@ mod clock_tests {
         Instant::from_millis(ms)
     }
 
-    /// Returns the apparent age of each message of a flight, ms. `said` gives the autopilot's clock at a time, `delay` the link's
-    /// delay.
+    /// Returns the apparent age of each message of a flight, ms. `said` returns the autopilot's clock at a time,
+    /// `delay` the link's delay.
     fn ages(said: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();

@@ -14,40 +14,42 @@
 
 use crc::{CRC_16_MCRF4XX, Crc, NoTable};
 
-/// First byte of a frame.
+/// First byte of a MAVLink 2 frame.
 pub const MAGIC: u8 = 0xFD;
 
-/// Length of the header, bytes.
+/// Length of a MAVLink frame's header, bytes.
 pub const HEADER: usize = 10;
 
-/// Length of the checksum, bytes.
+/// Length of a MAVLink frame's checksum, bytes.
 pub const CHECKSUM: usize = 2;
-/// Length of a signed frame's signature, bytes.
+/// Length of a signed MAVLink frame's signature, bytes.
 pub const SIGNATURE: usize = 13;
 
-/// Maximum payload length, bytes.
+/// Maximum payload length of a MAVLink frame, bytes.
 pub const MAX_PAYLOAD: usize = 255;
 
-/// Maximum frame length, bytes.
+/// Maximum length of a MAVLink frame, bytes.
 pub const MAX_FRAME: usize = HEADER + MAX_PAYLOAD + CHECKSUM + SIGNATURE;
 
-/// Incompatible flag of a signed frame.
+/// Incompatibility flag that marks a signed MAVLink frame.
 pub const SIGNED: u8 = 1;
 
-/// Bitwise CRC. A table would take a kilobyte of flash, and a link to an autopilot carries only some ten kilobytes a second.
+/// Checksum of MAVLink, computed bit by bit. A table would take a kilobyte of flash, and a link to an autopilot
+/// carries only some ten kilobytes a second.
 static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 
-/// Sender or addressee of a message.
+/// MAVLink address: sender or addressee of a message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Address {
-    /// System id, 1 to 255.
+    /// System id of MAVLink, 1 to 255.
     pub system: u8,
-    /// Component id: 1 is the autopilot, 191 an onboard computer.
+    /// Component id of MAVLink: 1 is the autopilot, 191 an onboard computer.
     pub component: u8,
 }
 
-/// Returns the checksum of a frame; `covered` are the bytes between the first one and the checksum.
+/// Returns the checksum of a frame; `covered` are the bytes between the start byte and the checksum. `known` has the
+/// message's seed.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);
@@ -55,53 +57,54 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
     digest.finalize()
 }
 
-/// Properties of a message for the checksum and the parser.
+/// Properties of a MAVLink message that the checksum and the parser need.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Known {
-    /// Message id, 24 bits.
+    /// Message id of MAVLink, 24 bits.
     pub id: u32,
     /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
     pub crc_extra: u8,
-    /// Length of its fields, without extensions of later dialects, bytes.
+    /// Length of the message's fields, without extensions of later dialects, bytes.
     pub length: u8,
 }
 
-/// Message ids.
+/// Ids of the MAVLink messages that this crate uses.
 pub mod id {
-    /// Type, mode and state of a system.
+    /// Message HEARTBEAT: type, mode and state of a system.
     pub const HEARTBEAT: u32 = 0;
-    /// Position of the vehicle.
+    /// Message GLOBAL_POSITION_INT: position of the vehicle.
     pub const GLOBAL_POSITION_INT: u32 = 33;
     /// Message COMMAND_LONG: a command with seven parameters.
     pub const COMMAND_LONG: u32 = 76;
-    /// Reply to a command.
+    /// Message COMMAND_ACK: reply to a command.
     pub const COMMAND_ACK: u32 = 77;
-    /// Current target of an ArduPilot or PX4, in its local frame.
+    /// Message POSITION_TARGET_LOCAL_NED: the vehicle's target, in its local frame.
     pub const POSITION_TARGET_LOCAL_NED: u32 = 85;
-    /// Target position to fly to.
+    /// Message SET_POSITION_TARGET_GLOBAL_INT: target position to fly to.
     pub const SET_POSITION_TARGET_GLOBAL_INT: u32 = 86;
-    /// Current target of the vehicle.
+    /// Message POSITION_TARGET_GLOBAL_INT: the vehicle's target, as latitude and longitude.
     pub const POSITION_TARGET_GLOBAL_INT: u32 = 87;
     /// Message RADIO_STATUS: signal and noise level of a radio.
     pub const RADIO_STATUS: u32 = 109;
     /// Message TIMESYNC: clock value, which the receiver sends back.
     pub const TIMESYNC: u32 = 111;
-    /// State of the vehicle's geofence.
+    /// Message FENCE_STATUS: state of the vehicle's geofence.
     pub const FENCE_STATUS: u32 = 162;
-    /// Landed state of the vehicle.
+    /// Message EXTENDED_SYS_STATE: landed state of the vehicle.
     pub const EXTENDED_SYS_STATE: u32 = 245;
-    /// Named value, for an operator to plot.
+    /// Message NAMED_VALUE_FLOAT: named number, for an operator to plot.
     pub const NAMED_VALUE_FLOAT: u32 = 251;
-    /// Text for an operator.
+    /// Message STATUSTEXT: text for an operator.
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// Maximum length of a later dialect's extensions, bytes; a longer message is treated as noise.
+/// Maximum length of the extensions that later dialects may add to a message, bytes. A longer message is treated as
+/// noise.
 const ADDED: u8 = 24;
 
 impl Known {
-    /// Maximum payload length of this message.
+    /// Maximum payload length of this message with extensions, bytes.
     pub const fn longest(self) -> u8 {
         self.length.saturating_add(ADDED)
     }
@@ -115,7 +118,8 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that are read or written, and messages whose payload may contain frames. The latter are skipped as a whole.
+/// Messages that the parser knows: those read or written, and those whose payload may contain frames. The latter are
+/// skipped as a whole.
 const TABLE: [Known; 26] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::GLOBAL_POSITION_INT, 104, 28),
@@ -148,7 +152,7 @@ const TABLE: [Known; 26] = [
     known(385, 147, 133),
 ];
 
-/// Returns the properties of a message.
+/// Returns the properties of the message `id`; `None` for an unknown one.
 pub fn find_known(id: u32) -> Option<Known> {
     TABLE.into_iter().find(|known| known.id == id)
 }

@@ -9,7 +9,7 @@ use super::frame::{
 };
 use heapless::Vec;
 
-/// Payload of a message; reads beyond its end return 0.
+/// Payload of a received message; reads beyond its end return 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Payload<'a>(pub(super) &'a [u8]);
 
@@ -50,93 +50,93 @@ impl Payload<'_> {
 
 const _: () = assert!(MAX_PAYLOAD <= u8::MAX as usize, "what a length says");
 
-/// Received message, in the units and frames of the wire. Enum values are unchecked numbers.
+/// Received MAVLink message, in the units and frames of the wire. Enum values are unchecked numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Incoming {
     /// HEARTBEAT: the sender's type, mode and status.
     Heartbeat {
-        /// `MAV_TYPE`.
+        /// Value of `MAV_TYPE`, the type of vehicle.
         kind: u8,
-        /// `MAV_AUTOPILOT`: 3 is ArduPilot, 12 PX4.
+        /// Value of `MAV_AUTOPILOT`: 3 is ArduPilot, 12 PX4.
         autopilot: u8,
-        /// `MAV_MODE_FLAG`: bit 7 is armed.
+        /// Flags of `MAV_MODE_FLAG`: bit 7 is armed.
         base_mode: u8,
-        /// Mode number of the autopilot.
+        /// Number of the flight mode, defined by the autopilot.
         custom_mode: u32,
-        /// `MAV_STATE`.
+        /// Value of `MAV_STATE`, such as active or in a failsafe.
         status: u8,
     },
-    /// GLOBAL_POSITION_INT.
+    /// GLOBAL_POSITION_INT: position and velocity of the vehicle.
     GlobalPosition {
         /// Time of the position, ms since the autopilot's start.
         boot_ms: u32,
-        /// 10⁻⁷ degrees.
+        /// Latitude of the vehicle, 10⁻⁷ degrees.
         lat_e7: i32,
-        /// 10⁻⁷ degrees.
+        /// Longitude of the vehicle, 10⁻⁷ degrees.
         lon_e7: i32,
         /// Height above mean sea level, mm.
         amsl_mm: i32,
         /// Velocity toward north, east and down, cm/s.
         velocity_cm_s: [i16; 3],
     },
-    /// EXTENDED_SYS_STATE.
+    /// EXTENDED_SYS_STATE: landed state of the vehicle.
     ExtendedSysState {
-        /// `MAV_LANDED_STATE`: 1 on the ground, 2 in the air, 3 taking off, 4 landing.
+        /// Value of `MAV_LANDED_STATE`: 1 on the ground, 2 in the air, 3 taking off, 4 landing.
         landed_state: u8,
     },
-    /// POSITION_TARGET_LOCAL_NED; only its kind of target.
+    /// POSITION_TARGET_LOCAL_NED: the vehicle's target in its local frame; only its kind is read.
     PositionTargetLocal {
-        /// Bits of the ignored fields.
+        /// Bits of the target's values that the vehicle ignores.
         type_mask: u16,
     },
-    /// POSITION_TARGET_GLOBAL_INT.
+    /// POSITION_TARGET_GLOBAL_INT: the vehicle's target.
     PositionTargetGlobal {
-        /// 10⁻⁷ degrees.
+        /// Latitude of the target, 10⁻⁷ degrees.
         lat_e7: i32,
-        /// 10⁻⁷ degrees.
+        /// Longitude of the target, 10⁻⁷ degrees.
         lon_e7: i32,
-        /// Altitude in `frame`, m.
+        /// Altitude of the target above the reference of `frame`, m.
         altitude_m: f32,
-        /// Bits of the ignored fields.
+        /// Bits of the target's values that the vehicle ignores.
         type_mask: u16,
-        /// `MAV_FRAME`: 5 is above mean sea level.
+        /// Value of `MAV_FRAME`: 5 is above mean sea level.
         frame: u8,
     },
-    /// COMMAND_LONG.
+    /// COMMAND_LONG: command with seven parameters.
     CommandLong {
-        /// `MAV_CMD`.
+        /// Value of `MAV_CMD`, the number of the command.
         command: u16,
-        /// Seven parameters.
+        /// Parameters of the command.
         parameters: [f32; 7],
         /// System and component of the addressee.
         to: Address,
-        /// True for a repetition of a command without an answer.
+        /// True for a repetition of a command that was not answered.
         is_repeated: bool,
     },
-    /// COMMAND_ACK.
+    /// COMMAND_ACK: reply to a command.
     CommandAck {
-        /// `MAV_CMD`.
+        /// Value of `MAV_CMD`, the number of the command.
         command: u16,
-        /// `MAV_RESULT`: 0 accepted.
+        /// Value of `MAV_RESULT`: 0 is accepted.
         result: u8,
     },
     /// TIMESYNC: a request or its reply.
     TimeSync {
         /// Clock of the replying system, ns; 0 in a request.
         answered: u64,
-        /// Clock of the requesting system.
+        /// Clock of the requesting system, which the reply repeats, in its own units.
         asked: u64,
     },
-    /// FENCE_STATUS.
+    /// FENCE_STATUS: state of the vehicle's geofence.
     FenceStatus {
         /// True while the vehicle is outside of its geofence.
         is_breached: bool,
     },
     /// RADIO_STATUS of a SiK radio, in the units of [`noise_w`]; 255 is unknown.
     RadioStatus {
-        /// Signal strength of the last frame.
+        /// Signal strength of the last received frame.
         rssi: u8,
         /// Noise level between frames.
         noise: u8,
@@ -203,13 +203,13 @@ impl Incoming {
     }
 }
 
-/// A unit of a SiK radio, 1/1.9 dB, as a power of 2: log2(10) / 19.
+/// Step of a SiK radio's levels, 1/1.9 dB, as a power of 2: log2(10) / 19.
 const SIK_PER_UNIT: f32 = 0.174_838_32;
 
-/// Unit 0 of a SiK radio, -127 dBm, as a power of 2 of a watt: -15.7 log2(10).
+/// Level 0 of a SiK radio, -127 dBm, as a power of 2 of a watt: -15.7 log2(10).
 const SIK_ZERO: f32 = -52.154_27;
 
-/// Returns the noise power between frames, W, for `noise` of RADIO_STATUS.
+/// Returns the noise power, W, for the value `noise` of a SiK radio's RADIO_STATUS.
 ///
 /// The radio's documentation states `signal_dBm = (RSSI / 1.9) - 127` as an approximation, and the same units for noise. `None`
 /// for 255 (unknown), and for 0, which a radio reports before its first measurement and which is below any real noise.
@@ -221,7 +221,7 @@ pub fn noise_w(noise: u8) -> Option<f32> {
         .then(|| libm::exp2f(SIK_ZERO + SIK_PER_UNIT * f32::from(noise)))
 }
 
-/// Received message, and its sender.
+/// Received MAVLink message, and its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Received {
@@ -229,23 +229,24 @@ pub struct Received {
     pub from: Address,
     /// Decoded message; `None` for a kind that this crate skips, or that only companions send.
     pub message: Option<Incoming>,
-    /// Message id.
+    /// Message id of MAVLink.
     pub id: u32,
     /// True if the frame has a signature, which the parser does not check.
     pub is_signed: bool,
 }
 
-/// Counters of a parser.
+/// Counters of received MAVLink frames.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
-    /// Valid frames.
+    /// Number of valid frames.
     pub frames: u32,
-    /// Known messages with a wrong checksum or unknown incompatible flags. Corrupted frames, sometimes other bytes.
+    /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. They are corrupted
+    /// frames, sometimes other bytes.
     pub broken: u32,
 }
 
-/// Parser with a buffer of one frame of maximum length.
+/// Parser of MAVLink frames, with a buffer of one frame of maximum length.
 #[derive(Clone, Debug, Default)]
 pub struct Parser {
     /// Received bytes; if not empty, they start with a possible frame.
@@ -254,17 +255,17 @@ pub struct Parser {
 }
 
 enum First {
-    /// Incomplete frame.
+    /// The first bytes are the start of an incomplete frame.
     Part,
-    /// Unknown or invalid header.
+    /// The first bytes are no frame: the header is unknown or invalid.
     None,
-    /// Corrupted frame.
+    /// The first bytes are a corrupted frame.
     Broken,
     Frame(Received, usize),
 }
 
 impl Parser {
-    /// Creates a parser.
+    /// Creates a parser without received bytes.
     pub const fn new() -> Self {
         Self {
             bytes: Vec::new(),
@@ -275,7 +276,8 @@ impl Parser {
         }
     }
 
-    /// Adds one byte. Call [`next_message`](Self::next_message) until it returns `None` before the next one. Constant work.
+    /// Adds one received byte. Call [`next_message`](Self::next_message) until it returns `None` before the next
+    /// byte. Constant work.
     pub fn push(&mut self, byte: u8) {
         if self.bytes.is_empty() && byte != MAGIC {
             return;
@@ -286,12 +288,13 @@ impl Parser {
         }
     }
 
-    /// Returns the next message. Constant work for each byte, see [`next_frame`](Self::next_frame).
+    /// Returns the next received message, or `None`. Constant work for each byte, see
+    /// [`next_frame`](Self::next_frame).
     pub fn next_message(&mut self) -> Option<Received> {
         self.next_frame(|received, _| received)
     }
 
-    /// Returns the result of `read` for the next message and its frame.
+    /// Returns the result of `read` for the next received message and the bytes of its frame.
     ///
     /// Each byte starts at most one checksum, of at most 266 bytes. In real frames at most one byte in ten does so, in
     /// maliciously chosen bytes one in three.
@@ -316,12 +319,12 @@ impl Parser {
         None
     }
 
-    /// Counters since the parser was created.
+    /// Returns the counts of valid and corrupted frames since the parser was created.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// Discards the first `length` bytes, and those up to the next possible start of a frame.
+    /// Discards the first `length` received bytes, and those up to the next possible start of a frame.
     fn drop_front(&mut self, length: usize) {
         let rest = self.bytes.get(length..).unwrap_or_default();
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();

@@ -5,49 +5,49 @@ use heapless::Vec;
 use super::frame::{Address, CHECKSUM, HEADER, MAGIC, SIGNATURE, checksum, find_known, id};
 use crate::geodetic::Geodetic;
 
-/// Maximum payload length of these messages, bytes.
+/// Maximum payload length of the messages that this crate sends, bytes.
 const LONGEST: usize = 54;
 
-/// Length of a signature, if the crate was built with signing.
+/// Number of bytes reserved for a signature; 0 if the crate was built without signing.
 const SIGNING: usize = if cfg!(feature = "mavlink-signing") {
     SIGNATURE
 } else {
     0
 };
 
-/// Frame to send, with room for its signature.
+/// MAVLink frame to send; its capacity includes a signature.
 pub type FrameBytes = Vec<u8, { HEADER + LONGEST + CHECKSUM + SIGNING }>;
 
 /// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
 pub mod severity {
-    /// Problem with which the flight continues.
+    /// Severity of a problem with which the flight continues.
     pub const WARNING: u8 = 4;
-    /// Information for an operator.
+    /// Severity of a piece of information for the operator.
     pub const INFO: u8 = 6;
 }
 
-/// Message to send, in the units and frames of the wire.
+/// MAVLink message to send, in the units and frames of the wire.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Outgoing<'a> {
-    /// HEARTBEAT of an active onboard computer.
+    /// HEARTBEAT of an active onboard computer, the companion.
     Heartbeat,
-    /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: requests a message at an interval.
+    /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: requests that a message is sent at an interval.
     SetMessageInterval {
         /// Id of the requested message.
         id: u32,
-        /// Interval, µs.
+        /// Requested interval, µs.
         interval_us: u32,
     },
     /// COMMAND_ACK: reply to a command.
     CommandAck {
-        /// `MAV_CMD`.
+        /// Value of `MAV_CMD`, the number of the command.
         command: u16,
-        /// `MAV_RESULT`.
+        /// Value of `MAV_RESULT`, the answer.
         result: u8,
-        /// Sender of the command.
+        /// Sender of the command, to which the reply goes.
         to: Address,
     },
-    /// SET_POSITION_TARGET_GLOBAL_INT, above mean sea level (frame 5).
+    /// SET_POSITION_TARGET_GLOBAL_INT: target to fly to, above mean sea level (frame 5).
     SetPosition {
         /// Time since the companion's start, ms.
         boot_ms: u32,
@@ -55,7 +55,7 @@ pub enum Outgoing<'a> {
         at: Geodetic,
         /// Target velocity toward north, east and down, m/s; without it the autopilot stops at the target.
         velocity_m_s: Option<[f32; 3]>,
-        /// Heading, radians clockwise from north.
+        /// Heading of the drone, radians clockwise from north; `None` leaves it to the autopilot.
         yaw_rad: Option<f32>,
     },
     /// TIMESYNC request, which the autopilot sends back.
@@ -63,26 +63,26 @@ pub enum Outgoing<'a> {
         /// Time stamp of the question, returned in the answer.
         asked: u64,
     },
-    /// STATUSTEXT of at most 50 bytes; a longer text is truncated.
+    /// STATUSTEXT: text for an operator, of at most 50 bytes; a longer text is truncated.
     StatusText {
-        /// See [`severity`].
+        /// Severity of the text: see [`severity`].
         severity: u8,
-        /// Text.
+        /// Text for the operator.
         text: &'a str,
     },
-    /// NAMED_VALUE_FLOAT.
+    /// NAMED_VALUE_FLOAT: named number, for an operator to plot.
     NamedValue {
         /// Time since the companion's start, ms.
         boot_ms: u32,
-        /// Name of at most ten bytes; a longer one is truncated.
+        /// Name of the number, at most ten bytes; a longer one is truncated.
         name: &'a str,
-        /// Value.
+        /// Value of the number.
         value: f32,
     },
 }
 
-/// Bits of `type_mask` in a target, which mark ignored values. Position (bits 0 to 2), velocity (3 to 5), acceleration (6 to 8),
-/// yaw (10), yaw rate (11).
+/// Bits of `type_mask` in a target, which mark values that the autopilot is to ignore. Position (bits 0 to 2),
+/// velocity (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
 mod mask {
     pub(super) const VELOCITY: u16 = 0b11_1000;
     pub(super) const ACCELERATION: u16 = 0b1_1100_0000;
@@ -90,7 +90,7 @@ mod mask {
     pub(super) const YAW_RATE: u16 = 1 << 11;
 }
 
-/// `MAV_FRAME_GLOBAL_INT`: latitude, longitude, and altitude above mean sea level.
+/// Value `MAV_FRAME_GLOBAL_INT`: latitude, longitude, and altitude above mean sea level.
 const FRAME_AMSL: u8 = 5;
 
 pub(in crate::flight) const SET_MESSAGE_INTERVAL: u16 = 511;
@@ -108,7 +108,7 @@ impl Outgoing<'_> {
         }
     }
 
-    /// Encodes an unsigned frame; `to` is the autopilot, for messages with an addressee. Constant work.
+    /// Encodes the message as an unsigned frame from `from`; `to` is the autopilot. Constant work.
     pub fn encode(&self, from: Address, to: Address, sequence: u8) -> FrameBytes {
         let mut writer = Writer(FrameBytes::new());
         let [a, b, c, _] = self.id().to_le_bytes();

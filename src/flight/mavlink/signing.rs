@@ -21,37 +21,37 @@ use super::incoming::Received;
 use super::outgoing::FrameBytes;
 use crate::time::{Duration, Instant};
 
-/// Length of the truncated hash, bytes.
+/// Length of a signature's truncated hash, bytes.
 const TAG: usize = 6;
 
-/// Length of link id and timestamp, bytes.
+/// Length of link id and timestamp in a signature, bytes.
 const STAMPED: usize = SIGNATURE - TAG;
 
-/// Maximum age of the first frame of a sender: a minute, in timestamp units.
+/// Maximum age of a sender's first signed frame: a minute, in timestamp units of 10 µs.
 const BEHIND: u64 = 6_000_000;
 
-/// Maximum timestamp, in the year 2104.
+/// Maximum timestamp of a signature, in the year 2104.
 const LAST: u64 = (1 << 48) - 1;
 
 const UNIT_US: u32 = 10;
 
-/// Seconds from 1970-01-01 to 2015-01-01, where timestamps start.
+/// Seconds from 1970-01-01 to 2015-01-01, where signature timestamps start.
 const BEGIN_S: u64 = 1_420_070_400;
 
-/// Number of remembered senders; an autopilot forwards frames that others have signed.
+/// Number of senders whose timestamps are remembered. An autopilot forwards frames that others have signed.
 const SENDERS: usize = 8;
 
-/// Sender and its next timestamp. A new sender replaces the one with the oldest last frame, whose last minute could then be
-/// replayed.
+/// Sender of signed frames, and the minimum timestamp of its next one. A new sender replaces the one with the oldest
+/// last frame, whose last minute could then be replayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
     link: u8,
-    /// Minimum timestamp of its next frame; 0 for an unused entry.
+    /// Minimum timestamp of the sender's next frame; 0 for an unused entry.
     next: u64,
 }
 
-/// Time as a signature's timestamp.
+/// Time in the units of a signature's timestamp: 10 µs since 2015-01-01.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Stamp(u64);
 
@@ -59,31 +59,31 @@ impl Stamp {
     /// Timestamp of a board without a clock.
     pub const UNKNOWN: Self = Self(0);
 
-    /// Converts a Unix time.
+    /// Converts a Unix time, µs since 1970-01-01.
     pub const fn of_unix_micros(micros: u64) -> Self {
         let units = (micros / UNIT_US as u64).saturating_sub(BEGIN_S * 100_000);
         Self(if units < LAST { units } else { LAST })
     }
 }
 
-/// Reason why a frame is rejected.
+/// Reason why a frame's signature is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Flaw {
-    /// Unsigned frame.
+    /// The frame has no signature.
     Unsigned,
-    /// Signature with another key.
+    /// The signature is of another key, or the frame was altered.
     Key,
-    /// Timestamp in the past, or already used.
+    /// The signature's timestamp is in the past, or was used before.
     Old,
 }
 
-/// Key, and the state of its timestamps.
+/// Signing of MAVLink frames: the key, and the state of the timestamps.
 #[derive(Clone)]
 pub struct Signing {
     key: [u8; 32],
     link: u8,
-    /// Timestamp at `at`, and that of the last sent frame.
+    /// Timestamp that belongs to the time `at`. The field `sent` is the timestamp of the last sent frame.
     stamp: u64,
     at: Instant,
     sent: u64,
@@ -91,7 +91,7 @@ pub struct Signing {
 }
 
 impl core::fmt::Debug for Signing {
-    /// Omits the key, which must not appear in logs.
+    /// Formats the value without the key, which must not appear in logs.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Signing(..)")
     }
@@ -118,8 +118,8 @@ impl Signing {
         }
     }
 
-    /// Advances the timestamp to `now`, by at most about an hour per call. An exact step would need a 64-bit division, which takes
-    /// a kilobyte of flash.
+    /// Advances the own timestamp to `now`, by at most about an hour per call. An exact step would need a 64-bit
+    /// division, which takes a kilobyte of flash.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;
@@ -127,7 +127,7 @@ impl Signing {
         self.at = self.at + Duration::from_micros(u64::from(units) * u64::from(UNIT_US));
     }
 
-    /// Returns the signed frame. Work: a checksum and a hash of one frame.
+    /// Returns `frame` with a signature. Work: a checksum and a hash of one frame.
     pub fn sign(&mut self, now: Instant, frame: FrameBytes) -> FrameBytes {
         self.advance(now);
         self.sent = self.stamp.max(self.sent.saturating_add(1)).min(LAST);
@@ -154,7 +154,7 @@ impl Signing {
         frame
     }
 
-    /// Checks the signature of a whole frame. Work: a hash of one frame.
+    /// Checks the signature of a received frame. Work: a hash of one frame.
     ///
     /// # Errors
     /// [`Flaw`] states why the frame is rejected.
@@ -210,7 +210,7 @@ impl Signing {
     }
 }
 
-/// Compares in constant time.
+/// Returns true if two truncated hashes are equal, in constant time.
 fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     let differs = one
         .into_iter()

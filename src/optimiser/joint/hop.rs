@@ -42,7 +42,7 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of a hop's reach by its start p and by w, the two free coordinates of its end.
+/// Derivatives of a hop's reach by its start p, its end's free coordinates w, and ln gamma.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -52,16 +52,16 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Mixed second derivatives: row i by the free coordinate w_i and by p.
+    /// Mixed second derivatives of the reach: row i by the end's free coordinate w_i and by the start p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives by w: w_1 twice, w_1 and w_2, w_2 twice.
+    /// Second derivatives of the reach by the free coordinates: w_1 twice, w_1 and w_2, w_2 twice.
     pub(super) by_ww: [f32; 3],
-    /// Derivative by ln gamma, m.
+    /// Derivative of the reach by ln gamma, the logarithm of the target SIR, m.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// Reach of a hop whose end is fixed: all derivatives are 0.
+    /// Derivatives for a hop whose end is fixed: all are 0.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -71,8 +71,9 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Returns the derivatives for the hop `from` - `to`. The dependent coordinate comes first in each triple. `noise` is nu,
-    /// 1/m^2. Returns [`Reach::FIXED`] at the very rim of the reach, where no coordinate is dependent.
+    /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`. The dependent
+    /// coordinate comes first in each triple. `c` is target over gain, and `noise` is nu, 1/m^2. Returns
+    /// [`Reach::FIXED`] at the very rim of the reach, where no coordinate is dependent.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -121,7 +122,8 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of the inverse interference plus noise, s in m^2.
+/// Derivatives q'(s) and 2 q''(s) of the inverse interference plus noise, q(s) = s / (1 + nu s). s is the squared
+/// distance from the interferer, m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -150,11 +152,11 @@ pub(crate) enum Coordinate {
     H,
 }
 
-/// (x, y, h), or three numbers that each belong to one coordinate.
+/// Position (x, y, h), m, or three other numbers of which each belongs to one coordinate.
 pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
-    /// Returns the coordinates reordered: the coordinate `self` first, then the other two in their order.
+    /// Returns (x, y, h) reordered: the coordinate `self` first, then the other two in their order.
     #[inline(never)] // called from many places
     pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
         match self {
@@ -179,7 +181,7 @@ impl Coordinate {
         self.first_row(bend).map(|row| self.first(row))
     }
 
-    /// Restores rows and columns to the order (x, y, h); the inverse of [`Coordinate::first_of`].
+    /// Restores a matrix to rows and columns (x, y, h); the inverse of [`Coordinate::first_of`].
     pub(crate) fn back_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         let [a, b, c] = bend.map(|row| self.back(row));
         match self {
@@ -206,13 +208,14 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition of a hop, s + spare >= c l; s and l are the squared distances of the module's text.
+/// Condition for a hop to meet its target: s + `spare` >= `c` l. s and l are the squared distances of the hop's end
+/// from the interferer and from the sender, m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
-    /// c - 1.
+    /// Difference c - 1, without cancellation.
     pub(super) e: f32,
-    /// Constant term of the quadratic, m^2.
+    /// Constant term of the condition, m^2; 0 without noise.
     pub(super) spare: f32,
 }
 
@@ -221,7 +224,8 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the tangent at the squared distance `s`, m^2, from the interferer; `noise` is nu, 1/m^2.
+    /// Returns the noise-free condition that equals the one with noise at the squared distance `s`. `s` is the
+    /// distance from the interferer, m^2; `noise` is nu, 1/m^2, `c` target over gain, and `e` is c - 1.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

@@ -23,5 +23,5 @@ mod starts;
 pub use site::Room;
 pub use solver::{Seat, Solver};
 
-/// Maximum number of relays of a chain for the joint method; 0 without the feature `altitude`.
+/// Maximum number of relays for which the joint method works; 0 without the feature `altitude`.
 pub const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };

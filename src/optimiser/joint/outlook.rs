@@ -11,24 +11,27 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Derivatives of the slack about a nominal chain by a relay's position.
+/// Value function: derivatives of the slack, the chain's spare length at Rx, by a relay's position. Later relays
+/// react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// First derivatives by x, y and h, m per m.
+    /// First derivatives of the slack (spare length at Rx) by the relay's x, y and h, m per m.
     pub(crate) slope: Triple,
-    /// Second derivatives of the value by x, y and h, 1/m; symmetric.
+    /// Second derivatives of the slack (spare length at Rx) by the relay's x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// Derivative by the logarithm of the target, m.
+    /// Derivative of the slack (spare length at Rx) by the logarithm of the target SIR, m.
     pub(crate) by_target: f32,
-    /// Expected gain of slack by steps of later relays, m: the part proportional to the step's fraction.
+    /// Gain of spare length at Rx expected from later relays' steps, m: the part linear in the fraction. It is
+    /// multiplied by the fraction of the steps that is tried.
     pub(crate) linear: f32,
-    /// Part of the expected gain that is proportional to the square of the fraction, m.
+    /// Gain of spare length at Rx expected from later relays' steps, m: the part quadratic in the fraction. It is
+    /// multiplied by the square of the fraction of the steps that is tried.
     pub(crate) square: f32,
 }
 
 impl Outlook {
-    /// Returns the slack of a last relay at `at`, m, and its derivatives. The last hop is at most `reach_m` long. The slack is the
-    /// spare length of that hop. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
+    /// Returns the slack of a chain whose last relay is at `at`, m, and its derivatives. The slack is `reach_m`, the
+    /// maximum length of the last hop, less its length. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -51,7 +54,8 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty of a relay too close to the interferer. Half `weight` near^2, with the slopes of `near`.
+    /// Subtracts the penalty for a relay too close to the interferer, half `weight` `near`^2. `slope` and `by_target`
+    /// are the derivatives of `near` by the position and by ln gamma.
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -65,8 +69,8 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function through a hop to the relay before, and returns the optimal policy. The step of the two free
-    /// coordinates is limited to `low` to `high`, m, relative to the current position.
+    /// Propagates the value function through `hop` to the relay before it, and returns the optimal policy. The step
+    /// of the two free coordinates is limited to `low` to `high`, m, relative to the current position.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -127,7 +131,7 @@ impl Outlook {
     }
 }
 
-/// Returns a + b f.
+/// Returns a + b f, for each coordinate.
 fn add(a: Triple, b: Triple, f: f32) -> Triple {
     let mut sum = a;
     for (cell, b) in sum.iter_mut().zip(b) {
@@ -145,25 +149,28 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     sum
 }
 
-/// Policy of a relay: its step in the two free coordinates of its hop.
+/// Policy of a relay in the joint method: its step in the two free coordinates of its hop.
 ///
-/// The step has a feedback on the previous relay's move.
+/// The step depends linearly on the move of the previous relay.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True for the larger of the two values that the hop allows for the dependent coordinate.
+    /// True if the dependent coordinate is the larger of the two values that the hop allows.
     pub(super) rising: bool,
-    /// Step if the previous relay has not moved, m.
+    /// Step of the two free coordinates if the previous relay has not moved, m.
     pub(super) step: [f32; 2],
-    /// Additional step per move of the previous relay in x, y and h.
+    /// Additional step of each free coordinate per metre that the previous relay has moved in x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature by which a step is divided, relative to the largest curvature. Flatter directions are noise.
+/// Minimum curvature by which a step is divided, relative to the largest curvature. Smaller curvature is rounding
+/// noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// Returns the step within the box that maximises a quadratic. The quadratic has `slope` and `bend` (yy, yh, hh), made concave.
+    /// Returns the policy whose step, between `low` and `high`, maximises a quadratic function. The function has the
+    /// gradient `slope` and the second derivatives `bend` (yy, yh, hh), made concave; `across` are the mixed ones by
+    /// the previous relay's position.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],
@@ -234,7 +241,7 @@ impl Policy {
         }
     }
 
-    /// Returns the change of the free coordinates for `share` of the step.
+    /// Returns the change of the two free coordinates, m, for the fraction `share` of the step.
     ///
     /// `change` is the move of the previous relay.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
@@ -245,7 +252,7 @@ impl Policy {
     }
 }
 
-/// Returns the symmetric matrix (yy, yh, hh) with each eigenvalue made negative.
+/// Returns the symmetric matrix (yy, yh, hh) with each eigenvalue made negative. So the quadratic has a maximum.
 fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     let (mean, half) = (0.5 * (yy + hh), 0.5 * (yy - hh));
     let root = sqrt(square(half) + square(yh));
@@ -265,7 +272,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     [mean + half * cos, half * sin, mean - half * cos]
 }
 
-/// Compressed [`Policy`]: feedback with three digits is sufficient.
+/// Compressed [`Policy`]: the derivatives are stored with three digits, which is sufficient.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(super) struct Brief {
     axis: Coordinate,

@@ -13,23 +13,23 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::{Sender, in_noise, square};
 
-/// Maximum fraction of the squared reach that is used.
+/// Fraction of the squared maximum hop length that the joint method uses, to stay clear of rounding.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation. With a small violation the required separation is still kept.
+/// Factor on the minimum separation in the joint method, so that a small violation of it is harmless.
 pub(super) const MARGIN: f32 = 1.0005;
 
 /// Newton iterations of the point at which a hop with noise is linearised (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Bisection steps of [`Site::halved`], on a path whose end is out of reach.
+/// Number of bisection steps of [`Site::halved`], for a path whose end is out of reach.
 const HALVINGS: u8 = 12;
 
-/// Relay whose position is computed, with the hop to it.
+/// Relay whose position the joint method computes, with the hop to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
-    /// nu = N eta / P, 1/m^2: 0 without noise.
+    /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
     pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,
@@ -39,7 +39,8 @@ pub(crate) struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    /// Returns the relay that receives from `sender` and is limited to `room`; `first` if the sender is Tx.
+    /// Returns the relay that receives from `sender`; `first` is true if the sender is Tx. `room` has the lateral
+    /// offsets and altitudes that the relay may choose from.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -67,7 +68,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns this site without the minimum separation from its sender.
+    /// Returns this relay without the minimum separation from its sender.
     pub(crate) fn unparted(self) -> Self {
         Self {
             apart_m: 0.0,
@@ -75,8 +76,9 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position at `wanted`, or as close to it as the hop reaches. The hop has `target` and a sender at `from_m` along
-    /// x. `None` if no hop meets the target. x is at most that of Rx.
+    /// Returns the position at the cross-section `wanted`, or the closest one that the hop reaches. The hop has to
+    /// meet `target` from a sender at x = `from_m`. `None` if no hop meets the target. The position's x is at most
+    /// Rx's.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -87,7 +89,8 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the farthest position along x with the cross-section `at` that the hop reaches.
+    /// Returns the position of largest x, with the lateral offset and altitude `at`, that the hop reaches. `None` if
+    /// there is none.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -99,9 +102,10 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns `wanted`, or the closest reachable cross-section on the line from the best one in the room. Reachable means without
-    /// a step back along x; `None` if nothing is. For c > 1 a hop from p reaches a ball, with the interferer at m: its centre is
-    /// p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// Returns the reachable cross-section closest to `wanted` on the line to it from the best allowed one. Both ends
+    /// of the line are moved into the allowed range. Reachable means without a step back along x; `None` if nothing
+    /// is. For c > 1 a hop from p reaches a ball, with the interferer at m: its centre is p + (p - m) / (c - 1), its
+    /// radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -114,7 +118,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns centre and squared radius, m^2, of the cross-sections in reach at x >= `x_m`, for c > 1.
+    /// Returns the circle of cross-sections (y, h) in reach at x >= `x_m`, for c = target / gain > 1. It is the
+    /// centre and the squared radius, m^2; `None` for c <= 1.
     fn disk(
         &self,
         target: f32,
@@ -165,7 +170,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest reachable position toward `wanted`, by bisection. The path begins at the sender's cross-section.
+    /// Returns the farthest reachable position on a path to the cross-section `wanted`, by bisection. The path begins
+    /// at the sender's cross-section.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -186,7 +192,8 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Returns the cross-section for `share` of `policy`. The sender is at `from`, which is `change` from its nominal position.
+    /// Returns the cross-section for the fraction `share` of the step of `policy`. The sender is at `from`, which is
+    /// `change` from its current position; `nominal` is the relay's current position.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -276,7 +283,8 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Returns the first coordinate of the hop's end, whose other two coordinates are `a` and `b`.
+/// Returns the first coordinate of the hop's end, whose other two coordinates are `a` and `b`. `None` if no such end
+/// just meets the target. `rising` selects the larger of the two solutions.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -302,7 +310,8 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point within a circle that is closest to `wanted` on the line from `best`. `None` if there is none.
+/// Returns the point on the line from `best` to `wanted` at which it leaves a circle. `middle` is the centre, and
+/// `rim` the squared radius, m^2. `None` if `best` is outside.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -326,12 +335,12 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Cross-section (y, h) of one relay, each in three bytes as a fraction of its room.
+/// Stored cross-section (y, h) of one relay: each in three bytes, as a fraction of its allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
 impl Cell {
-    /// Returns the cell nearest to `at` in `room`.
+    /// Returns the stored form of `at`, rounded to the nearest value in `room`.
     pub(super) fn of(at: CrossSection, room: Room) -> Self {
         let [a, b, c, _] = code(at.y_m, room.lateral).to_le_bytes();
         let [d, e, f, _] = code(at.altitude_m, room.band).to_le_bytes();
@@ -372,9 +381,9 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {
-    /// Lateral offsets, m.
+    /// Lateral offsets that the relay may choose from, m.
     pub lateral: Band,
-    /// Altitudes, m.
+    /// Altitudes that the relay may choose from, m.
     pub band: Band,
 }
 
@@ -388,7 +397,7 @@ impl Room {
         }
     }
 
-    /// Returns this room limited to the altitude `altitude_m`.
+    /// Returns these lateral offsets with `altitude_m` as the only allowed altitude.
     pub const fn at_altitude(self, altitude_m: f32) -> Self {
         Self {
             band: Band::at(altitude_m),
@@ -396,7 +405,7 @@ impl Room {
         }
     }
 
-    /// Returns the cross-section in the room that is nearest to `at`.
+    /// Returns the allowed cross-section (lateral offset and altitude) that is nearest to `at`.
     #[inline(never)] // called from many places
     pub const fn nearest(self, at: CrossSection) -> CrossSection {
         CrossSection {
@@ -406,16 +415,17 @@ impl Room {
     }
 }
 
-/// Fraction of the maximum SIR of the first or the last hop that counts as the chain's ceiling.
+/// Fraction of the maximum SIR of the first or the last hop that is used as the chain's upper bound.
 const LITTLE: f32 = 0.999_97;
 
-/// Bisection steps between Tx and the noise-free optimum of a first hop.
+/// Number of bisection steps for the optimum of a first hop with noise.
 const END_HALVINGS: u8 = 24;
 
-/// Returns the maximum SIR of a first hop into `room`, less a margin that leaves the relay a choice. The optimum is straight away
-/// from the interferer, at t times its distance from Tx. With U and B the squared distances along that line and across it, let
-/// s = B + (1 + t)^2 U + h^2; the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with
-/// noise there is one optimum, closer to Tx.
+/// Returns the maximum SIR of a first hop into `room`, less a margin that leaves the relay a choice. `room` has the
+/// allowed lateral offsets and altitudes. The optimum is straight away from the interferer, at t times its distance
+/// from Tx. With U and B the squared distances along that line and across it, let s = B + (1 + t)^2 U + h^2; the
+/// slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with noise there is
+/// one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -450,7 +460,7 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// Returns the maximum SIR of the hop from a relay of `power_w` in `room` to Rx, less a margin.
+/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts in `room`, less a margin.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
         .nearest(CrossSection::default())
@@ -458,7 +468,8 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Returns the slack, m, of the hop to Rx at `target` from a last relay at `at`, and its derivatives.
+/// Returns the slack of the last hop for `target`, m, and its derivatives by the last relay's position. The relay is
+/// at `at`, with `power_w` watts. The slack is the hop's maximum length less its length.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,
@@ -481,19 +492,19 @@ pub(super) fn tail(
     (slack, outlook)
 }
 
-/// Cost of a violation of the minimum separation, in units of D; it outweighs any gain of slack.
+/// Weight of the penalty for a violated minimum separation, in units of D. It outweighs any gain of slack.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from an end of the room at which a relay counts as at the end, in units of D.
+/// Distance from the end of its allowed range at which a relay counts as at the end, in units of D.
 const EDGE: f32 = 2e-6;
 
-/// Relative spare length up to which a hop counts as fully stretched.
+/// Relative margin of a hop's squared length up to which the hop counts as fully stretched.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the violation of the minimum separation at `to`, m^2, its weight, and its slope. The violation is in squares, the
-    /// slope is by ln gamma. A full hop shorter than d_min ends too close to the interferer: |p' - p|^2 = q(|p' - m|^2) / c <
-    /// d_min^2. With noise this is |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// Returns the violation of the minimum separation d_min at `to`, its weight, and its slope. The violation is in
+    /// squares, m^2; the slope is by ln gamma. A full hop shorter than d_min ends too close to the interferer: |p' -
+    /// p|^2 = q(|p' - m|^2) / c < d_min^2. With noise this is |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
@@ -508,14 +519,15 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty of a relay at `to` too near the interferer, in metres of slack.
+    /// Returns the penalty of a relay at `to` that is too near the interferer, in metres of slack.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
     }
 
-    /// Returns the policy of the relay at `to`, and propagates `outlook` to the relay before, at `from`. The step is limited to
-    /// `trust` times the distance from the interferer. Work: some 400 multiplications and two square roots.
+    /// Returns the policy of the relay at `to`, and propagates the value function to the relay at `from`. `outlook`
+    /// is the value function. The step is limited to `trust` times the distance from the interferer. Work: some 400
+    /// multiplications and two square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -569,9 +581,10 @@ impl Site<'_> {
         }
     }
 
-    /// Returns the dependent coordinate of the hop's end, and the derivative of F by it (see `hop`).
+    /// Returns the dependent coordinate of the hop's end, and the derivative of F by it.
     ///
-    /// It is the coordinate with the steepest slope of those that are not at an end of their room, `low` to `high`.
+    /// F is 0 for a hop of maximum length (see `hop`). The coordinate is the one with the steepest slope of those
+    /// that are not at an end of their allowed range, `low` to `high`.
     fn axis(
         &self,
         c: f32,

@@ -14,25 +14,30 @@ use crate::sir::square;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
-    /// Parabola over the line; `aside` and `up` are the offsets in the middle, in units of D / 2.
+    /// Parabola over the line. In the middle, `aside` and `up` are its lateral offset and height, in units of D / 2.
     Arch { aside: f32, up: f32 },
-    /// Spiral about the interferer: toward a position right above or beside it, and from there to Rx.
+    /// Spiral about the interferer: toward a position right above or beside it, and from there to Rx. `aside` and
+    /// `up` are the direction of that position, `far` its distance relative to the geometric mean of those of Tx and
+    /// Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Arch without a minimum separation. The sweep's rules, which let relays hold back, judge it.
+    /// Parabola as `Arch`, without a minimum separation. Its target is found by the hops of a message sweep, in which
+    /// relays may stop before their reach.
     Through { aside: f32, up: f32 },
-    /// Arch to the side, with altitudes interpolated between relays with a fixed altitude.
+    /// Parabola to the side, with altitudes interpolated between the relays with a fixed altitude.
     ///
     /// Before the first and after the last of those relays the chain is `level`, or goes down to Tx and Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Relays at the outer corner of the room and one minimum separation beside it, alternately. For relays without room for a row.
+    /// Chain for relays that have no room in a row. They are in turn at an upper corner and one separation beside it.
+    /// The corner is that of the allowed lateral offsets and altitudes, on the side away from the interferer.
     Turns,
-    /// Low, from a target so high that no hop leaps over the interferer.
+    /// Chain at the lowest altitude, for a target SIR so high that no hop leaps over the interferer.
     Near,
-    /// Relay 1 right above Rx, at the best altitude or lateral offset. The others are on the way down from there.
+    /// Chain with relay 1 right above Rx, at the best altitude or lateral offset. The others are on the way down from
+    /// there.
     Far,
 }
 
-/// Offsets (aside, up) of the arches.
+/// Lateral offset and height in the middle of each arch that is tried, in units of D / 2.
 const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
@@ -43,10 +48,10 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of arches that are also tried without a minimum separation.
+/// Number of arches, the first ones, that are also tried without a minimum separation.
 const THROUGH: usize = 3;
 
-/// Lateral offset, and true if level at the ends.
+/// Initial chains for fixed altitudes: lateral offset in units of D / 2, and true if level at the ends.
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -56,8 +61,8 @@ const HELD: [(f32, bool); 6] = [
     (0.25, true),
 ];
 
-/// Spirals: aside and up of the intermediate position, and its distance from the interferer. The distance is relative to the
-/// geometric mean of those of Tx and Rx.
+/// Spiral initial chains: `aside`, `up` and `far` of each. They are lateral offset, height and distance of the
+/// intermediate position from the interferer. The distance is relative to the geometric mean of those of Tx and Rx.
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
     (1.0, 0.0, 1.0),
@@ -74,7 +79,7 @@ const SPIRALS: [(f32, f32, f32); 9] = [
 struct Way {
     to: Triple,
     angle: f32,
-    /// Increase of the logarithm of the distance.
+    /// Increase, over the whole spiral, of the logarithm of the distance from the interferer.
     rise: f32,
     length: f32,
 }
@@ -96,7 +101,8 @@ impl Way {
         }
     }
 
-    /// Returns the end of a hop from `here`. Its length is `step` times its end's distance from the interferer.
+    /// Returns the end of a hop from `here` along the spiral, relative to the interferer. The hop is `step` times as
+    /// long as its end's distance from the interferer.
     fn after(&self, here: Triple, step: f32) -> Triple {
         let bend = 0.5 * step * self.rise / self.length;
         let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
@@ -111,10 +117,10 @@ impl Way {
     }
 }
 
-/// Minimum divisor for lengths.
+/// Minimum length by which the spiral's computation divides, to avoid a division by 0.
 const SHORTEST: f32 = 1e-6;
 
-/// Maximum turn of a hop about the interferer, as a tangent.
+/// Maximum tangent of the angle by which one hop of a spiral turns about the interferer.
 const MOST_TURN: f32 = 1.5;
 
 fn length([x, y, z]: Triple) -> f32 {
@@ -122,7 +128,8 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the cross-section of the next relay on a spiral, after a relay at `from`.
+    /// Returns the cross-section of the next relay on a spiral, after a relay at `from`. `c` is target over gain,
+    /// which determines the length of the hop.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -155,7 +162,7 @@ impl Start {
         })
     }
 
-    /// Returns the cross-section of relay `index` in alternating positions, `apart_m` from each other.
+    /// Returns the cross-section of relay `index` in a chain whose relays alternate by `apart_m`.
     pub(super) fn in_turn(
         index: u16,
         interferer: &Interferer,
@@ -180,7 +187,8 @@ impl Start {
         })
     }
 
-    /// Returns start `number` for relays with that `room`. `None` after the last, `Some(None)` if it does not apply.
+    /// Returns the initial chain `number` for relays limited to `room`. `None` after the last one; `Some(None)` if
+    /// that chain does not fit into `room`.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -222,7 +230,8 @@ impl Start {
         }
     }
 
-    /// Returns the cross-section of the relay after one at `x_m`, in a chain of length `distance_m`.
+    /// Returns the cross-section in this initial chain of the relay whose previous relay is at `x_m`. `distance_m` is
+    /// the distance from Tx to Rx.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
             Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
@@ -238,10 +247,10 @@ impl Start {
     }
 }
 
-/// Bisection for the highest feasible target, in ln gamma.
+/// Bisection for the highest feasible target SIR of a chain, in ln gamma.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest target found feasible, and true if relays have to hold back to meet it.
+    /// Highest target found feasible, and true if relays have to stop before their reach to meet it.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -251,8 +260,8 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward from `sigma` to a precision of `width`. The first step is `step`, each next one `growth` times as
-    /// long.
+    /// Creates a search downward from the target `sigma`, in ln gamma, to a precision of `width`. The first step is
+    /// `step`, each next one `growth` times as long.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -264,7 +273,9 @@ impl Seek {
         }
     }
 
-    /// Creates a search upward from the feasible target `sigma`. The first step is `step`, each next one three times as long.
+    /// Creates a search upward from the feasible target `sigma`, in ln gamma, to a precision of `width`. The first
+    /// step is `step`, each next one three times as long. `holds_back` is true if relays have to stop before their
+    /// reach for `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -276,7 +287,8 @@ impl Seek {
         }
     }
 
-    /// Records the result of a target, feasible with or without holding back. Returns true if there is another to try.
+    /// Records the result of the current target; returns true if there is another one to try. `met` is `None` if the
+    /// target is infeasible, and true if relays have to stop before their reach for it.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -302,11 +314,11 @@ impl Seek {
         true
     }
 
-    /// Returns the highest target found feasible, and true if relays have to hold back to meet it.
+    /// Returns the highest feasible target found, and true if relays have to stop before their reach.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }
 }
 
-/// Maximum step of the search, in units of ln gamma.
+/// Step at which the search gives up, in units of ln gamma.
 const MOST_STEP: f32 = 40.0;

@@ -31,9 +31,9 @@ use crate::sir::square;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fewest {
-    /// Number of relays that meets the target.
+    /// Number of relays with which a chain meets the target SIR.
     pub relays: u16,
-    /// True if no smaller number meets it.
+    /// True if it is proven that no smaller number of relays meets the target.
     pub proven: bool,
 }
 
@@ -41,16 +41,16 @@ pub struct Fewest {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Most {
-    /// Highest target that is met, linear SIR, to 1e-6 relative.
+    /// Highest target SIR that is met, linear, to 1e-6 relative.
     pub target: f32,
     /// Minimum number of relays that meets `target`.
     pub relays: u16,
 }
 
-/// Lower limit of the search in [`Most::of`], relative to the ceiling of the first hop.
+/// Lowest target searched by [`Most::of`], as a fraction of the highest possible SIR of the first hop.
 const DEPTH: f32 = 1e-20;
 
-/// Bisection steps of the search in [`Most::of`], which is 46 wide in ln target: to 1e-8.
+/// Number of bisection steps in [`Most::of`]. Its range of ln(target) is 46 wide, so it is found to 1e-8.
 const HALVINGS: u8 = 32;
 
 impl Fewest {
@@ -75,7 +75,8 @@ impl Fewest {
 }
 
 impl Most {
-    /// Returns the highest target that any number of relays meets. `None` if it is below 1e-20 of the first hop's ceiling.
+    /// Returns the highest target SIR that any number of relays meets. `None` if it is below 1e-20 of the highest
+    /// possible SIR of the first hop.
     ///
     /// With different altitudes, or a minimum separation, it is a feasible target but not certainly the highest. Work: 33 times
     /// that of [`Fewest::of`].
@@ -110,7 +111,7 @@ impl Most {
 }
 
 impl Mission {
-    /// Writes the positions of the mission's N relays for `target` to `places`, relay 1 first.
+    /// Writes positions with which the mission's N relays meet `target` to `places`, relay 1 first.
     ///
     /// Returns false if they do not meet it, or `places` is shorter than N. Every hop but one has its maximum length, and meets
     /// the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
@@ -127,7 +128,7 @@ impl Mission {
     }
 }
 
-/// Returns the minimum number of relays; its `proven` does not consider the minimum separation.
+/// Returns the minimum number of relays for `target`; its `proven` ignores the minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))
@@ -220,7 +221,8 @@ fn required_places(
     settled(&chain, places).is_some() || settled(&plain, places).is_some()
 }
 
-/// Writes the relays' positions: their reaches, then the required positions from the last relay back.
+/// Writes positions that meet the target to `places`; `None` if there are none. First each relay's reach, the
+/// farthest x at which its hop meets the target; then, from the last relay back, the x that the next hop requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let (slack, mut place) = chain.ends(|index, reach| {
@@ -254,7 +256,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
     }
 }
 
-/// Number of additional relays that are tried with a minimum separation.
+/// Number of additional relays that are tried if a minimum separation excludes the minimum number.
 const MORE: u16 = 32;
 
 #[cfg(feature = "internals")]
@@ -270,8 +272,8 @@ fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
     chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns the minimum number of equal relays for `target` in a field; see [`Fewest::of`]. Without a separation it is found by
-/// bisection.
+/// Returns the minimum number of relays with the same `profile` for `target` in a field. Without a separation it is
+/// found by bisection; see [`Fewest::of`].
 fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
     let met_by = |mission: &Mission, relays: u16| {
         mission
@@ -303,7 +305,8 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
         })
 }
 
-/// Returns the highest target (linear, to an f32's step) of the mission's N equal relays in its field.
+/// Returns the highest target SIR that the mission's N relays meet in its field, all with `profile`. It is linear, to
+/// an f32's step.
 ///
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
 /// `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,

@@ -77,28 +77,30 @@ use crate::place::Placement;
 
 pub use super::edge::EdgeCoordinate;
 
-/// Bisection steps of the distance from Rx, in f64: to far below an f32's step.
+/// Number of bisection steps in f64: enough for an error far below an f32's step.
 const HALVINGS: u8 = 48;
 
-/// Geometric case of the optimal position.
+/// Geometric case of the optimal position of a single relay that may move sideways.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AsideCase {
-    /// Touching position of the level circles of both SIRs, at the lowest altitude.
+    /// Optimum where the circles of constant SIR_1 (first hop) and SIR_2 (second hop) touch. It is at the lowest
+    /// altitude.
     Touching,
-    /// Position of maximum SIR_1 at the lowest altitude, where the first hop is worse than the second.
+    /// Optimum at the maximum of SIR_1, lowest altitude: the first hop is the worse one even there.
     Hilltop,
-    /// Position above Rx, at the lowest altitude: the first hop is the better one even there.
+    /// Optimum above Rx, at the lowest altitude: the first hop is the better one even there.
     AboveRx,
-    /// Edge of the corridor's box along this coordinate: the optimum without limits is outside the box.
+    /// Optimum on an edge of the corridor's box along this coordinate. The optimum without limits is outside the box.
     Edge(EdgeCoordinate),
-    /// Position above Rx: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
+    /// Optimum above Rx: the interferer is at Tx (X = Y = 0), so the SIR of the first hop is constant.
     Level,
-    /// Point on a vertical face of the corridor at which both SIRs' level lines touch; only with noise.
+    /// Optimum on a vertical face of the corridor, with noise: both SIRs' level lines touch there.
     Wall,
-    /// Position inside the corridor at its lowest or highest altitude, with noise. By a search without a proof of optimality.
+    /// Optimum inside the corridor at its lowest or highest altitude, with noise. Found by a search without a proof
+    /// of optimality.
     Inside,
-    /// Position above Rx: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    /// Optimum above Rx: the interferer is at Rx (X = D, Y = 0), so the second hop's SIR is always 0.
     Drowned,
 }
 
@@ -118,20 +120,21 @@ impl AsideCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile`, and its case; `None` in a field. The position is in [0, D] and in the
-/// lateral band.
+/// Returns the optimal position of a relay with `profile`, and its case; `None` in a field. The position is in [0, D]
+/// and in the lateral band.
 ///
-/// The mission's band of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the result is
-/// outside of the corridor, at most 272 evaluations of both hops; with noise and lateral room some 13 000 more.
+/// The mission's band of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the
+/// result is outside of the corridor, some 300 evaluations of both hops; with noise and lateral room some 23 000
+/// more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. The position is in [0, D] and in
-/// both bands.
+/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. The position is in
+/// [0, D] and in the bands of altitudes and lateral offsets.
 ///
-/// Work: 48 bisection steps in f64, with noise as many for each. If the result is outside of the corridor, at most 736
-/// evaluations of both hops; with noise and lateral room some 26 000 more.
+/// Work: 48 bisection steps in f64, with noise as many for each. If the result is outside of the corridor, some 800
+/// evaluations of both hops; with noise and lateral room some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }
@@ -212,7 +215,7 @@ fn holds(band: Band, value: f32) -> bool {
     (band.least_m..=band.most_m).contains(&value)
 }
 
-/// Returns the optimal position at one altitude, without limits in x and y.
+/// Returns the optimal position at one altitude, without limits in x and y, and its case.
 fn without_limits(
     mission: &Mission,
     interferer: &Interferer,
@@ -236,7 +239,7 @@ fn without_limits(
     (place, case)
 }
 
-/// Plane at one altitude, in m and m^2: D, X, Y, h^2, G = K / A and nu.
+/// Plane at one altitude, with the scene in m and m^2: D, interferer (X, Y), h^2, G = K / A, noise nu.
 struct Plane {
     d: f64,
     x: f64,
@@ -277,13 +280,13 @@ impl Plane {
         (self.loudest(high), AsideCase::Touching)
     }
 
-    /// Returns SIR_1 / A.
+    /// Returns SIR_1 / A at (x, y): the SIR of the first hop over its gain.
     fn first(&self, (x, y): (f64, f64)) -> f64 {
         let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// Returns t: the maximum of SIR_1 is at -t (X, Y), opposite the interferer as seen from Tx.
+    /// Returns t: the maximum of SIR_1 is at -t (X, Y), opposite the interferer as seen from Tx. `q` is X^2 + Y^2.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {
@@ -332,12 +335,12 @@ impl Plane {
         at(low * far)
     }
 
-    /// Returns SIR_2 / A at the ground distance `s` from Rx.
+    /// Returns SIR_2 / A, the second hop's SIR over the first hop's gain. `s` is the ground distance from Rx.
     fn second(&self, s: f64) -> f64 {
         self.g / (squared(s) + self.h2)
     }
 
-    /// Returns the point with the largest SIR_1 on the circle of radius `s` about Rx.
+    /// Returns the point with the largest SIR_1, the first hop's SIR, on the circle of radius `s` about Rx.
     fn loudest(&self, s: f64) -> (f64, f64) {
         if self.noise > 0.0 {
             return self.loudest_in_noise(s);

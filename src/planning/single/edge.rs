@@ -70,20 +70,20 @@ use crate::mission::{Band, Interferer, Mission};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
 
-/// Free coordinate of an edge.
+/// Coordinate that varies along an edge of the box in which a relay may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum EdgeCoordinate {
-    /// x, along the line from Tx to Rx.
+    /// Edge along x, from Tx toward Rx.
     Along = 4,
-    /// y, across the line.
+    /// Edge along y, across the line Tx to Rx.
     Across = 5,
-    /// Altitude.
+    /// Vertical edge: the altitude varies.
     Upward = 6,
 }
 
-/// Two hops of a mission's only relay, at any position.
+/// Evaluator of both hops of a mission with a single relay, which may be anywhere.
 #[derive(Clone, Copy)]
 pub(super) struct TwoHops<'a> {
     pub(super) mission: &'a Mission,
@@ -105,7 +105,8 @@ impl TwoHops<'_> {
     }
 }
 
-/// Edge that contains `through`, with the free coordinate in `room`, m.
+/// Edge of the box in which a relay may be. `free` is the coordinate that varies, within `room`, m; the other two are
+/// those of `through`.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
     pub(super) free: EdgeCoordinate,
@@ -124,7 +125,7 @@ impl Edge {
         place
     }
 
-    /// Returns the extrema of SIR_1, computed in f64, and of SIR_2; missing ones are NaN, or far away.
+    /// Returns the extrema of SIR_1 and SIR_2 along the edge, m, computed in f64. Missing ones are NaN, or far away.
     fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
         let squared = |x: f64| x * x;
@@ -163,8 +164,9 @@ impl Edge {
         [narrow(sum / p), narrow(-p * b / sum), end, f32::NAN]
     }
 
-    /// Returns the best position on the edge. Work: at most 10 evaluations of both hops, and 40 more for each interval on which
-    /// one SIR rises, the other falls, and they cross: without noise one such interval for x and for the altitude, two for y.
+    /// Returns the best position on the edge. Work: at most 16 evaluations of both hops, and 42 more for each
+    /// interval on which one SIR rises, the other falls, and they cross: without noise one such interval for x and
+    /// for the altitude, two for y.
     pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,
@@ -183,7 +185,7 @@ impl Edge {
         best
     }
 
-    /// Returns the best position of the interval [`low`, `high`] without its lower end. Each SIR is monotone on it.
+    /// Returns the best position on the edge from above `low` to `high`. Each SIR is monotone between them.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -210,7 +212,7 @@ impl Edge {
     }
 }
 
-/// Sorts the values; a NaN is replaced by one of the others.
+/// Returns the four values in ascending order; a NaN is replaced by one of the others.
 fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, b) = (a.min(b), a.max(b));
     let (c, d) = (c.min(d), c.max(d));
@@ -229,10 +231,11 @@ pub(super) fn narrow(value: f64) -> f32 {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Doublings of t at most until a falling function is below 0.
+/// Maximum number of doublings of t in the search for a negative value of a falling function.
 const DOUBLINGS: u8 = 100;
 
-/// Returns the extrema, m; missing ones are NaN.
+/// Returns the extrema of SIR_1 along an edge with noise, m; missing ones are NaN. `p`, `a` and `b` are those of the
+/// module's table, and `noise` is nu.
 fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     if !(libm::fabs(p) > 0.0) {
         let squared = libm::sqrt((b - a) / noise) - a;
@@ -252,7 +255,7 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     slope.turns().map(|t| libm::copysign(1.0, p) * t)
 }
 
-/// Function phi of the module's documentation, for P > 0.
+/// Function phi(t) for P > 0, which for t > 0 has the sign of the slope of SIR_1 along an edge.
 struct Slope {
     p: f64,
     a: f64,
@@ -324,18 +327,19 @@ fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
     at
 }
 
-/// Number of lines on either side of y = 0.
+/// Number of lines along x that the search of the corridor evaluates on either side of y = 0.
 const LINES: u8 = 24;
 
-/// Number of the best lines that are refined.
+/// Number of the best lines along x that the search of the corridor refines.
 const FOLLOWED: usize = 3;
 
-/// Golden-section steps about each refined line.
+/// Number of golden-section steps in y about each refined line.
 const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
 
-/// Returns the best position at `altitude_m` in `along` by `across`. Work: at most 145 lines of some 90 evaluations.
+/// Returns the best position at `altitude_m` with x in `along` and y in `across`. Work: at most 243 lines of some 90
+/// evaluations of both hops.
 pub(super) fn best_in_corridor(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -397,7 +401,7 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts `new` into the best lines, best first.
+/// Inserts `new` into the list of the best lines if it is better than one of them; best first.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {
@@ -407,7 +411,8 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     }
 }
 
-/// Returns the touching position at `y_m`; `None` outside of [0, D] and `band`, and without noise. 40 bisection steps.
+/// Returns the position in the vertical plane y = `y_m` at which the level lines of both SIRs touch. `None` if it is
+/// outside of [0, D] or `band`, and without noise. Work: 40 bisection steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -447,7 +452,7 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane along the line, in m and m^2: D, X, (y0 - Y)^2, y0^2, nu, and G = K / A.
+/// Vertical plane y = y0 with the scene: D, interferer's X, (y0 - Y)^2, y0^2, noise nu, and G = K / A. In m and m^2.
 struct Face {
     d: f64,
     x: f64,
@@ -458,7 +463,7 @@ struct Face {
 }
 
 impl Face {
-    /// Returns x - D of the maximum of SIR_1 on the circle of radius `r`.
+    /// Returns x - D of the maximum of SIR_1 on the circle of radius `r` about Rx in this plane, m.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);
@@ -467,7 +472,8 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// Returns the maximum of SIR_1 / A on the circle of radius `r`.
+    /// Returns the maximum of SIR_1 / A on the circle of radius `r` about Rx in this plane. A is the first hop's
+    /// gain.
     fn first(&self, r: f64) -> f64 {
         let (z, gap) = (self.best(r), self.d - self.x);
         let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;

@@ -24,27 +24,27 @@ use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
 
-/// Bisection steps for the crossing of the SIRs: to an f32's step, even near Tx.
+/// Number of bisection steps for the x at which both SIRs are equal: to an f32's step, even near Tx.
 const HALVINGS: u8 = 40;
 
-/// Position of a relay, and the SIR (linear; in a field expected) of the worse of its two hops.
+/// Position of a single relay, and the SIR (linear; in a field its mean) of the worse of its two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Found {
-    /// Position.
+    /// Position of the relay.
     pub place: Placement,
-    /// Smaller one of SIR_1 and SIR_2.
+    /// Smaller one of SIR_1 (hop from Tx) and SIR_2 (hop to Rx), linear.
     pub sir: f32,
 }
 
 impl Found {
-    /// Returns the better of the two; this one if they are equal.
+    /// Returns `self` or `other`, whichever has the higher SIR; `self` if they are equal.
     fn or(self, other: Self) -> Self {
         if other.sir > self.sir { other } else { self }
     }
 }
 
-/// Two hops of a mission's only relay, at one altitude.
+/// Evaluator of both hops of a mission with a single relay above the line, at one altitude.
 #[derive(Clone, Copy)]
 struct Two<'a> {
     mission: &'a Mission,
@@ -71,7 +71,8 @@ impl Two<'_> {
         }
     }
 
-    /// Returns the better of the two f32 positions at the crossing. In [`low`, `high`] SIR_1 falls below SIR_2 there.
+    /// Returns the best position at the crossing in [`low`, `high`], where SIR_1 falls below SIR_2. It is the better
+    /// of the two neighbouring f32 values of x.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

@@ -79,37 +79,37 @@ use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Extremum, first_hop_turn, square};
 
-/// Case of the optimum; the first five are Corollary 1's, for X >= 0.
+/// Case of the optimal x at a given altitude; the first five are Corollary 1's, for X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum PlaceCase {
-    /// x = 0: the first hop is the worse one even right above Tx, p_t / p_u < C_1.
+    /// Optimum at x = 0: the first hop is the worse one even right above Tx, p_t / p_u < C_1.
     AboveTx = 1,
-    /// x of the only crossing: SIR_1 falls over the relevant range and crosses SIR_2 once.
+    /// Optimum at the only x where SIR_1 = SIR_2: SIR_1 falls all the way to Rx, and crosses SIR_2 once.
     Crossing = 2,
-    /// x = D: the first hop is the better one wherever SIR_1 does not rise.
+    /// Optimum at x = D: SIR_1 falls all the way to Rx, and the first hop is the better one even there.
     AboveRx = 3,
-    /// x of the crossing before the minimum of SIR_1, or D if SIR_1 has recovered by then.
+    /// Optimum where SIR_1 = SIR_2 before the minimum of SIR_1, or at x = D if SIR_1 has recovered by then.
     BeforeValley = 4,
-    /// x = D: the first hop is the better one even at the minimum of SIR_1.
+    /// Optimum at x = D: the first hop is the better one even at the minimum of SIR_1, before Rx.
     OverValley = 5,
-    /// x of the maximum of SIR_1, for X < 0: the first hop is the worse one even there.
+    /// Optimum at the maximum of SIR_1, for X < 0: the first hop is the worse one even there.
     Hilltop = 6,
-    /// x of the crossing beyond the maximum of SIR_1, for X < 0.
+    /// Optimum where SIR_1 = SIR_2 beyond the maximum of SIR_1, for X < 0 (interferer behind Tx).
     BeyondHill = 7,
-    /// x = D, for X < 0: SIR_1 rises all the way to Rx, or the first hop is the better one even there.
+    /// Optimum at x = D, for X < 0. SIR_1 rises all the way to Rx, or the first hop is the better one even there.
     HillAboveRx = 8,
-    /// x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
+    /// Optimum at x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
     Level = 9,
-    /// Position x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    /// Optimum at x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned = 10,
-    /// Second maximum of SIR_1, or the crossing of both SIRs beyond it; only with noise.
+    /// Optimum at the maximum of SIR_1 after its minimum, with noise, or where the SIRs cross after it.
     SecondHill = 11,
 }
 
 impl PlaceCase {
-    /// Number of the case in Corollary 1, 1 to 5; 0 for cases that it omits.
+    /// Number of the case in the paper's Corollary 1, 1 to 5; 0 for cases that the paper omits.
     pub const fn printed(self) -> u8 {
         let number = self as u8;
         if number <= Self::OverValley as u8 {
@@ -166,7 +166,8 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
     })
 }
 
-/// Returns the best position at or beyond the maximum after the minimum of SIR_1. The maximum must be before `end_m`.
+/// Returns the best position at or beyond the maximum that SIR_1 has after its minimum, with noise. `None` if there
+/// is no such maximum before `end_m`.
 fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;
@@ -184,23 +185,23 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     })
 }
 
-/// Case of the optimum; the first three are Theorem 2's.
+/// Case of the optimal altitude at a given x; the first three are Theorem 2's.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum AltitudeCase {
-    /// Lowest altitude: both SIRs fall with the altitude (x <= Psi^h, or X <= 0).
+    /// Optimum at the lowest altitude: both SIRs fall with the altitude (x <= Psi^h, or X <= 0).
     BothFall = 1,
-    /// Altitude within the band at which SIR_1, which rises with the altitude, equals SIR_2.
+    /// Optimum at the altitude in the band at which SIR_1, which rises with the altitude, equals SIR_2.
     Crossing = 2,
-    /// End of the band: SIR_1 rises with the altitude, but equals SIR_2 nowhere in the band.
+    /// Optimum at an end of the band: SIR_1 rises with the altitude, but equals SIR_2 nowhere in the band.
     End = 3,
-    /// Lowest altitude: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    /// Optimum at the lowest altitude: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
     Drowned = 4,
 }
 
 impl AltitudeCase {
-    /// Number of the case in Theorem 2, 1 to 3; 0 for the case that it omits.
+    /// Number of the case in the paper's Theorem 2, 1 to 3; 0 for the case that the paper omits.
     pub const fn printed(self) -> u8 {
         match self {
             Self::Drowned => 0,
@@ -249,7 +250,7 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if SIR_1 rises with the altitude. It rises from the bottom of `band` up to the returned altitude.
+/// Returns true if SIR_1 rises with the altitude at `x_m`, and the end of the rise in `band`, m.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
@@ -262,22 +263,23 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Edge of the optimum with its case there, or the inside; on a corner the first edge.
+/// Edge of the box (x by altitude) with the optimum, and its case there; or the inside of the box. On a corner it is
+/// the first of the edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {
-    /// Lowest altitude, by Theorem 1.
+    /// Optimum at the lowest altitude, where Theorem 1 has this case.
     Lowest(PlaceCase),
-    /// Highest altitude, by Theorem 1.
+    /// Optimum at the highest altitude, where Theorem 1 has this case.
     Highest(PlaceCase),
-    /// Position above Rx, by Theorem 2.
+    /// Optimum above Rx, where Theorem 2 has this case.
     AboveRx(AltitudeCase),
-    /// Point inside the box at which the level lines of both SIRs touch; only with noise.
+    /// Optimum inside the box, where the level lines of both hops' SIRs touch; only with noise.
     Touching,
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. The position is in [0, D] and the
-/// mission's band.
+/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. Its x is in [0, D],
+/// and its altitude in the mission's band.
 ///
 /// Work: at most 190 evaluations of both hops and one of Lemma 1.
 pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
@@ -307,20 +309,20 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     Some(best)
 }
 
-/// Ratios p_t / p_u, linear.
+/// Ratios p_t / p_u of the powers of Tx and relay, linear, at which the case of Corollary 1 changes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
-    /// C_1: below it the first hop is the worse one even right above Tx; 0 with the interferer at Rx.
+    /// Ratio C_1: below it the first hop is the worse one even right above Tx. It is 0 with the interferer at Rx.
     pub c1: f32,
-    /// C_2: above it the first hop is the better one even right above Rx.
+    /// Ratio C_2: above it the first hop is the better one even right above Rx.
     pub c2: f32,
-    /// C_3: above it the first hop is the better one even at the minimum of SIR_1. The minimum is between Tx and Rx or beyond.
-    /// `None` for X <= 0; with noise, the minimum before the maximum.
+    /// Ratio C_3: above it the first hop is the better one even at the minimum of SIR_1. The minimum is between Tx
+    /// and Rx or beyond. `None` for X <= 0; with noise, the minimum before the maximum.
     pub c3: Option<f32>,
 }
 
-/// Returns the ratios for a relay at `altitude_m`, m, above 0; `None` in a field.
+/// Returns the power ratios C_1 to C_3 for a relay at `altitude_m`, m, above 0; `None` in a field.
 ///
 /// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems/`. Constant work.
 pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {

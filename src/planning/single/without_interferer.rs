@@ -35,15 +35,16 @@ use crate::sir::square;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Noise {
-    /// Noise of the relay.
+    /// Noise power at the relay's receiver, W.
     pub relay_w: f32,
-    /// Noise of Rx.
+    /// Noise power at the ground receiver Rx, W.
     pub receiver_w: f32,
 }
 
 /// Returns the optimal position of a relay with `profile` against `noise` only, and its SNR (linear).
 ///
-/// Only the mission's distance, Tx power and channel are used. The lowest altitude is best. Constant work.
+/// Only the mission's distance, Tx power and channel are used. The altitude is that of `profile`; a lower one is
+/// always better. Constant work.
 pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found {
     let config = mission.config();
     let (d, h) = (config.distance_m, profile.altitude_m);
@@ -68,7 +69,8 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
     }
 }
 
-/// Returns the position in [`low`, `high`] with the best worst-hop SIR. E(SIR_1) is monotone there.
+/// Returns the position in [`low`, `high`] with the best worst-hop SIR. E(SIR_1), the mean SIR of the first hop, is
+/// monotone there.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {
@@ -110,7 +112,8 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     Some(best)
 }
 
-/// Returns the extrema of E(SIR_1), rising, for a linear Upsilon. The roots of b x^2 + 2 a x - b h^2 = 0.
+/// Returns both extrema of E(SIR_1) along x, ascending, m. Upsilon is linear in [`low`, `high`]: for a + b x they are
+/// the roots of b x^2 + 2 a x - b h^2 = 0. `high` twice if Upsilon is constant.
 fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
     let b = (at_high - at_low) / (high - low);
@@ -126,7 +129,8 @@ fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] 
     [one.min(other), one.max(other)]
 }
 
-/// Runs Algorithm 3 with the step `epsilon` (linear SIR, above 0), from the highest target. `None` without a field.
+/// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without
+/// a field.
 ///
 /// It only evaluates positions where E(SIR_2) is one of its targets, so it may miss the optimum of a field that changes much
 /// between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.

@@ -7,7 +7,7 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// State of the chain as seen by one node, for another node.
+/// Hello message: the sender's state of the chain, view and mission, on the side of the destination.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "seven flags of the wire format"
@@ -17,36 +17,38 @@ use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 pub struct Hello {
     /// [`digest`](crate::wire::digest::digest) of the sender's mission as loaded before flight.
     pub mission: u16,
-    /// Latest view known to the sender.
+    /// Identifier of the latest view known to the sender.
     pub latest_view: ViewId,
-    /// The sender's neighbour on this side; 0 for none.
+    /// Neighbour of the sender on the side of the destination; 0 for none.
     pub neighbour: u16,
     /// True to request a hello in return.
     pub requests_reply: bool,
     /// True to request a new view.
     pub requests_view: bool,
-    /// True if the sender has restarted and has not taken part in anything yet.
+    /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could join between the destination and the destination's neighbour. These two receive each other.
+    /// True if the sender could join between the destination and the destination's neighbour on this side. The sender
+    /// and that neighbour receive each other.
     pub ready: bool,
-    /// Number of connected relays from the sender on toward its other side, 1 to 1000.
+    /// Number of connected relays from the sender on, away from the destination: 1 to 1000. The sender is included.
     pub behind: u16,
-    /// Nodes on this side that the sender receives, bit 0 for the nearest: 0 to 15.
+    /// Bit set of the nodes on the destination's side that the sender receives: 0 to 15. Bit 0 is the nearest.
     pub hears: u8,
-    /// Newest mission that the sender has.
+    /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,
-    /// True if the sender flies that mission.
+    /// True if the sender flies the mission `latest_mission`.
     pub active: bool,
-    /// True if all relays of the sender's view fly that mission, an upload.
+    /// True if all relays of the sender's view fly the mission `latest_mission`, an uploaded one.
     pub active_in_view: bool,
-    /// True if a relay refuses that mission. The sender itself, which then flies another one, or one beyond it.
+    /// True if a relay refuses the mission `latest_mission`. It is the sender, which flies another mission, or a
+    /// relay beyond it.
     pub refused: bool,
-    /// Number that an answering offer has to repeat; 0 if the sender accepts no offer.
+    /// Number that a mission offer in reply to this hello has to repeat; 0 if the sender accepts no offer.
     pub offer_number: u16,
 }
 
 impl Hello {
-    /// Returns true if node `by`, the sender, receives node `of`, on the side of the destination.
+    /// Returns true if node `by`, the sender of this hello, receives node `of`, on the destination's side.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
@@ -121,22 +123,23 @@ impl Hello {
     }
 }
 
-/// Claim of the sender to its node number since its start, or the repetition of such a claim. Sent in both directions.
+/// Claim of the sender to its node number, or the echo of another node's claim. It resolves duplicate node numbers,
+/// and is sent in both directions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Claim number of the node: drawn at its start, raised at most once while it is active.
+    /// Claim number of the claiming node: drawn at its start, raised at most once while it is active.
     pub number: u32,
-    /// Last claim number received under the node's own number from another node; 0 for none.
+    /// Last claim number that the claiming node received from another node with its number; 0 for none.
     pub other_number: u32,
-    /// True if the node is passive because another node uses its number.
+    /// True if the claiming node is passive because another node uses its number.
     pub passive: bool,
-    /// True if the sender repeats what it received under the destination's number.
+    /// True for an echo: the sender repeats a claim that it received under the destination's number.
     pub echo: bool,
 }
 
 impl Claim {
-    /// Encodes the claim; flags from bit 0: passive, echo.
+    /// Encodes the claim into `buffer`; returns its length. Its flags from bit 0: passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
         let numbers = [self.number, self.other_number].map(u32::to_le_bytes);
@@ -157,7 +160,8 @@ impl Claim {
     }
 }
 
-/// Encodes a fence; the number in the pass id is that of the association.
+/// Encodes a fence message into `buffer`; returns its length. The pass number on the wire is the number of the
+/// fence's association.
 pub(super) fn encode_fence(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, mission);
     let numbers = [fence.echo, fence.number].map(Word::new);

@@ -23,17 +23,17 @@ use self::parts::{Word, read, tag, write};
 use super::upload::{UPLOAD, Upload};
 use crate::guard::Fence;
 
-/// Maximum body of a sweep: sixteen targets with a measured field or with a lateral offset.
+/// Maximum length of a sweep's body, bytes: sixteen targets with a measured field or a lateral offset.
 const SWEEP: usize = 88;
 
-/// Maximum body except for an offer: measurements, or without the feature `sensing` a sweep.
+/// Maximum length of a body except for an offer, bytes: measurements, or a sweep without `sensing`.
 const LONG: usize = if cfg!(feature = "sensing") {
     round::HEARD
 } else {
     SWEEP
 };
 
-/// Maximum body: an offer, measurements, or without those features a sweep.
+/// Maximum length of a body, bytes: an offer, measurements, or without those features a sweep.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {
     offer::LENGTH
@@ -46,13 +46,13 @@ pub const MAX_BODY: usize = LONG;
 /// Message between neighbours. *Onward* is the direction of a pass: toward Rx, or toward Tx in a field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Onward message: targets, and the sender's reach for each.
+    /// Message to the next relay of a pass: target SIRs, and the sender's reach (farthest x) for each.
     Sweep(Sweep),
-    /// Reply to a sweep: its verdict. It acknowledges the sweep of the same number.
+    /// Reply to a sweep: its verdict, the result for each target. It acknowledges the sweep of the same number.
     Verdict(Answer),
-    /// Reply to a repeated pass: the pass of this number has arrived, but has no result yet.
+    /// Reply to a repeated pass message: it was received before, and its result is not known yet.
     Busy {
-        /// Number of the pass.
+        /// Number of the pass that is in progress.
         number: u16,
     },
     /// Either direction: heartbeat request, reply, or both.
@@ -64,31 +64,32 @@ pub enum Message {
         /// Number of the answered request, 0 for none.
         reply: u16,
     },
-    /// Onward message: profiles of the relays up to the sender.
+    /// Message to the next relay of a pass: profiles (altitude and power) of the relays up to the sender.
     Gather(Roster),
-    /// Reply to a gathering: profiles of the whole chain.
+    /// Reply to a gathering: profiles (altitude and power) of the whole chain.
     Gathered(Roster),
-    /// Onward message: interference estimate, and measurements of the relays up to the sender.
+    /// Message to the next relay of a pass: interference estimate, and measurements up to the sender. The
+    /// measurements are those of the relays from the leader to the sender.
     Sense(Heard),
-    /// Reply to a sensing pass: measurements of the relays from the sender on.
+    /// Reply to a sensing pass: measurements of the sender and of all later relays of the pass.
     Sensed(Heard),
-    /// Onward message: turn of the relays in Algorithm 2.
+    /// Message to the next relay of a pass: token of Algorithm 2, whose receiver may move.
     Token(Token),
-    /// Reply to a token: its result.
+    /// Reply to a token: position of the sender and SIRs after the pass.
     Moved(Moved),
-    /// Onward message: lease renewal by the view's leader.
+    /// Message to the next relay: lease renewal by the view's leader.
     Pulse(Pulse),
     /// Reply to a lease renewal: its acknowledgement.
     Pulsed(Pulsed),
     /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// Onward message: proposal of a new view, which counts the present relays.
+    /// Message to the next relay: proposal of a new view, which counts the present relays.
     Proposal(Proposal),
     /// Reply to a proposal: the decision on it.
     Decision(Decision),
     /// Either direction: limit along the line (fence) that keeps two neighbours apart.
     Fence {
-        /// Digest of the sender's mission as loaded before flight, combined with its upload's sites. See
+        /// Digest of the sender's mission as loaded before flight, and of the sites of its uploaded mission. See
         /// [`digest`](super::digest::digest).
         line_digest: u16,
         /// State of the fence at the sender.
@@ -101,19 +102,19 @@ pub enum Message {
         /// Number of the destination's hello that the offer answers, 0 for none.
         offer_number: u16,
     },
-    /// Ground to relay: interference level at that end of the chain.
+    /// Ground to relay: interference level measured at Tx or Rx.
     Level {
-        /// Digest of the mission loaded before flight.
+        /// Digest of the mission that the sender loaded before flight.
         mission: u16,
         /// Mean received power, W: 1e-30 to 1e6, including the noise of that receiver.
         power_w: f32,
     },
-    /// Either direction: claim to the sender's node number, or the echo of one.
+    /// Either direction: claim to the sender's node number, or the echo of another node's claim.
     Claim(Claim),
 }
 
 impl Message {
-    /// Returns the digest of the sender's mission, view or line; `None` for a message without one.
+    /// Returns the digest in the message, of a mission, view or line; `None` for a message without one.
     pub const fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -138,7 +139,7 @@ impl Message {
         }
     }
 
-    /// Returns true for messages of a round, whose digest is that of mission and view.
+    /// Returns true for messages of passes and leases, whose digest is that of mission and view.
     pub(crate) const fn belongs_to_view(&self) -> bool {
         matches!(
             self,
@@ -160,7 +161,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that are sent onward in a pass.
+    /// Returns true for messages that relays forward in the direction of a pass (onward). They are messages of
+    /// passes, proposals and lease renewals, but not the replies to them.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,
@@ -175,7 +177,7 @@ impl Message {
 }
 
 impl Message {
-    /// Encodes the body into `buffer`; returns its length, at most [`MAX_BODY`].
+    /// Encodes the message body into `buffer`; returns its length, at most [`MAX_BODY`] bytes.
     ///
     /// `None` if it does not fit, or needs a feature that the crate was built without.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {

@@ -21,17 +21,18 @@ pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
     Ok((upload, answer.number()))
 }
 
-/// Stored form of an upload: an offer without `answer`.
+/// Encoding of an uploaded mission for storage: that of an offer message without the number it answers.
 impl Upload {
-    /// Length of an encoded upload, bytes: its tag and the fixed-size fields of its wire form.
+    /// Length of an encoded upload, bytes: the message tag and the fixed-size fields of the wire format.
     pub const LENGTH: usize = size_of::<u8>() + size_of::<OfferBody>();
 
-    /// Encodes the upload for storage, [`Upload::LENGTH`] bytes, into `buffer`; `None` if it does not fit.
+    /// Encodes the uploaded mission for storage into `buffer`; `None` if it does not fit. Returns the length,
+    /// [`Upload::LENGTH`] bytes.
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         write(&(tag::OFFER, OfferBody::of(self)), buffer)
     }
 
-    /// Decodes a stored upload; `None` if `bytes` are not exactly one valid upload.
+    /// Decodes a stored uploaded mission; `None` if `bytes` are not exactly one valid upload.
     ///
     /// The caller protects the stored bytes by a check sequence.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
@@ -42,19 +43,19 @@ impl Upload {
     }
 }
 
-/// Wire form: version and base, the numbers in the order of the digest, and the sites. It is packed, so its size in memory is
-/// that on the wire, from which [`Upload::LENGTH`] is computed.
+/// Uploaded mission on the wire: version, base, the numbers in the order of the digest, sites. It is packed, so its
+/// size in memory is that on the wire, from which [`Upload::LENGTH`] is computed.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Pass id: its number is the version, its mission the base.
+    /// Version of the upload, and digest of the mission that it replaces.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// Encoded by [`Sites::to_bytes`]; all 0 for none.
+    /// Positions of Tx and Rx, encoded by [`Sites::to_bytes`]; all 0 if the upload has none.
     sites: SitesBody,
 }
 

@@ -8,7 +8,7 @@ use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
-/// Tags: the first byte of a body, which is the kind of message; sweeps have three kinds.
+/// Message tags: the first byte of a body, which is the kind of message. Sweeps have three kinds.
 pub(super) mod tag {
     pub(crate) const SWEEP: u8 = 0;
     pub(crate) const VERDICT: u8 = 1;
@@ -73,8 +73,9 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Decodes numbers of targets, and returns the rest. postcard also accepts longer encodings, with a count padded by empty varint
-/// bytes, up to a limit that depends on the width of usize. They are rejected here, so that all nodes accept the same.
+/// Decodes a list of one number per target SIR; returns the list and the remaining bytes. postcard also accepts
+/// longer encodings, with a count padded by empty varint bytes, up to a limit that depends on the width of usize.
+/// They are rejected here, so that all nodes accept the same.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -85,7 +86,8 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum slack or reach, m: a position is at most 1e6, and the last hop is limited to 1e9.
+/// Maximum slack (spare length) or reach in a message, m. A position is at most 1e6, and the last hop is limited to
+/// 1e9.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -135,7 +137,7 @@ pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
 
-/// Returns true if the lateral offset is in range, m.
+/// Returns true if the lateral offset `y_m`, m, is in range.
 pub(super) fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }
@@ -154,14 +156,14 @@ pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
         .all(|number| (least..=FARTHEST_M).contains(number))
 }
 
-/// Reason why a body is rejected.
+/// Reason why the body of a message is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MessageError {
-    /// Invalid or non-canonical encoding, or bytes are left.
+    /// The encoding is invalid or not the shortest, or bytes are left over.
     Encoding,
-    /// Number that is not finite or outside its range.
+    /// A number in the message is not finite or outside its range.
     Value,
 }
 

@@ -18,30 +18,31 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep of targets along the chain, from one relay to the next.
+/// Sweep message: the target SIRs of a pass along the chain, and how far each is met.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
-    /// [`digest`](crate::wire::digest::digest) of the sender.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Target SIRs.
+    /// Target SIRs that this sweep tries.
     pub ladder: Ladder,
-    /// Cross-section and power of the sender.
+    /// Lateral offset, altitude and power of the sender.
     pub relay: Station,
-    /// True if relays use the cross-sections of the joint method instead of the configured cross-sections.
+    /// True if relays use the joint method's lateral offsets and altitudes, and not the configured ones.
     pub chosen: bool,
-    /// Upsilon measured by the sender at its position, 1/W, in a closed loop.
+    /// Upsilon = E[1/I] measured by the sender at its position, 1/W; `None` to use the agreed field.
     pub measured_per_w: Option<f32>,
-    /// Reach of the sender for each target, m along x. Shorter than the ladder if the upper targets cannot be met.
+    /// Reach of the sender for each target, the farthest x at which it meets the target, m. Shorter than the ladder
+    /// if the upper targets cannot be met.
     pub reaches: PerTarget,
 }
 
-/// Common start of all kinds of sweeps; the reaches come last.
+/// Fields at the start of all kinds of sweep messages; the reaches come last.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Anchor of the ladder; negative for a plain pass.
+    /// Lower middle target SIR of the ladder, or its only one; negative for a plain pass.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -68,7 +69,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep; Upsilon or the lateral offset comes between head and reaches.
+    /// Encodes the sweep into `buffer`; returns its length. Upsilon or the lateral offset comes between head and
+    /// reaches.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -96,7 +98,7 @@ impl Sweep {
     }
 }
 
-/// Checks the ranges of a sweep; with a `y_m` it is one at the joint method's cross-section.
+/// Returns the decoded sweep if all values are in range. With a `y_m` it is one of the joint method.
 fn checked(
     head: SweepHead,
     y_m: Option<f32>,
@@ -126,18 +128,18 @@ fn checked(
     })
 }
 
-/// Verdict on a sweep; sent back.
+/// Reply to a sweep: the result for each target, and the destination's required position.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Answer {
-    /// Number of the sweep.
+    /// Number of the sweep that this message answers.
     pub number: u16,
-    /// [`digest`](crate::wire::digest::digest) of the sender.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Results of the targets.
+    /// Slacks (spare lengths) of the sweep's targets, and the committed target.
     pub verdict: Verdict,
     /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
     pub required_x_m: Option<f32>,
-    /// True if the sender or a later relay of the pass has its own profile.
+    /// True if the sender, or a later relay of the pass, has a profile other than the mission's common one.
     pub own: bool,
 }
 
@@ -175,37 +177,38 @@ impl Answer {
     }
 }
 
-/// Maximum number of relays in one roster.
+/// Maximum number of relay profiles in one message.
 pub const MOST_NAMED: usize = 8;
 
-/// Profile of a relay that differs from the mission's common one.
+/// Profile of a relay, altitude and power, that differs from the mission's common one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
     /// Index of the relay in the view, from 1 next to Tx.
     pub index: u16,
-    /// Fixed altitude, m; 0 if the relay chooses.
+    /// Fixed altitude of the relay, m; 0 if the relay chooses its altitude.
     pub held_m: f32,
-    /// Transmit power, W.
+    /// Transmit power of the relay, W.
     pub power_w: f32,
 }
 
-/// Profiles of some relays, in the order of their indices.
+/// List of relay profiles in the order of the relays' indices.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Profiles: onward of the relays up to the sender, back of the whole chain.
+/// Message that collects relay profiles. In the direction of the pass it has those of the relays up to the sender, in
+/// a reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
-    /// [`digest`](crate::wire::digest::digest) of the sender.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Index of the last relay in earlier passes; 0 in the first pass.
+    /// Index of the last relay whose profile earlier passes collected; 0 in the first pass.
     pub after: u16,
-    /// Profiles of the relays after that index. If the roster is full, the next pass collects the other profiles.
+    /// Profiles of relays after the index `after`. If the list is full, the next pass collects the other profiles.
     pub seats: OwnSeats,
 }
 
-/// Index, altitude or 0, and power of each relay.
+/// Relay profiles on the wire: index, altitude in m (0 if the relay chooses), and power in W.
 type SeatsBody = Vec<(Word, f32, f32), MOST_NAMED>;
 
 impl Roster {
@@ -250,18 +253,18 @@ impl Roster {
     }
 }
 
-/// Token of Algorithm 2.
+/// Token message of Algorithm 2, in which one relay after the other improves its own position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
-    /// [`digest`](crate::wire::digest::digest) of the sender.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
     /// Transmit power of the sender, W.
     pub power_w: f32,
-    /// Action of this pass.
+    /// Action of the relays in this pass.
     pub turn: AdjustStep,
     /// SIR of the chain before this pass, linear; 0 if unknown.
     pub sir: f32,
@@ -302,24 +305,24 @@ impl Token {
     }
 }
 
-/// Action of a relay that receives the token.
+/// Action of each relay that receives the token of Algorithm 2.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// Stay, and learn the neighbours' positions.
+    /// Stay, and store the neighbours' positions.
     Look,
-    /// Move if another position is better.
+    /// Move if another position has a better SIR.
     Move {
         /// Maximum change of altitude, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Local search.
+        /// Method of the search for a better position.
         local: Local,
     },
-    /// Stay for good.
+    /// Stay for good: Algorithm 2 has ended.
     Stop,
 }
 
-/// Action as one byte and three numbers, which are 0 if unused.
+/// Action of a token on the wire: one byte and three numbers, which are 0 if unused.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct StepBody {
     kind: u8,
@@ -350,7 +353,7 @@ impl StepBody {
         }
     }
 
-    /// Decodes the action; `None` if it is out of range or not the only encoding.
+    /// Returns the decoded action; `None` if it is out of range or not the only encoding.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
@@ -375,18 +378,18 @@ impl StepBody {
     }
 }
 
-/// Result of a token; sent back.
+/// Reply to a token of Algorithm 2, sent against its direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
-    /// Number of the pass.
+    /// Number of the token's pass.
     pub number: u16,
-    /// [`digest`](crate::wire::digest::digest) of the sender.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
-    /// True if the sender or a later relay of the pass has moved.
+    /// True if the sender, or a later relay of the pass, has moved in this pass.
     pub position_changed: bool,
-    /// SIR of the worst hop after the sender, linear.
+    /// SIR of the worst hop after the sender in the direction of the pass, linear.
     pub worst_sir: f32,
 }
 
@@ -416,27 +419,29 @@ fn sir_in_range(sir: f32) -> Option<f32> {
     (0.0..=f32::MAX).contains(&sir).then_some(sir)
 }
 
-/// Length of the body: tag, pass id, estimate, sums, receiver's level and the excluded node.
+/// Length of a sensing message's body, bytes: tag, pass, estimate, sums, Rx's level, excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Interference estimate, and measurements. Onward of the relays up to the sender, back of those from the sender on.
+/// Sensing message: the interference estimate, and the relays' measurements. In the direction of the pass it has
+/// those of the relays up to the sender, in a reply those of the sender and of all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
-    /// Number of the pass, wrapping.
+    /// Number of the pass along the chain, wrapping.
     pub number: u16,
-    /// [`digest`](crate::wire::digest::digest) of the sender.
+    /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// New estimate for all relays.
+    /// Interference estimate that all relays are to use.
     pub estimate: NumberedEstimate,
-    /// Sums of the measurements.
+    /// Weighted sums of the relays' measurements.
     pub sums: Sums,
-    /// Level at the receiver.
+    /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay that does not fit the others and is not included in `sums`; 0 for none. Used on the way back.
+    /// Node number of a relay whose measurements do not fit the others, and are not in `sums`; 0 for none. Used in
+    /// replies.
     pub excluded: u16,
 }
 
-/// Estimate as one byte and four numbers, which are 0 if unused.
+/// Interference estimate on the wire: one byte and four numbers, which are 0 if unused.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct EstimateBody {
     number: Word,
@@ -496,7 +501,7 @@ impl EstimateBody {
     }
 }
 
-/// Sums in two parts, since serde has no longer tuples.
+/// Measurement sums on the wire, in two arrays, since serde has no longer ones.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {

@@ -7,41 +7,41 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// Proposal of a new view; sent onward from relay to relay.
+/// Proposal of a new view, an agreement on the chain's members; relays forward it from one to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
-    /// Mission of the view: the one that every relay up to the sender has.
+    /// Identifier of the new view's mission, which every relay up to the sender has.
     pub mission_id: MissionId,
-    /// New view, later than every view known to its proposer.
+    /// Identifier of the proposed view, later than every view known to its proposer.
     pub proposed_view: ViewId,
     /// Number of relays that the proposal has reached, including the sender: 1 to 1000.
     pub place: u16,
-    /// Result of the poll of the relays up to the sender.
+    /// Votes and leases of the relays up to the sender.
     pub poll: Poll,
 }
 
-/// Poll of a proposal.
+/// Poll of the relays that a proposal has reached: votes and leases of an earlier view.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
     /// Newest view that any polled relay knows to be agreed on.
     pub agreed: View,
-    /// Number of polled members of that view, 0 to 1000.
+    /// Number of polled relays that are members of the view `agreed`: their votes, 0 to 1000.
     pub votes: u16,
-    /// True if its proposer was polled: that half of a split view counts as the larger one.
+    /// True if the proposer of the view `agreed` was polled. With half of the votes, its side then has the quorum.
     pub proposer: bool,
-    /// Remaining lease of members of that view that were not polled, in tenths of a second.
+    /// Remaining lease of those members of the view `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until positions of the new view may be used, tenths of a second; 65535 if unknown. The cause is leases of earlier
-    /// views.
+    /// Time until leases of earlier views have expired, in tenths of a second; 65535 if unknown. Positions of the new
+    /// view may be used only then.
     pub earlier_lease_left: u16,
-    /// Latest successor of that view that a member has accepted; it may have been agreed on.
+    /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on.
     pub successor: Option<Successor>,
 }
 
 impl Poll {
-    /// Returns an empty poll of the members of `agreed`.
+    /// Returns a poll without votes yet; `agreed` is the view whose members are polled.
     pub(crate) const fn of(agreed: View) -> Self {
         Self {
             agreed,
@@ -54,23 +54,23 @@ impl Poll {
     }
 }
 
-/// View that was decided, and may have been agreed on.
+/// View that a decision accepted, and that may have been agreed on.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
-    /// Proposal of the decision.
+    /// Identifier of the proposal to which the decision belongs.
     pub proposal: ViewId,
     /// Decided view: the proposed one, or one that was found to be decided before.
     pub view: View,
 }
 
-/// Decision on a proposal; sent back.
+/// Decision on the proposal of a view; sent back from relay to relay to the proposer.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
-    /// Proposed mission.
+    /// Identifier of the proposed view's mission.
     pub mission_id: MissionId,
-    /// Proposed view.
+    /// Identifier of the proposed view.
     pub proposed_view: ViewId,
     /// Position of the sender on the proposal's path, from 1 at the proposer: 1 to 1000.
     pub place: u16,
@@ -80,8 +80,8 @@ pub struct Decision {
     pub base: View,
     /// View to accept: the proposed one, or one that was decided before; `None` without a quorum.
     pub accepted: Option<View>,
-    /// Time until the view's positions may be used, tenths of a second. The cause is members of the previous view that were not
-    /// polled.
+    /// Time until positions of the accepted view may be used, in tenths of a second. Members of the previous view
+    /// that were not polled may have a lease until then.
     pub usable_in: u16,
 }
 
@@ -137,7 +137,7 @@ impl SizedBody {
     }
 }
 
-/// Returns true if the view can exist.
+/// Returns true if a view with this identifier and number of relays can exist.
 fn is_view(view: View) -> bool {
     (view.id == ViewId::LOADED || view.id.is_proposed()) && is_size(view.relays)
 }
@@ -169,7 +169,7 @@ impl Proposal {
         )
     }
 
-    /// Decodes a proposal; agreed or decided views must be earlier ones.
+    /// Decodes a proposal. An agreed or accepted view in it must be earlier than the proposed one.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(Word::number);
@@ -255,11 +255,11 @@ impl Decision {
     }
 }
 
-/// Lease renewal of the view's leader; sent from the leader to the last relay.
+/// Lease renewal, which the leader of a view sends and each relay forwards to the last one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulse {
-    /// Number of the renewal, wrapping: all members have taken part in the one before.
+    /// Number of the renewal, wrapping. When it is sent, all members have taken part in the previous one.
     pub number: u16,
     /// Digest of the mission and the view.
     pub view_digest: u16,
@@ -267,11 +267,11 @@ pub struct Pulse {
     pub lease: u16,
 }
 
-/// Acknowledgement of a lease renewal; sent back.
+/// Acknowledgement of a lease renewal; sent back from relay to relay to the leader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulsed {
-    /// Number of the renewal.
+    /// Number of the acknowledged renewal.
     pub number: u16,
     /// Digest of the mission and the view.
     pub view_digest: u16,

@@ -10,10 +10,10 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// [`PEERS`] as a node number.
+/// Number of table entries, [`PEERS`], as a node number.
 const ROOM: u16 = 8;
 
-/// Value of `Settings::dead_after`.
+/// Silence after which a node is forgotten; the value of `Settings::dead_after`.
 const GONE: Duration = Duration::from_millis(15_000);
 
 const KEY: Key = Key::new([0xA5; 32]);
@@ -33,7 +33,8 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// Returns a frame of `from`, node `addresses.0`, to node `addresses.1`: a handshake or a `Busy`.
+/// Returns a frame of the session `from`: a handshake or a `Busy`. `addresses` are the node numbers of its sender and
+/// its receiver.
 fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {
@@ -63,7 +64,8 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Exchanges all pending handshakes, and returns their number. `counters` are those of `one` and `other`.
+/// Exchanges all pending handshakes between two nodes, and returns their number. `ends` has session and number of
+/// each node, `counters` their frame counters.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
@@ -91,7 +93,7 @@ fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     }
 }
 
-/// Returns the session of node `node`, epoch `epoch`, after handshakes with node 1's `own`.
+/// Returns the session of node `node` in epoch `epoch`, after handshakes with node 1's session `own`.
 fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Session {
     let mut other = Session::new(Auth { key: KEY, epoch }, 0, GONE);
     other.greet(1);
@@ -117,7 +119,7 @@ fn three_handshakes_make_a_link_known_and_four_where_they_cross() {
     }
 }
 
-/// Handshakes are lost: the end without proof requests again, and receives a reply.
+/// Loses handshakes: the node without a proof requests again, and receives a reply.
 #[test]
 fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
     for lost in 0..4 {
@@ -172,7 +174,7 @@ fn a_body_of_a_handshake_says_who_is_known() {
     );
 }
 
-/// Pinned entries and the most recently used one stay; earlier recordings are rejected.
+/// Fills the table: pinned entries and the last used one stay, and earlier recordings are rejected.
 #[test]
 fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     let mut own = session();
@@ -216,7 +218,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
 }
 
-/// Recorded handshakes of many nodes replace only entries of unproven nodes.
+/// Replays recorded handshakes of many nodes, which replace only entries of unproven nodes.
 #[test]
 fn recorded_handshakes_do_not_drive_out_who_is_known() {
     let mut handshakes = Vec::new();
@@ -243,7 +245,8 @@ fn recorded_handshakes_do_not_drive_out_who_is_known() {
     }
 }
 
-/// A node that restarted without a handshake, or forgot this one, has no session in either direction. `greet` starts one.
+/// Starts a session with `greet` after one node has forgotten the other. A node that restarted without a handshake,
+/// or forgot this one, has no session in either direction.
 #[test]
 fn a_greeting_mends_what_only_one_end_knows() {
     let mut own = session();
@@ -292,7 +295,7 @@ fn after_the_last_nonce_nobody_new_is_met() {
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
 
-/// A node with an older or reused epoch repeats handshakes; a replayed recording is a single frame.
+/// Repeats handshakes of an older or reused epoch, which are reported once. A replayed recording is not reported.
 #[test]
 fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not() {
     for epoch in [1, 7] {
@@ -330,7 +333,7 @@ fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
     }
 }
 
-/// Frames under the own number: claim numbers and epochs of the sender, with the own key or another.
+/// Receives frames under the relay's own number. Claim number, epoch and key are its own or others.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -362,7 +365,7 @@ fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     }
 }
 
-/// Echo of a node's own frames, handshake and message.
+/// Receives the echo of the relay's own frames, a handshake and a message.
 #[test]
 fn frames_of_its_own_are_recognised() {
     let mut counters = [0; 2];
@@ -374,7 +377,7 @@ fn frames_of_its_own_are_recognised() {
     }
 }
 
-/// Two nodes 2 of one epoch at node 1. Node 1 accepts the larger claim and shows that to the smaller one.
+/// Connects two nodes 2 of one epoch to node 1. Node 1 accepts the larger claim and shows that to the smaller one.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     const FAR: u32 = 1 << 20;
@@ -418,8 +421,8 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     }
 }
 
-/// Node 2 with the larger claim falls silent. After the timeout the smaller claim is accepted, and recordings of the larger one are
-/// rejected until that node itself is received.
+/// Silences the node 2 with the larger claim. After the timeout the smaller claim is accepted, and recordings of the
+/// larger one are rejected until that node itself is received.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_believed_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

@@ -50,7 +50,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the fixed altitude of relay `index`, if it has one while other relays choose.
+    /// Returns the altitude of relay `index`, m, if it is fixed while others choose theirs; else `None`.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = (self.seat_of)(index).room;
         let free = !self.mission.config().band.is_single();
@@ -61,7 +61,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude of relay `index`, interpolated between the relays with a fixed altitude.
+    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. Before the
+    /// first and after the last of these it is constant if `level`, and otherwise goes down to Tx and Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.mission.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -77,19 +78,21 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns the parameters of relay `index` and of its hop from a sender at `from`.
+    /// Returns relay `index`, limited to `room`, with its hop from a sender at `from`.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack, m, of the hop to Rx from the last relay at `at`, and its derivatives.
+    /// Returns the slack of the last hop for `target`, m, and its derivatives; the last relay is at `at`. The slack
+    /// is the hop's maximum length less its length.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         site::tail(self.mission, power_w, room, target, at)
     }
 
-    /// Returns the highest possible target of the chain, in ln gamma. It is the smaller bound of the first and the last hop.
+    /// Returns the upper bound of the chain's SIR, in ln gamma. It is the smaller maximum of the first and the last
+    /// hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         let first = (self.seat_of)(1).room;
@@ -98,7 +101,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target, in ln gamma, above which no hop leaps over the interferer. It is the largest gain of any hop.
+    /// Returns the target SIR, in ln gamma, above which no hop leaps over the interferer. It is the largest gain of
+    /// any hop.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -107,7 +111,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     }
 }
 
-/// Returns the cross-section in `room`, right above Rx, with the best SIR from Tx.
+/// Returns the allowed cross-section right above Rx at which a relay has the best SIR from Tx.
 pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -124,7 +128,7 @@ pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Roo
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Relays of a segment in memory; 0 without the feature `altitude`.
+/// Number of relays in a segment of the chain whose policies are in memory; 0 without `altitude`.
 pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
     SEGMENT
 } else {
@@ -132,12 +136,13 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// State of the chain at a segment: the position before it and the value function at its end.
+/// Stored state of a segment of the chain: the x before it, and the value function at its end.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Mark {
     /// x of the relay before the segment, m.
     pub(super) x_m: f32,
-    /// Derivatives of the value function at the segment's last relay: m per m; second ones, 1/m.
+    /// First derivatives of the slack (spare length at Rx) by the segment's last relay's position, m/m. The next
+    /// field has the second ones, 1/m.
     pub(super) slope: Triple,
     pub(super) bend: [f32; 6],
 }
@@ -170,7 +175,7 @@ pub(super) fn last_of(mission: &Mission) -> u8 {
     u8::try_from(last).unwrap_or(u8::MAX)
 }
 
-/// Returns position and index of the relays in `segment`.
+/// Returns each relay of `segment` as its number within the segment and its index in the chain.
 pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
     let first = u16::from(segment) * SEGMENT_RELAYS;
     // Counted in u16 at both ends, since zipping two ranges backward may panic.
@@ -179,18 +184,18 @@ pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<It
         .filter(move |(_, index)| *index <= relays)
 }
 
-/// Known profile of one relay: its power, and its lateral offsets and altitudes.
+/// Profile of one relay for the joint method: power, allowed lateral offsets, allowed altitudes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
     /// Lateral offsets and altitudes that the relay may choose from.
     pub room: Room,
-    /// Transmit power, W.
+    /// Transmit power of the relay, W.
     pub power_w: f32,
 }
 
 impl Seat {
-    /// Returns the mission's common profile.
+    /// Returns the profile that the mission gives to every relay without one of its own.
     pub const fn common(mission: &Mission) -> Self {
         Self {
             room: Room::of(mission),
@@ -198,8 +203,8 @@ impl Seat {
         }
     }
 
-    /// Returns the profile of a relay with the altitude and power `own`. If it `holds` the altitude, that is the only one
-    /// allowed.
+    /// Returns the profile of a relay with the altitude and power `own`. If `holds` is true, the relay keeps that
+    /// altitude.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

@@ -13,13 +13,13 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision of the target of a start, in ln gamma.
+/// Precision of the highest target that is found for an ascent's result, in ln gamma.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Distance from the ceiling of the first or the last hop at which the search ends, in ln gamma.
+/// Distance from the upper bound by the first and the last hop at which the search ends, in ln gamma.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Distance of the target above that ceiling at the first probe, in ln gamma.
+/// Excess of an ascent's first maximum target over the chain's upper bound, in ln gamma.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -41,8 +41,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.tried(chain, seek, purpose, met.then_some(false))
     }
 
-    /// Checks one more segment, from the last to the first, for positions that let all relays hold back. `place_m` is the
-    /// required x of the segment's last relay. Bounded by twenty relays.
+    /// Checks in one more segment, from the last to the first, that relays can hold back. Holding back is to take a
+    /// position before one's reach, for the sake of later relays. `place_m` is the required x of the segment's last
+    /// relay. Bounded by twenty relays.
     pub(super) fn try_hold_back(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -63,7 +64,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records the result of a target: `met` is `Some` if it is feasible, true if relays have to hold back.
+    /// Records the result of one target, and selects the next work. `met` is `Some` if the target is feasible, and
+    /// true if relays have to stop before their reach for it.
     pub(super) fn tried(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -170,7 +172,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the search for the highest target by the sweep's rules, after an ascent to `sigma`.
+    /// Returns the search for the highest target by the hops of a message sweep. Relays may stop before their reach
+    /// in it. It follows an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in ln gamma.
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -181,19 +184,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the current start may still become the best.
+    /// Returns true if the ascent from the current initial chain may still give the best chain.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current start is dropped early because it cannot become the best. `turn` is its next step.
+    /// Returns true if the current ascent is dropped early because it cannot give the best chain. `turn` is its next
+    /// action.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    /// Returns true if the best start meets the ceiling, so that no other start can be better.
+    /// Returns true if the best chain so far meets the upper bound `ceiling`. No other chain can be better then.
     pub(super) fn is_complete(&self, ceiling: f32) -> bool {
         self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
     }
@@ -231,21 +235,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays of a polished chain. Chains with fixed altitudes are always polished, since their path has kinks.
+/// Maximum number of relays of a chain that is polished, by moves of single relays. Chains with fixed altitudes are
+/// always polished, since their path has kinks.
 const POLISHED: u16 = 5;
 
-/// Number of times that the polish halves its moves.
+/// Number of times that the final polish of a chain halves the moves of its relays.
 const HALVINGS: u16 = 12;
-/// First move of the polish, as a fraction of the room.
+/// First move of a relay in the polish, as a fraction of its allowed range.
 const FIRST_MOVE: f32 = 0.25;
 
-/// Minimum gain of an accepted move, in ln gamma.
+/// Minimum gain of the target SIR by an accepted move of the polish, in ln gamma.
 pub(super) const GAIN: f32 = 2e-5;
-/// Maximum number of accepted moves.
+/// Maximum number of accepted moves of the polish.
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Returns the relay of the current move, its direction (one of six), and its number of halvings.
+    /// Returns the current move of the polish: the relay, the kind of move, and the number of halvings. Kinds 0 to 3
+    /// are down, up, left and right; 4 and 5 take the cross-section of the relay two ahead or two back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -253,10 +259,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of a chain that meets `sigma`: one relay by a fraction of its room.
+    /// Tries the next move of one relay in a chain that meets the target `sigma`, in ln gamma.
     ///
-    /// The fraction is halved from round to round. The moves find gains that the derivatives do not show, because another
-    /// constraint is active.
+    /// The relay moves by a fraction of its allowed range, which is halved from round to round, or to another relay's
+    /// cross-section. The moves find gains that the derivatives do not show, because another constraint is active.
     pub(super) fn polish(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -302,7 +308,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Begins the ascent from the next start chain, or ends the search after the last one.
+    /// Begins the ascent from the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -374,7 +380,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the cross-section of relay `index`: the stored one, or for a new start that of its shape.
+    /// Returns the cross-section of relay `index`: the stored one, or that of a new initial chain.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

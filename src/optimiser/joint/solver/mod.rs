@@ -32,11 +32,11 @@ pub use chain::Seat;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct ForwardPass {
-    /// Relays that the pass has completed.
+    /// Number of relays that the forward pass has completed.
     done: u16,
-    /// New position of the last relay computed in this pass.
+    /// New position of the relay that this forward pass has computed last.
     from: Placement,
-    /// Position of that relay before this pass.
+    /// Old position, before this forward pass, of the relay that the pass has computed last.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -45,48 +45,50 @@ struct ForwardPass {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Begin the next start.
+    /// Begin the next initial chain.
     Begin,
-    /// Search for the highest feasible target of the unchanged chain.
+    /// Search for the highest feasible target SIR of the unchanged chain.
     Seek(Seek, Purpose),
-    /// Compute the chain for one target, and store it.
+    /// Compute the chain for one target SIR, in ln gamma, and store it.
     Settle(f32, Purpose),
-    /// Check that relays can hold back: segment, required x of its last relay, m, and the search.
+    /// Check that relays can stop before their reach: segment, required x at its end, search, purpose.
     HoldBack(u8, f32, Seek, Purpose),
-    /// Try the next move of the polish; the chain meets this target.
+    /// Try the next move of one relay; the chain meets this target SIR, in ln gamma.
     Polish(f32),
-    /// Backward pass at this segment.
+    /// Run the backward pass at this segment of the chain.
     Back(u8),
-    /// Forward pass with a fraction of the step and a target; stored if `true`.
+    /// Run the forward pass with this fraction of the steps and this target, in ln gamma. It stores the chain if
+    /// `true`.
     Forward(f32, f32, bool),
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Initial chain with the shape of the start.
+    /// The search finds the target of an initial chain.
     Start,
-    /// Higher target during an ascent.
+    /// The search raises the target during an ascent, with the chain unchanged.
     Raise,
-    /// New computation of the slack after its cap was lowered.
+    /// The search computes the chain's spare length at Rx again after its cap was lowered.
     Tighten,
-    /// Result of an ascent.
+    /// The search finds the highest target of an ascent's chain, by the hops of the joint method.
     Judge,
-    /// Result of an ascent by the sweep's rules.
+    /// The search finds the highest target of an ascent's chain, by the hops of a message sweep. Relays may stop
+    /// before their reach in it.
     Last,
-    /// Check of the ceiling, by the sweep's rules.
+    /// The search checks, by the hops of a message sweep, that the chain meets its upper bound.
     Probe,
-    /// Check of one relay's move, by the sweep's rules.
+    /// The search checks a move of one relay, by the hops of a message sweep.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the pass uses the sweep's rules.
+    /// Returns true if the search computes the chain by the hops of a message sweep.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
 }
 
-/// Solver of a chain of at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
+/// Joint solver of a chain of at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is told on its own, by another part of the work"
@@ -95,32 +97,34 @@ impl Purpose {
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     number: u8,
     start: Start,
-    /// Best target found, in ln gamma, and the number of its start.
+    /// Best target SIR found, in ln gamma, and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Result of the best start's ascent before it was judged, in ln gamma.
+    /// Target that the best ascent had reached at its end, in ln gamma. An ascent that will stay below is dropped.
     highest: f32,
-    /// Cells of the best start, and the target at which it was judged, in ln gamma. `None` if a repetition of it would give
-    /// another chain: it was judged before its ascent ended, or without an ascent.
+    /// Stored cross-sections of the best chain. The next field is the target from which its highest one was searched,
+    /// in ln gamma; `None` if a repetition of that ascent would give another chain: its search began before it ended,
+    /// or without an ascent.
     best_cells: [Cell; RELAYS],
     best_judged: Option<f32>,
-    /// Target at which the current start was judged, in ln gamma.
+    /// Target from which the current chain's highest target is searched, in ln gamma.
     judged_at: Option<f32>,
-    /// True while the current ascent has not been affected by the comparison with the best start.
+    /// True while the comparison with the best chain has not affected the current ascent.
     is_whole: bool,
-    /// True once the best start is judged more finely, and polished.
+    /// True once the best chain's target is searched more finely, and the chain is polished.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
-    /// True if relays have to hold back for the target found.
+    /// True if relays have to take a position before their reach for the target found.
     holds_back: bool,
-    /// True if any start was limited by the minimum separation.
+    /// True if the minimum separation limited the ascent from any initial chain.
     walled: bool,
-    /// Current move of the polish, number of accepted moves, and the cell of the relay before the move.
+    /// Number of the polish's current move. The next fields are the number of accepted moves, and the moved relay's
+    /// previous cross-section.
     moving: u16,
     moved: u8,
     kept: Cell,
-    /// Segment whose policies are in memory.
+    /// Segment of the chain whose policies are in memory.
     loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
@@ -128,7 +132,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Creates a solver. `None` in a field, for more than `RELAYS` relays, or without the feature `altitude`.
+    /// Creates a joint solver. `None` in a field, for more than `RELAYS` relays, or without the feature `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
         (fits && mission.interferer().is_some()).then(|| Self {
@@ -169,8 +173,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Processes one portion of the work: ten relays backward and forward, or twenty without a change.
     ///
-    /// Ready with the target, a linear SIR, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and must be
-    /// constant.
+    /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
+    /// must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target can be met.
@@ -211,7 +215,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::default();
     }
 
-    /// Stores the cross-section `cell` of relay `index`; at a segment's start, also the x before it, `x_m`.
+    /// Stores the cross-section `cell` of relay `index`. `x_m` is the x of the relay before it, stored at the start
+    /// of a segment.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -223,7 +228,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the mark before relay `index` if that is the first of its segment.
+    /// Returns the stored state of the segment that begins with relay `index`; `None` if none does.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -231,13 +236,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             .filter(|_| at.is_multiple_of(SEGMENT))
     }
 
-    /// Returns true if relays have to hold back for the target found.
+    /// Returns true if relays have to take a position before their reach for the target found.
     pub const fn holds_back(&self) -> bool {
         self.holds_back
     }
 }
 
-/// Stored cells of the best start against those of a repetition of that start.
+/// Tests that the stored best chain equals the one that a repetition of its ascent gives.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -315,7 +320,7 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the target and the positions, in bits, and the number of portions.
+    /// Returns target and cross-sections of the solved chain, as f32 bits, and the number of `step` calls.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -349,7 +354,7 @@ mod tests {
         (bits, portions)
     }
 
-    /// Random missions; their number is `UAV_RELAY_KEPT`, 150 by default.
+    /// Uses random missions; the environment variable `UAV_RELAY_KEPT` is their number, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;

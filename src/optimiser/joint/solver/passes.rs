@@ -22,7 +22,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Computes the policies of `segment` after a relay at `before`; returns the value function there. Bounded by ten relays.
+    /// Computes the policies of `segment`, after a relay at `before`; returns the value function there. `None` if a
+    /// hop cannot meet the target. Bounded by ten relays.
     pub(super) fn recall(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -89,7 +90,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the nominal position of the relay before `segment`.
+    /// Returns the position in the current chain of the relay before `segment`.
     pub(super) fn nominal_before(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -106,7 +107,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.at(index, (chain.seat_of)(index)).at(x_m)
     }
 
-    /// Runs one more segment of a forward pass, or computes the policies for it.
+    /// Runs the forward pass through one more segment, or computes the policies for it. The pass tries the fraction
+    /// `share` of the steps with the target `sigma`, and stores the chain if `kept`.
     pub(super) fn forward(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -147,7 +149,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by `share` of their steps.
+    /// Moves the relays of `segment` by the fraction `share` of their steps. `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -182,14 +184,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Relays in one portion of a plain pass.
+/// Number of relays in one portion of a pass that does not change the chain.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty at which the judged chain still counts as possible, in units of D.
+/// Maximum penalty, in units of D, at which the result of an ascent still counts as feasible.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Continues a plain pass for `sigma`. Ready with the slack at its end, `None` if a hop cannot meet the target.
+    /// Continues a pass without steps for the target `sigma`, in ln gamma. Stores the chain if `kept`. Ready with the
+    /// slack, the spare length at Rx, m; `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -252,7 +255,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index`, which receives from `from`, with the separation that the start requires.
+    /// Returns relay `index`, which receives from `from`. Some initial chains need no minimum separation.
     pub(super) fn link<'a>(
         &self,
         chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
@@ -269,7 +272,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Returns the hop to relay `index` of the current chain by the sweep's rules; no farther than `end_m`.
+    /// Returns the hop to relay `index` of the current chain, as in a message sweep. It ends at `end_m`, m, at most.
     pub(super) fn hop(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -294,7 +297,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         .ending(end_m)
     }
 
-    /// Returns the minimum step along x that keeps the separation of relay `index` and the one before.
+    /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
     pub(super) fn least_step(
         &self,
         mission: &Mission,
@@ -311,7 +314,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
     ///
-    /// To be called once the chain is solved. The limit is equal, to the bit, to the one in the passes with the sweep's rules.
+    /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used in its
+    /// passes by the hops of a message sweep.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
         let first = mission.config().distance_m - steps.clone().sum::<f32>();
@@ -324,7 +328,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (end_m + step).min(mission.config().distance_m)
     }
 
-    /// Returns the required x of the relay before `segment`, m, for its last relay at `place_m`.
+    /// Returns the required x, m, of the relay before `segment` if its last relay is at `place_m`.
     ///
     /// `None` if a relay of the segment cannot take its required position.
     pub(super) fn held_back_x_m(
