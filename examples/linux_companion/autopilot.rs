@@ -16,7 +16,7 @@ use uav_relay::flight::autopilot::{
 };
 use uav_relay::flight::axis::Axis;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Band, Event, Instant, Placement, Relay, Sites};
+use uav_relay::{Band, Event, Instant, Placement, Relay, Side, Sites};
 
 use crate::datagrams::Datagrams;
 use crate::lost;
@@ -64,6 +64,8 @@ pub(crate) struct AutopilotPlan {
     pub(crate) place: Where,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
+    /// Side of the neighbour that the antenna points to.
+    pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
 }
 
@@ -94,6 +96,7 @@ impl Companion {
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
         let mut link = Autopilot::new(axis, plan.pace, now);
         link.set_seed(seed());
+        link.point_antenna(plan.antenna);
         if let Some(SigningKey(key)) = plan.key {
             link.sign(Signing::new(key, LINK, stamp(), now));
         }

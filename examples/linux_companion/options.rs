@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, ValueEnum as _};
+use clap::{Args, Parser, ValueEnum};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::{
     ChannelLoad, Duration, Field, FieldPoint, GuardConfig, Identity, Interference, Listen, Mission,
-    Settings, Wiring,
+    Settings, Side, Wiring,
 };
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::endpoint::{Endpoint, FORM};
@@ -94,6 +94,10 @@ pub(crate) struct Options {
     /// Maximum speed of the drone, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
     speed: f32,
+    /// Neighbour that a directional antenna points to, forward on the drone: the targets have that heading. Without it the autopilot
+    /// chooses the heading
+    #[arg(long, value_name = "SIDE", value_enum, requires = "autopilot")]
+    antenna: Option<Antenna>,
     #[command(flatten)]
     sites: SiteOptions,
     /// Maximum position error of a hovering drone, m, 0 to 1000. Drones may come closer to each other by as much
@@ -165,6 +169,15 @@ impl ListenOptions {
             relative_error: self.listen_error.unwrap_or(default.relative_error),
         })
     }
+}
+
+/// Direction of a directional antenna.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Antenna {
+    /// Toward the transmitter.
+    Upstream,
+    /// Toward the receiver.
+    Downstream,
 }
 
 #[derive(Debug)]
@@ -282,6 +295,10 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
         place,
         sites,
         pace: Pace::of_speed(options.speed),
+        antenna: options.antenna.map(|antenna| match antenna {
+            Antenna::Upstream => Side::Upstream,
+            Antenna::Downstream => Side::Downstream,
+        }),
         key: key.transpose()?.map(SigningKey),
     }))
 }

@@ -3,6 +3,7 @@
 use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
 use super::own::Own;
+use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
@@ -24,6 +25,8 @@ pub(super) struct FenceFollower {
     taken_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
+    /// Neighbour's position across the line.
+    across: CrossSection,
     /// True once this relay is known to be beyond a fence plane that the neighbour has announced.
     clear: bool,
     /// True if this relay has reported to the neighbour that it is beyond the newest fence plane.
@@ -40,6 +43,7 @@ impl FenceFollower {
             asked_m: f32::INFINITY,
             taken_m: f32::INFINITY,
             target_m: 0.0,
+            across: CrossSection::on_line(0.0),
             clear: false,
             owner_informed: false,
         }
@@ -142,7 +146,7 @@ impl FenceFollower {
             return;
         }
         self.association.receive_open(fence);
-        self.target_m = fence.target_m;
+        (self.target_m, self.across) = (fence.target_m, fence.across);
         let ahead = fence.number.wrapping_sub(self.number);
         if fence.number != 0 && (self.number == 0 || (1..AHEAD).contains(&ahead)) {
             if self.number == 0 {
@@ -154,6 +158,11 @@ impl FenceFollower {
             self.asked_m = fence.apart_m;
             self.owner_informed = false;
         }
+    }
+
+    /// Returns the agreed x of the neighbour, at its position across the line; `None` before its first fence.
+    pub(super) fn neighbour_place(&self) -> Option<Placement> {
+        (self.number != 0).then(|| self.across.at(self.target_m))
     }
 
     /// Returns the smallest allowed x, m. If it is above the current setpoint, this relay has to go there.

@@ -528,6 +528,14 @@ impl Guard {
             .or_else(|| self.pending(side))
     }
 
+    /// Returns the agreed position of the neighbour at `side`; `None` while it is unknown.
+    pub fn neighbour_place(&self, side: Side) -> Option<Placement> {
+        match side {
+            Side::Upstream => self.follower.neighbour_place(),
+            Side::Downstream => self.owner.neighbour_place(),
+        }
+    }
+
     /// Returns the reason if the setpoint has not moved toward `side` for five reminders, else `None`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;

@@ -3,7 +3,7 @@
 use super::association::{Association, KeepOut};
 use super::association::{Fence, HoldReason};
 use super::own::Own;
-use crate::place::CrossSection;
+use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
@@ -188,6 +188,13 @@ impl FenceOwner {
     /// change, because they may separate the two relays.
     pub(super) fn holds(&self, own: &Own) -> bool {
         self.asked_m.min(self.granted_m) < own.config.separation_m
+    }
+
+    /// Returns the agreed x of the neighbour, at its position across the line; `None` before its first message.
+    pub(super) fn neighbour_place(&self) -> Option<Placement> {
+        self.counted_m
+            .is_finite()
+            .then(|| self.across.at(self.target_m))
     }
 
     pub(super) fn handle_fence(&mut self, fence: &Fence, own: &Own, jitter: &mut Jitter) {

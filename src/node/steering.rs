@@ -142,6 +142,11 @@ impl Steering {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 
+    /// Returns the agreed position of the neighbour at `side`; `None` while it is unknown, and without a guard.
+    pub(crate) fn neighbour_place(&self, side: Side) -> Option<Placement> {
+        self.guard.as_ref().filter(|_| GUARD)?.neighbour_place(side)
+    }
+
     /// Returns the next motion message (fence), with its side and its destination node.
     pub(crate) fn poll_transmit(&mut self) -> Option<(Side, u16, Fence)> {
         self.guard()?.poll()

@@ -204,7 +204,7 @@ impl Link<'_> {
     /// A slack of 0 or more means that the chain meets the target. `reach` is the end of this relay's range, and
     /// `from_m` that of the relay before. `None` if Rx is out of reach from everywhere. Toward Rx the slack is reach
     /// + `d_max` - D. Toward Tx it is the maximum length of the first hop minus the position, at the position of the
-    /// range that maximises it.
+    ///   range that maximises it.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {

@@ -11,6 +11,7 @@ use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::node::view::record::{RecordError, ViewRecord};
 use crate::place::Placement;
+use crate::pointing::Bearing;
 use crate::relay::frames;
 use crate::sensing::estimate::NumberedEstimate;
 use crate::sensing::fit::Unfit;
@@ -450,6 +451,13 @@ impl Relay {
     /// While the drone is not flown only [`HoldReason::Order`] is possible.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
+    }
+
+    /// Returns the bearing of the next node at `side` from the setpoint: a relay, the transmitter or the receiver.
+    ///
+    /// `None` without a setpoint, and while the position of that relay is unknown: its guard has to send it.
+    pub fn bearing(&self, side: Side) -> Option<Bearing> {
+        Bearing::between(self.setpoint()?, self.node.place_toward(side)?)
     }
 
     /// Returns the linear SIR of every hop of the agreed chain. `None` before an agreement or without known interference.

@@ -18,7 +18,7 @@ use wire::{Placed, stream};
 /// # Panics
 /// - The parser deviates from the definition of frames, misses an intact one, or exceeds its bound on work.
 /// - The link sends numbers that are not finite, targets far from the line or not of its state, depends on how its bytes are
-/// split, allocates, or requests needless calls.
+///   split, allocates, or requests needless calls.
 /// - A link with a key accepts unsigned or repeated frames, rejects others, or does not sign its frames with increasing stamps.
 pub fn mavlink(data: &[u8]) {
     let mut input = Input::new(data);

@@ -13,6 +13,7 @@ use mavlink::dialects::common::{
 };
 
 use super::*;
+use crate::vehicle::{Target, axis};
 
 /// Creates the only relay of a chain, with a motion guard, between the two sites of the vehicle.
 fn relay(settings: Settings) -> Relay {
@@ -130,6 +131,42 @@ fn an_engaged_drone_flies_to_its_relays_setpoint() {
     }
 }
 
+/// Checks that the yaw of each target points from the drone to the chosen neighbour, relative to north.
+#[test]
+fn the_yaw_points_an_antenna_to_the_neighbour() {
+    for side in [Side::Upstream, Side::Downstream] {
+        let (mut vehicle, mut relay) = flies(Kind::Px4, Settings::default());
+        vehicle.link.point_antenna(Some(side));
+        vehicle.mode = Mode::Companion;
+        run(&mut vehicle, &mut relay, 2_000);
+        let from = vehicle.now;
+        run(&mut vehicle, &mut relay, 2_000);
+        let along = axis().to_ned(0.0, [1.0, 0.0, 0.0]);
+        let line_rad = along[1].atan2(along[0]);
+        let expected = match side {
+            Side::Upstream => line_rad - core::f32::consts::PI,
+            Side::Downstream => line_rad,
+        };
+        let targets = vehicle.targets_since(from);
+        assert!(targets.len() > 5);
+        for (_, target) in targets {
+            assert_eq!(target.type_mask & 1 << 10, 0, "it has a yaw");
+            let error = (target.yaw_rad - expected).abs();
+            assert!(
+                error < 0.01,
+                "{side:?}: {} instead of {expected}",
+                target.yaw_rad
+            );
+        }
+        vehicle.link.point_antenna(None);
+        vehicle.link.handle_bearing(None);
+        let from = vehicle.now;
+        run(&mut vehicle, &mut relay, 1_000);
+        let free = |(_, target): &(Instant, Target)| target.type_mask & 1 << 10 != 0;
+        assert!(vehicle.targets_since(from).iter().skip(1).all(free));
+    }
+}
+
 /// Checks that the autopilot link passes the radio's noise sample to the relay. A relay that does not measure
 /// interference counts the sample as rejected.
 #[test]
@@ -209,6 +246,35 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
     assert!(format!("{first:?}") == format!("{expected:?}"));
 }
 
+/// Checks that a relay's bearings lead to the agreed position of its neighbour relay, and to the transmitter.
+#[test]
+fn bearings_lead_to_the_neighbours_agreed_position() {
+    let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
+    let mut vehicle = Vehicle::new(Kind::Px4);
+    vehicle.armed = true;
+    vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    assert_eq!(first.bearing(Side::Downstream), None);
+    for tenths in 0..1_200 {
+        if tenths == 50 {
+            vehicle.mode = Mode::Companion;
+        }
+        run(&mut vehicle, &mut first, 100);
+        talk(&mut first, &mut second, vehicle.now, 900.0, false);
+    }
+    let [own, next] = [&first, &second].map(|relay| relay.setpoint().unwrap());
+    let ahead = first.bearing(Side::Downstream).unwrap();
+    assert!(
+        (ahead.distance_m - (next.x_m - own.x_m)).abs() < 0.1,
+        "{ahead:?}"
+    );
+    assert!(ahead.azimuth_rad.abs() < 0.01, "{ahead:?}");
+    let behind = first.bearing(Side::Upstream).unwrap();
+    let to_tx = (own.x_m.powi(2) + own.altitude_m.powi(2)).sqrt();
+    assert!((behind.distance_m - to_tx).abs() < 0.1, "{behind:?}");
+    let back = second.bearing(Side::Upstream).unwrap();
+    assert!((back.distance_m - ahead.distance_m).abs() < 0.1, "{back:?}");
+}
+
 /// Checks that a drone on the wrong side of its neighbour cannot come under setpoint control.
 #[test]
 fn a_drone_out_of_order_cannot_be_engaged() {
@@ -239,9 +305,7 @@ fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
     let (mut vehicle, mut relay) = flies(Kind::Px4, settings);
     let base = *relay.mission();
     let loaded = vehicle::sites();
-    let tx = vehicle::axis()
-        .point(Placement::on_line(-60.0, 0.0))
-        .unwrap();
+    let tx = axis().point(Placement::on_line(-60.0, 0.0)).unwrap();
     let moved = Sites { tx, ..loaded };
     let longer = Axis::between(moved).unwrap();
     let config = MissionConfig {
@@ -256,17 +320,14 @@ fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
                 .unwrap(),
             longer,
         ),
-        (
-            Upload::new(&base, 2, *base.config()).unwrap(),
-            vehicle::axis(),
-        ),
+        (Upload::new(&base, 2, *base.config()).unwrap(), axis()),
     ];
-    for (upload, axis) in uploads {
+    for (upload, line) in uploads {
         relay.handle_upload(vehicle.now, &upload).unwrap();
         run(&mut vehicle, &mut relay, 2_000);
         assert_eq!(relay.version(), upload.version());
         let positions = run(&mut vehicle, &mut relay, 1_000);
-        let at = vehicle::axis().point(vehicle.place).unwrap();
-        assert_eq!(positions.last(), axis.place(at).as_ref());
+        let at = axis().point(vehicle.place).unwrap();
+        assert_eq!(positions.last(), line.place(at).as_ref());
     }
 }

@@ -65,6 +65,7 @@ pub(crate) struct Target {
     pub(crate) alt_m: f32,
     pub(crate) velocity_m_s: [f32; 3],
     pub(crate) type_mask: u16,
+    pub(crate) yaw_rad: f32,
 }
 
 impl Target {
@@ -363,6 +364,7 @@ impl Vehicle {
             alt_m: amsl_mm as f32 / 1e3,
             velocity_m_s: [0.0; 3],
             type_mask: 0xDF8,
+            yaw_rad: 0.0,
         })
     }
 
@@ -452,6 +454,7 @@ impl Vehicle {
             alt_m: target.alt,
             velocity_m_s: [target.vx, target.vy, target.vz],
             type_mask: target.type_mask.bits(),
+            yaw_rad: target.yaw,
         };
         if self.mode == Mode::Companion && self.takes_targets {
             self.goal = Some(target);

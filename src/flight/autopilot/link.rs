@@ -81,6 +81,8 @@ pub struct Autopilot {
     state: State,
     setpoint: Option<Placement>,
     look: Option<Bearing>,
+    /// Side of the neighbour that a directional antenna points to.
+    antenna: Option<Side>,
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
@@ -131,6 +133,7 @@ impl Autopilot {
             state: State::Silent,
             setpoint: None,
             look: None,
+            antenna: None,
             target: None,
             stop: None,
             blind_at: None,
@@ -295,6 +298,13 @@ impl Autopilot {
     /// Sets the heading that a directional antenna needs. `None`, or an invalid azimuth, leaves the heading to the autopilot.
     pub fn handle_bearing(&mut self, look: Option<Bearing>) {
         self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
+    }
+
+    /// Sets the side whose neighbour a directional antenna points to, forward on the drone; `None` leaves the heading as it is.
+    ///
+    /// [`exchange`](Self::exchange) then calls [`handle_bearing`](Self::handle_bearing) with [`Relay::bearing`].
+    pub const fn point_antenna(&mut self, side: Option<Side>) {
+        self.antenna = side;
     }
 
     /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the drone's setpoint.
@@ -785,7 +795,7 @@ impl Autopilot {
     /// changed; and the drone's position, if a new one was handed over. A loop that serves the relay's ports after each call ignores both.
     ///
     /// The caller still hands events of the relay to [`handle_event`](Self::handle_event), because [`Relay::poll_event`] returns each event
-    /// once, and [`handle_bearing`](Self::handle_bearing) the bearing of an antenna. The first line is that of [`new`](Self::new); an
+    /// once, and [`handle_bearing`](Self::handle_bearing) the bearing of an antenna that [`point_antenna`](Self::point_antenna) does not set. The first line is that of [`new`](Self::new); an
     /// exchange replaces a line of [`fly_along`](Self::fly_along).
     ///
     /// Constant work: one call of each input of the relay and of the link, and a new [`Axis`](crate::flight::axis::Axis) when the sites have changed.
@@ -846,6 +856,9 @@ impl Autopilot {
         let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
         self.handle_hold(now, holds);
         self.handle_setpoint(now, setpoint);
+        if let Some(side) = self.antenna {
+            self.handle_bearing(relay.bearing(side));
+        }
         let sir_db = relay.target().map(|target| 10.0 * libm::log10f(target));
         self.handle_values(now, sir_db, setpoint);
         (is_news, position)

@@ -65,6 +65,18 @@ impl Node {
         self.steering.setpoint(self.wanted_place())
     }
 
+    /// Returns the position of the next node at `side`: the agreed one of a relay, or an end of the line. `None` while unknown.
+    pub(crate) fn place_toward(&self, side: Side) -> Option<Placement> {
+        if !self.layers.neighbours.at(side).has_no_peer() {
+            return self.steering.neighbour_place(side);
+        }
+        let x_m = match side {
+            Side::Upstream => 0.0,
+            Side::Downstream => self.member.mission.config().distance_m,
+        };
+        Some(Placement::on_line(x_m, 0.0))
+    }
+
     pub(crate) fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.steering.hold_reason(side)
     }
