@@ -179,7 +179,7 @@ impl Mixed {
 pub struct DrawnHop {
     /// Random link of 1 to 4 relays that has the hop, with numbers rounded to the relays' f32.
     pub link: Link,
-    /// Same hop as a value of the crate.
+    /// Hop of the link as a value of the crate, for comparison with the reference.
     pub hop: Hop,
     /// Index of the relay that receives the hop, from 1.
     pub index: u16,

@@ -100,7 +100,7 @@ pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// Prints `line` on standard error; a closed pipe is ignored.
+/// Prints the message `line` on standard error; a closed pipe is ignored.
 pub fn say(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
@@ -144,7 +144,7 @@ pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<()
 /// Parses a number on the command line, which must be within `least` to `most`.
 ///
 /// # Errors
-/// A message with the allowed range.
+/// The text is not a number in this range; the message states the range.
 pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     let range = || format!("must be a number within {least:?} to {most:?}");
     let value: f64 = text.parse().map_err(|_| range())?;

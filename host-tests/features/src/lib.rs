@@ -183,7 +183,7 @@ impl Chain {
     }
 }
 
-/// Returns the relays that receive a frame, from 0, each with its receiving port.
+/// Returns the indices, from 0, of the relays that receive a frame, each with its receiving port.
 ///
 /// Relay `index` (from 0) of `count` sends the frame on `port`.
 fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {

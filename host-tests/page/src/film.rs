@@ -11,7 +11,7 @@ use uav_relay_sim::cli::Prepared;
 use uav_relay_sim::report::seconds;
 use uav_relay_sim::simulator::outcome::{Outcome, Shot, Transmission};
 
-/// Largest number of moments in a recording; if there are more, moments close to each other are merged.
+/// Largest number of times at which the recorded picture changes; if there are more, some are merged.
 const STANDS: usize = 600;
 
 /// Largest number of frames in a recording; later frames are left out.
@@ -19,7 +19,7 @@ const FRAMES: usize = 20_000;
 
 #[derive(Serialize)]
 pub(crate) struct FilmTold {
-    /// Moments at which the picture changes, in order.
+    /// States of the chain at the times at which the picture changes, in order.
     stands: Vec<StandTold>,
     /// Frames that were sent, each with its time in s, sender's index, and direction.
     ///
@@ -78,9 +78,9 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
     thinned(changes)
 }
 
-/// Merges moments that are close to each other, until at most [`STANDS`] remain.
+/// Merges changes of the picture that are close in time, until at most [`STANDS`] remain.
 ///
-/// The merged moment has the time of the later one.
+/// The merged change has the time of the later one.
 fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
     let mut all = all;
     let mut apart_us = 1_000;

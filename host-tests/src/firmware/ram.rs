@@ -8,7 +8,7 @@ use super::journal::{BLANK, Flash};
 /// Mock of two flash sectors in RAM, with wear, loss of power, and a record of the erases.
 #[derive(Debug)]
 pub struct Ram {
-    /// Words of each sector.
+    /// Content of each flash sector, in words of 32 bits.
     pub sectors: [Vec<u32>; 2],
     /// Number of word writes and erases after which power fails during the last of them.
     ///
@@ -23,7 +23,7 @@ pub struct Ram {
 
 enum Power {
     On,
-    /// Power fails in the middle of the operation: only a random part of the bits changes.
+    /// Power that fails in the middle of the operation: only a random part of the bits changes.
     Fails,
     Off,
 }

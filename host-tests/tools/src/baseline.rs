@@ -22,9 +22,9 @@ pub struct Mean {
     pub sir: f64,
     /// Standard error of the mean SIR, linear.
     pub error: f64,
-    /// Mean over the draws of the worst hop's SIR in dB.
+    /// Mean over the random chains of the worst hop's SIR in dB.
     pub db: f64,
-    /// Mean of log2(1 + SIR) of the worst hop, bit/s/Hz.
+    /// Mean over the random chains of the worst hop's log2(1 + SIR), bit/s/Hz.
     pub rate: f64,
 }
 

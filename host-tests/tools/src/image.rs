@@ -80,7 +80,7 @@ impl Board {
 
     /// Returns the arguments of cargo that build the board's image, and the path of the resulting ELF.
     ///
-    /// `radio` selects the image for a shared radio. Both are relative to the root of the checkout.
+    /// `radio` selects the image for a shared radio. All paths are relative to the root of the checkout.
     pub fn build(&self, radio: bool) -> (Vec<String>, PathBuf) {
         let [wires, radios] = self.images;
         let image = if radio { radios } else { wires };

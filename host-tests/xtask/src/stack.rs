@@ -23,11 +23,11 @@ pub struct Function {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StackError {
-    /// Function that can call itself, directly or not.
+    /// Error: the function with this name can call itself, directly or not.
     Recursion(String),
-    /// Function whose stack frame has no constant size.
+    /// Error: the stack frame of the function with this name has no constant size.
     Dynamic(String),
-    /// Name that no function of the image has.
+    /// Error: no function of the image has this name.
     Unknown(String),
 }
 

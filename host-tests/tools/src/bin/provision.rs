@@ -26,7 +26,7 @@ struct Asked<'a> {
     uavs: u16,
     method: Method,
     tolerance: f64,
-    /// Silence after which a relay probes its neighbour, ms; 0 for the firmware's default.
+    /// Silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
     probe_after_ms: u32,
 }
 

@@ -44,7 +44,7 @@ struct Row {
     sir_linear: f32,
 }
 
-/// Table row: best SIRs of a relay that may or may not leave the line, or its altitude.
+/// Table row: best SIRs of a relay that may or may not leave the line, and the lowest altitude.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
@@ -98,7 +98,7 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the relay's best SIRs with and without a free side and altitude.
+/// Returns the relay's best SIRs if it may or may not leave the line, and the lowest altitude.
 ///
 /// The interferer's distance from the line rises by `step_m`.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
@@ -177,7 +177,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
     })
 }
 
-/// Computes the figure of the SIR that a free side and a free altitude gain for a single relay.
+/// Computes the figure of the SIR gained if a single relay may leave the line, or the lowest altitude.
 pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {

@@ -177,19 +177,19 @@ fn escape(words: &str) -> String {
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum FigureError {
-    /// Scenario of the figure is not a valid mission, with the reason.
+    /// Error: the scenario of the figure is not a valid mission, for this reason.
     Mission(Refusal),
-    /// Settings of the figure are rejected by a relay, with the reason.
+    /// Error: a relay rejects the settings of the figure, for this reason.
     Setup(SetupError),
-    /// Target SIR that cannot be met, or simulated chain that has not settled: the text names it.
+    /// Error: a target SIR cannot be met, or a simulated chain has not settled. The text names the chain.
     Unsettled(&'static str),
-    /// Chart of the figure cannot be drawn, with the reason.
+    /// Error: the chart of the figure cannot be drawn, for this reason.
     Drawing(NotDrawn),
-    /// Table of the figure cannot be written as CSV, with the reason.
+    /// Error: a table of the figure cannot be written as CSV, for this reason.
     Table(csv::Error),
-    /// Table, named by its file, with a number that is not finite.
+    /// Error: the table with this file name contains a number that is not finite.
     NotFinite(String),
-    /// File that cannot be written, with its path and the reason.
+    /// Error: the file with this path cannot be written, for this reason.
     File(String, std::io::Error),
 }
 

@@ -45,7 +45,7 @@ struct Row {
     sir_linear: f64,
 }
 
-/// Table row: distribution of the interference at one x of the field.
+/// Table row: distribution of the interference power at one x of the interference field.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PointRow {
     field: Kind,
@@ -105,7 +105,7 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     paper::mission(&scenario, relays)
 }
 
-/// Returns all sweeps until each chain settles, in both fields and for each number of relays.
+/// Returns a table row for each sweep of every chain, in both fields and for each number of relays.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for field in [Kind::Uneven, Kind::Even] {
@@ -125,9 +125,9 @@ fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the cells of the table in the caption: final SIRs by three ways to choose the targets.
+/// Returns the cells of the table in the caption: final SIRs by three ways to choose the target SIRs.
 ///
-/// They are the paper's step, a tenth of it, and bracketed targets.
+/// These are the paper's step, a tenth of it, and targets that bracket the optimum.
 fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     let mut rows = vec![
         ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]

@@ -23,8 +23,8 @@ pub struct Chain {
 
 /// Places each relay as far along the chain as the target SIR `target` (linear, > 0) allows.
 ///
-/// `None` if a hop cannot meet the target. If the target is too high, the relays do not come near the end, and the
-/// last hop has a lower SIR. Work: one farthest position for each of N relays.
+/// `None` if a hop cannot meet the target. If the target is too high, the last relay is far from the end of the
+/// chain, and the last hop has a lower SIR. Work: one farthest position for each of N relays.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     let profile = mission.config().common;
     let mut from = PerTarget::from(
@@ -63,7 +63,9 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     Some(Chain { places, sir })
 }
 
-/// Sweep of Algorithm 1 with the paper's fixed step: its target SIR and the resulting chain.
+/// Sweep (pass of messages along the chain) of Algorithm 1: its target SIR and the resulting chain.
+///
+/// The target falls by the paper's fixed step.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the sweep, from 1.

@@ -224,7 +224,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// Receiver position in `to` whose sender may be nearest to Tx.
+    /// Receiver position in `to` that allows the sender nearest to Tx.
     farthest: f64,
 }
 
@@ -240,13 +240,13 @@ pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
     target: f64,
-    /// Feasible hops that relays N - 1 down to 1 send.
+    /// Feasible hops sent by relays N - 1, N - 2, and so on to 1, in this order.
     before: Vec<Stage>,
     /// Positions of relay 1 from which the rest of the chain can meet the target.
     first: Vec<Span>,
 }
 
-/// Ranges of hops at one target SIR and sender's power, shared by consecutive relays of that power.
+/// Cache of hop ranges at one target SIR and sender's power, for consecutive relays of equal power.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -298,10 +298,10 @@ impl<'a> Stages<'a> {
         best.is_some_and(|x| self.line.first_sir(x) >= self.target)
     }
 
-    /// Returns the x of each relay in a chain that meets the target, rising; see [`Stages::is_met`].
+    /// Returns the x of each relay, m, in a chain that meets the target if [`Stages::is_met`].
     ///
-    /// Each relay is as near to an even division of the remaining distance as the target allows. `None` if no such
-    /// chain is found.
+    /// They rise from Tx to Rx. Each relay is as near to an even division of the remaining distance as the target
+    /// allows. `None` if the feasible positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;
@@ -380,7 +380,7 @@ const CELLS: f64 = 500.0;
 
 /// Line of possible relay positions at one altitude above Tx-Rx, with samples of the interference.
 ///
-/// The samples are dense enough for every turn of the interference.
+/// The samples are dense enough to show every minimum and maximum of the interference.
 pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
@@ -518,7 +518,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the points of `turns` at which the function drops below the level.
+/// Returns the positions of those crossings at which the function falls below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

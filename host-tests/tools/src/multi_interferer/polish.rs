@@ -87,7 +87,7 @@ pub fn polish(
     })
 }
 
-/// Moves relay `at` (from 0) to a position with a higher SIR of its two hops, if one is found.
+/// Moves relay `at` (from 0) if that raises the SIR of the worse of its two hops.
 ///
 /// `window` is the fraction of the altitude and lateral ranges that is searched on either side.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
@@ -196,9 +196,10 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
     if other.1 > one.1 { other } else { one }
 }
 
-/// Scans an altitude or lateral position around `own`, refines the best value, and returns `at` there.
+/// Finds the altitude or lateral position near `own` that maximises the SIR of `at`.
 ///
-/// `window` is the fraction of the range `least` to `most` that is searched on either side.
+/// Returns the relay's position and SIR there. `window` is the fraction of the range `least` to `most` that is
+/// searched on either side.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

@@ -19,15 +19,15 @@ use super::config::{
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum BlockError {
-    /// Scenario that is not a valid mission, with the reason.
+    /// Error: the scenario is not a valid mission, for this reason.
     Refused(Refusal),
-    /// Number of points in the interference field, which is more than a block can hold.
+    /// Error: the interference field has this many points, more than a block can hold.
     Points(usize),
-    /// Configuration that the drone would reject, with the reason.
+    /// Error: the drone would reject the configuration, for this reason.
     Config(ConfigError),
-    /// Sites of Tx and Rx that the drone would reject, with the reason.
+    /// Error: the drone would reject the sites of Tx and Rx, for this reason.
     Course(CourseError),
-    /// Configuration that the drone would read back differently from the block.
+    /// Error: the drone would read a different configuration from the block.
     Changed,
 }
 
@@ -100,7 +100,7 @@ pub struct Flight {
     sites: Option<Sites>,
     autopilot_key: Option<[u8; 32]>,
     network: u16,
-    /// Silence after which a relay probes its neighbour, ms; 0 for the firmware's default.
+    /// Silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
     probe_after_ms: u32,
 }
 
@@ -153,7 +153,7 @@ impl Flight {
         Self { measure, ..self }
     }
 
-    /// Sets the silence after which a relay probes its neighbour, ms; 0 for the firmware's default.
+    /// Sets the silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
     pub fn asking_after(self, probe_after_ms: u32) -> Self {
         Self {
             probe_after_ms,

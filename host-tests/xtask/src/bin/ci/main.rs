@@ -115,7 +115,7 @@ const LINES_OF_FAILURES: usize = 100;
 pub(crate) struct Evidence {
     failures: Vec<String>,
     last: VecDeque<String>,
-    /// Number of lines that may still be kept of the current list of failures; `None` outside a list.
+    /// Number of lines still to keep of the list of failures that is being read; `None` outside a list.
     remaining: Option<usize>,
 }
 
