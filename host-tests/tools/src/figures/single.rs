@@ -130,16 +130,16 @@ const NEAR: f64 = 0.5;
 /// Interpretation of the paper's "average gain": the quantity that is averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub enum Reading {
-    /// Average of the gains in linear SIR at each altitude.
+    /// Average gain as the mean, over the altitudes, of the gains in linear SIR.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Gain of the average linear SIR.
+    /// Average gain as the gain of the mean linear SIR over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
-    /// Gain of the average SIR in dB.
+    /// Average gain as the gain of the mean SIR in dB over the altitudes.
     #[serde(rename = "gain of mean dB")]
     Decibels,
-    /// Gain of the average log2(1 + SIR).
+    /// Average gain as the gain of the mean log2(1 + SIR) over the altitudes.
     #[serde(rename = "gain of mean log2(1 + SIR)")]
     Rates,
 }

@@ -8,7 +8,9 @@ const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
 
-/// Relative rounding allowance on the least separation, so that a thousand relays that just fit do.
+/// Relative allowance for rounding on the least separation.
+///
+/// Without it a thousand relays that just fit on the line could be rejected.
 const ROUNDING: f64 = 1e-12;
 
 /// Best chain of relays at one altitude: their positions and the SIR.
