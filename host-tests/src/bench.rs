@@ -15,25 +15,25 @@ use uav_relay::{
 
 use crate::fixtures::NETWORK;
 
-/// Steps at one instant after which a chain counts as stuck.
+/// Largest number of frames delivered at one instant. More mean that the relays never stop sending.
 const MOST_STEPS: u32 = 400_000;
 
-/// Frame in transit.
+/// Frame in transit between two nodes of the test bench.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time of arrival.
+    /// Time at which the frame arrives.
     pub at: Instant,
-    /// Sender of the frame.
+    /// Node that sends the frame: 0 is the transmitter, then come the relays, and last the receiver.
     pub from: usize,
-    /// Receiver of the frame.
+    /// Node that receives the frame: 0 is the transmitter, then come the relays, and last the receiver.
     pub to: usize,
-    /// Port of the receiver.
+    /// Port at which the receiver gets the frame.
     pub port: Port,
     pub bytes: Vec<u8>,
 }
 
 impl Frame {
-    /// Returns true if the frame is intact and its message is `wanted`.
+    /// Returns true if the frame is intact and `wanted` returns true for its message.
     pub fn is(&self, wanted: impl Fn(&Message) -> bool) -> bool {
         let mut deframer = Deframer::new();
         self.bytes.iter().any(|&byte| match deframer.push(byte) {
@@ -43,26 +43,29 @@ impl Frame {
     }
 }
 
-/// Path of a frame: from the sender's index and port to the receiver's index, both from 1.
+/// Function that routes a frame: takes the sender's index, its port, and the index of a receiver.
+///
+/// Returns the port at which the frame reaches that receiver; `None` if it does not. Indices are those in the chain,
+/// from 1.
 pub type Route = Box<dyn Fn(usize, Port, usize) -> Option<Port>>;
 
-/// Fate of an arriving frame, which may be changed: true if it is delivered.
+/// Function that may change an arriving frame, and returns true if the frame is to be delivered.
 pub type Fate = Box<dyn FnMut(&mut Frame) -> bool>;
 
-/// Relays, ground stations, and the frames between them.
+/// Test bench in virtual time: relays, ground stations, and the frames between them.
 #[expect(
     missing_debug_implementations,
     reason = "the route and the fate are closures"
 )]
 pub struct Bench {
     pub relays: Vec<Relay>,
-    /// Ground stations at the transmitter and the receiver.
+    /// Ground stations at the transmitter and at the receiver; `None` where there is none.
     pub grounds: [Option<Ground>; 2],
-    /// Index of each relay in the chain, from 1; a copy of a relay has the same one.
+    /// Index in the chain, from 1, of each entry of `relays`. A copy of a relay has the same index.
     places: Vec<usize>,
     pub now: Instant,
     pub flying: VecDeque<Frame>,
-    /// Events with the index of their relay in `relays`.
+    /// Events that the relays have raised, each with the position of the relay in `relays`, from 0.
     pub events: Vec<(usize, Event)>,
     pub latency: Duration,
     pub route: Route,
@@ -71,7 +74,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Creates a bench of relays with instantaneous links to their neighbours.
+    /// Creates a bench of `relays`, whose frames reach their neighbours without delay.
     pub fn new(relays: Vec<Relay>, now: Instant) -> Self {
         let places = relays.iter().map(|relay| usize::from(relay.index()));
         let mut bench = Self {
@@ -90,10 +93,12 @@ impl Bench {
         bench
     }
 
-    /// Creates all relays of `mission`, each with its own `settings` and a seed by its index.
+    /// Creates a bench with all relays of `mission`; `settings` returns those of a relay by its index.
+    ///
+    /// The seed of a relay's random numbers is its index.
     ///
     /// # Panics
-    /// A relay refuses its settings.
+    /// A relay rejects its settings.
     pub fn of(mission: Mission, settings: impl Fn(u16) -> Settings) -> Self {
         let relay = |index| {
             let identity = Identity {
@@ -113,15 +118,17 @@ impl Bench {
         self.drain();
     }
 
-    /// Returns the ground station at `end`, which is created by the first call.
+    /// Returns the ground station at `end`; the first call creates it.
+    ///
+    /// `base` is the mission that it was loaded with, `auth` authenticates its frames.
     pub fn ground(&mut self, base: &Mission, end: Side, auth: Auth) -> &mut Ground {
         let ground = || Ground::new(base, end, NETWORK, Wiring::Pair, auth);
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Delivers the next frame that has arrived, or advances to the next timer or arrival. Stops at `until`.
+    /// Delivers the next frame that has arrived, or advances to the next timer or arrival.
     ///
-    /// Then all nodes handle their timers and send. Returns false at `until`.
+    /// Then all nodes handle their timers and send. Returns false if nothing is left to do up to `until`.
     ///
     /// # Panics
     /// The relays never stop sending, or a relay asks to be called at once again and again.
@@ -168,7 +175,7 @@ impl Bench {
         self.run(self.now + span);
     }
 
-    /// Runs until the condition holds, for at most `limit`. Returns the time taken.
+    /// Runs until `done` returns true, and returns the virtual time taken. `None` if `limit` passes first.
     pub fn run_until(&mut self, limit: Duration, done: impl Fn(&Self) -> bool) -> Option<Duration> {
         let begun = self.now;
         while !done(self) {
@@ -191,7 +198,7 @@ impl Bench {
         }
     }
 
-    /// Lets all nodes handle their timers and send.
+    /// Lets all relays and ground stations handle their timers, and puts the frames they send in transit.
     fn drain(&mut self) {
         let (now, last) = (self.now, self.relays.len() + 1);
         for at in 0..self.relays.len() {
@@ -235,7 +242,7 @@ impl Bench {
         });
     }
 
-    /// Returns true if all relays hold positions in the same view.
+    /// Returns true if all relays hold their agreed positions, and are in the same view.
     pub fn holds(&self) -> bool {
         let view = self.relays[0].view();
         let holds = |relay: &Relay| relay.phase() == Phase::Holding && relay.view() == view;
@@ -246,13 +253,15 @@ impl Bench {
         self.relays.iter().map(Relay::setpoint).collect()
     }
 
-    /// Returns true if relay `at` of `relays` has raised `event`.
+    /// Returns true if the relay at position `at` of `relays`, from 0, has raised `event`.
     pub fn has_raised(&self, at: usize, event: Event) -> bool {
         self.events.contains(&(at, event))
     }
 }
 
-/// Carries frames between neighbours. They are on wires, or on a radio channel that reaches one relay in each direction.
+/// Routes frames to neighbours only: by wires, or by a radio channel with a range of one relay.
+///
+/// Returns the receiver's port; `None` if relay `to` is not a neighbour of `from` at that port.
 pub fn between_neighbours(from: usize, port: Port, to: usize) -> Option<Port> {
     match port {
         Port::Shared => (from.abs_diff(to) == 1).then_some(port),
@@ -261,7 +270,7 @@ pub fn between_neighbours(from: usize, port: Port, to: usize) -> Option<Port> {
     }
 }
 
-/// Returns the port and bytes of each frame that `relay` sends.
+/// Returns the port and the bytes of each frame that `relay` has to send at `now`.
 pub fn sent(relay: &mut Relay, now: Instant) -> Vec<(Port, Vec<u8>)> {
     let mut frame = [0; MAX_FRAME];
     let mut sent = Vec::new();
@@ -276,10 +285,10 @@ pub fn events(relay: &mut Relay) -> impl Iterator<Item = Event> {
     std::iter::from_fn(|| relay.poll_event())
 }
 
-/// Returns the positions on which relays of `mission` agree without any ports or faults.
+/// Returns the positions on which the relays of `mission` agree over links without faults.
 ///
 /// # Panics
-/// They do not agree within five seconds.
+/// They do not agree within five seconds of virtual time.
 pub fn agreed(mission: Mission) -> Vec<Option<Placement>> {
     let mut bench = Bench::of(mission, |_| Settings::default());
     let all = |bench: &Bench| bench.setpoints().iter().all(Option::is_some);

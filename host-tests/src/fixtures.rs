@@ -6,10 +6,12 @@ use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission;
 
-/// Network number of [`relay`].
+/// Network number of the relays in these tests.
 pub const NETWORK: u16 = 7;
 
-/// Returns the paper's chain of `relays`. Path losses are the reference model's, and there is no minimum separation.
+/// Returns the mission of the paper's chain with `relays` relays, without a minimum separation.
+///
+/// Its path losses are those of the f64 reference model.
 ///
 /// # Panics
 /// No mission has this number of relays.
@@ -17,7 +19,9 @@ pub fn mission(relays: u16) -> Mission {
     of_link(&Link::paper(usize::from(relays)), 1e-4).unwrap().0
 }
 
-/// Returns the paper's chain of `relays` as a scenario file has it, with a minimum separation of 4 m.
+/// Returns the mission of the default scenario file, the paper's chain, with `relays` relays.
+///
+/// Its minimum separation is 4 m.
 ///
 /// # Panics
 /// No mission has this number of relays.
@@ -26,10 +30,10 @@ pub fn paper(relays: u16) -> MissionConfig {
     *mission.config()
 }
 
-/// Returns relay `index` of `mission`, started at time 0.
+/// Creates relay `index` of `mission`, started at time 0; the index is also its random seed.
 ///
 /// # Panics
-/// The mission has no such relay, or it refuses the settings.
+/// The mission has no such relay, or the relay rejects the settings.
 pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
     let identity = Identity {
         network: NETWORK,
@@ -38,9 +42,10 @@ pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
     Relay::new(mission, identity, settings, u32::from(index), Instant::ZERO).unwrap()
 }
 
-/// Returns the record of a relay that has agreed on view `number`. The view has `relays` relays and was proposed by relay 1.
+/// Returns the stored record of a relay that has agreed on view `number`, proposed by relay 1.
 ///
-/// `base` is the digest of the loaded mission; `member` is true if the relay is in the view.
+/// The view has `relays` relays. `base` is the digest of the loaded mission; `member` is true if the relay is in the
+/// view.
 ///
 /// # Panics
 /// No relay can have such a record.

@@ -16,7 +16,7 @@ pub const fn seconds(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-/// Makes a run continue until `at`, even after it has settled.
+/// Makes a simulated run continue until `at`, even if the chain has settled before.
 pub fn go_on_until(setup: &mut Setup, at: Instant) {
     // A partition behind the last relay separates no relays, but keeps the run going.
     setup.partitions.push(Partition {
@@ -26,16 +26,16 @@ pub fn go_on_until(setup: &mut Setup, at: Instant) {
     });
 }
 
-/// Makes a run end at `at`, even after it has settled.
+/// Makes a simulated run end at `at`, even if the chain has settled before.
 pub fn end_at(setup: &mut Setup, at: Instant) {
     go_on_until(setup, at);
     setup.deadline = at;
 }
 
-/// Runs `setup` to the end, where all relays hold their positions and no setpoint has left its limits.
+/// Runs `setup` and checks that all relays hold their positions for the same target at the end.
 ///
 /// # Panics
-/// This is not so.
+/// The chain does not settle, or a setpoint was outside its limits.
 pub fn settle(setup: Setup) -> Outcome {
     let outcome = run(setup).unwrap();
     assert_eq!(outcome.ending, Ending::Settled);
@@ -43,13 +43,13 @@ pub fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// Runs `setup` without faults and on a [`Faults::BAD_DAY`]. The faults must change neither the ending nor a bit of the
-/// positions.
+/// Runs `setup` without faults and with [`Faults::BAD_DAY`], and checks that both end alike.
 ///
-/// Returns the run with faults.
+/// The faults must change neither the kind of ending nor a bit of the positions. Returns the run with faults, whose
+/// random numbers come from `seed`.
 ///
 /// # Panics
-/// The runs differ, a setpoint has left its limits, or a round of Algorithm 2 has made the chain worse.
+/// The runs differ, a setpoint was outside its limits, or a round of Algorithm 2 has lowered the chain's SIR.
 pub fn unharmed(mut setup: Setup, seed: u64) -> Outcome {
     let clean = run(setup.clone()).unwrap();
     setup.faults = Faults::BAD_DAY;
@@ -62,7 +62,7 @@ pub fn unharmed(mut setup: Setup, seed: u64) -> Outcome {
     faulty
 }
 
-/// Returns the paper's mission of eight relays with a minimum separation.
+/// Returns the paper's mission of eight relays with a minimum separation of `separation_m`.
 ///
 /// # Panics
 /// No mission has this separation.
@@ -74,7 +74,7 @@ pub fn eight_apart(separation_m: f32) -> Mission {
     Mission::try_new(config).unwrap()
 }
 
-/// Returns start positions of eight drones, in order along x and at least `gap_m` apart.
+/// Returns random start positions, m, of eight drones, rising in x and at least `gap_m` apart.
 pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
     let mut x_m = 0.0;
     let start = (0..8).map(|_| {
@@ -84,27 +84,29 @@ pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
     start.collect()
 }
 
-/// Returns eight drones in a row with random speeds and exact position reports.
+/// Returns eight drones that start in a row `gap_m` apart, with random speeds and exact positions.
 pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     let start = in_a_row(rng, gap_m);
     let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
     FlightSpec::exact(start, speed_mps, Duration::from_millis(200))
 }
 
-/// Separation of guarded flights, m.
+/// Minimum separation of drones in flights with a collision guard, m.
 pub const SEPARATION_M: f32 = 5.0;
 
-/// Smallest permitted distance of two drones, m. Positions are f32 of up to 1 km, with rounding errors of 2 mm.
+/// Smallest distance of two drones that the tests permit, m.
+///
+/// It is 2 mm below the separation, because positions are f32 of up to 1 km.
 pub const APART_M: f64 = SEPARATION_M as f64 - 2e-3;
 
-/// Gives `setup` a guard, and eight drones that start at least the separation apart.
+/// Adds a collision guard to `setup`, and eight drones that start at least the separation apart.
 pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
     let common = setup.mission.config().common;
     setup.settings.guard = Some(GuardConfig::of(&setup.mission, common));
     setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
 }
 
-/// Returns own profiles of all eight relays with a probability of 30 %, otherwise an empty list.
+/// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();
@@ -121,7 +123,7 @@ pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     own.collect()
 }
 
-/// Returns random faults: loss up to 50 %; corruption, duplicates and reordering up to 20 % each.
+/// Returns random fault probabilities: loss up to 50 %, the three others up to 20 % each.
 pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     Faults {
         loss: rng.random_range(0.0..=0.5),
@@ -131,7 +133,7 @@ pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     }
 }
 
-/// Returns a mission with the altitudes and lateral positions of `corridor`. `None` if its numbers are refused.
+/// Returns `config` as a mission with the altitude and lateral limits of `corridor`; `None` if invalid.
 pub fn with_room(config: &MissionConfig, corridor: Corridor) -> Option<Mission> {
     let config = MissionConfig {
         band: Band {

@@ -7,18 +7,23 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome, RelayEnd};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Time limit from the last event of a schedule to a settled chain, while frames are lost. Twenty times `dead_after`.
+/// Time limit from the last event of a schedule to a settled chain, while frames are lost.
+///
+/// It is twenty times `dead_after`, the silence after which a relay counts as lost.
 pub const RECOVERY: Duration = Duration::from_millis(300_000);
 
-/// Returns the environment variable `name` as a number, or `usual`.
+/// Returns the environment variable `name` as a number, or `usual` if it is not set.
 ///
 /// # Panics
-/// The variable is no number.
+/// The variable is not a number.
 pub fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// Draws up to three losses of the eight relays of `setup`, at times by `at`, ms. Half of the relays return, or all.
+/// Adds up to three random losses of relays to `setup`, each at the time in ms that `at` returns.
+///
+/// A lost relay returns if `all_return`, otherwise with a probability of one half. Sets the deadline [`RECOVERY`]
+/// after the last event.
 pub fn lose_relays(
     setup: &mut Setup,
     rng: &mut ChaCha8Rng,
@@ -42,10 +47,10 @@ pub fn lose_relays(
     setup.deadline = last.unwrap_or(Instant::ZERO) + RECOVERY;
 }
 
-/// Runs `count` schedules and prints their recovery times.
+/// Runs `count` random schedules, with the seeds from `first`, and prints their recovery times.
 ///
 /// # Panics
-/// `judge` finds a fault.
+/// `judge` has found a fault in one of them.
 pub fn run_all(
     first: u64,
     count: u64,
@@ -83,14 +88,16 @@ pub fn run_all(
     assert!(failed.is_empty(), "{failed:?}");
 }
 
-/// Returns the numbers of the relays that are alive at the end, from 1.
+/// Returns the numbers, from 1, of the relays that are switched on at the end of a run.
 pub fn left(outcome: &Outcome) -> Vec<u16> {
     let living = (1..).zip(&outcome.relays);
     let living = living.filter(|(_, relay)| relay.killed.is_none());
     living.map(|(index, _)| index).collect()
 }
 
-/// Returns the result of an undisturbed chain of the relays `left` of `setup` that flies `config`.
+/// Runs a chain of only the relays `left` of `setup`, without faults, and returns its result.
+///
+/// `config` is its mission.
 ///
 /// # Panics
 /// That chain does not settle.
@@ -112,10 +119,12 @@ pub fn undisturbed(setup: &Setup, left: &[u16], config: MissionConfig) -> Outcom
     outcome
 }
 
-/// Compares the relays `left` with an undisturbed chain of them that flies `config`, to the bit.
+/// Checks that the relays `left` end as in an undisturbed chain of only these, to the bit.
+///
+/// `version` and `config` are those of the mission that they must have at the end.
 ///
 /// # Errors
-/// The first difference, a relay that flies another `version`, or unsafe setpoints.
+/// The first difference, a relay with another mission version, or setpoints outside their limits.
 pub fn judge(
     setup: &Setup,
     outcome: &Outcome,

@@ -13,23 +13,25 @@ use uav_relay_oracle::reference::joint::Place;
 use uav_relay_sim::report::hop_sirs;
 use uav_relay_sim::simulator::outcome::Outcome;
 
-/// Relative spacing of f32 numbers.
+/// Relative spacing of f32 numbers: the machine epsilon, 2^-23.
 pub const SINGLE: f64 = f32::EPSILON as f64;
 
-/// Returns the profile of relay `index`: its own, or the mission's.
+/// Returns the profile of relay `index`: its entry in `own` if any, otherwise the mission's common one.
 pub fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile {
     own.iter()
         .find(|(of, _)| *of == index)
         .map_or(mission.config().common, |(_, profile)| *profile)
 }
 
-/// Returns the agreement that a leader predicts; `None` if no target can be met.
+/// Returns the agreement that the leader of the chain predicts; `None` if no target SIR can be met.
+///
+/// `own` has the relays whose profile differs from the common one.
 pub fn solve(mission: &Mission, own: &[(u16, Profile)]) -> Option<Agreed> {
     let of = |index| profile_of(mission, own, index);
     plan::solve(mission, Schedule::Bracketed, of).ok()
 }
 
-/// Returns the relays' positions for `target`, which the chain must be able to meet.
+/// Returns the relays' positions for the target SIR `target`, linear, which the chain can meet.
 pub fn places(mission: &Mission, own: &[(u16, Profile)], target: f32) -> Vec<Placement> {
     let of = |index| profile_of(mission, own, index);
     (1..=mission.relays())
@@ -37,18 +39,18 @@ pub fn places(mission: &Mission, own: &[(u16, Profile)], target: f32) -> Vec<Pla
         .collect()
 }
 
-/// Returns the positions along Tx-Rx, m.
+/// Returns the x of each position, its distance from Tx along the line to Rx, m.
 pub fn xs(places: &[Placement]) -> Vec<f64> {
     places.iter().map(|place| f64::from(place.x_m)).collect()
 }
 
-/// Returns the relays' final setpoints.
+/// Returns the relays' setpoints at the end of a simulated run.
 pub fn setpoints(outcome: &Outcome) -> Vec<Placement> {
     let relays = outcome.relays.iter();
     relays.map(|relay| relay.setpoint.unwrap()).collect()
 }
 
-/// Returns a position for the reference.
+/// Converts a position of the crate, f32, to one of the f64 reference model.
 pub fn reference(at: Placement) -> Place {
     Place {
         x_m: f64::from(at.x_m),
@@ -57,7 +59,9 @@ pub fn reference(at: Placement) -> Place {
     }
 }
 
-/// Compares the SIRs of 4 000 random chains, relays at any ordered positions, with the reference. Within 1e-6.
+/// Checks the crate's hop SIRs on 4 000 random chains against the reference, to 1e-6 relative.
+///
+/// `draw` draws a link; its relays get random x in rising order.
 pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Link) {
     let mut worst = 0.0_f64;
     for _ in 0..4_000 {
@@ -89,20 +93,21 @@ pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Li
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// Solution of a chain, compared with its optimum.
+/// Solution of a chain by the crate, compared with the optimum of the reference.
 #[derive(Debug)]
 pub struct Solved {
-    /// Positions along Tx-Rx, m.
+    /// Distances of the relays from Tx along the line to Rx, m.
     pub x: Vec<f64>,
-    /// Relative shortfall from the optimum.
+    /// Relative shortfall of the SIR from the optimum: 1 - SIR / optimum.
     pub short: f64,
-    /// Number of sweeps.
+    /// Number of message sweeps along the chain that the solution needs.
     pub sweeps: u32,
 }
 
-/// Solves a chain whose farthest positions are best, and compares it with the optimum. At most `allowed` short, never above.
+/// Checks that the crate's solution is at most `allowed` (relative) below the optimum, never above.
 ///
-/// `None` if the SIR of every chain is 0, which the solver must report.
+/// The relays of the link have one altitude, so the farthest position that meets a target is the best one. `None` if
+/// every chain has an SIR of 0, which the solver must report.
 pub fn optimum_is_found(
     link: &Link,
     (mission, own): &(Mission, Vec<(u16, Profile)>),
@@ -128,19 +133,21 @@ pub fn optimum_is_found(
     })
 }
 
-/// Results of unlike chains.
+/// Counters over chains whose relays differ in power and altitude.
 #[derive(Debug, Default)]
 pub struct Mixed {
-    /// Number of chains with an agreement.
+    /// Number of chains for which the solver found an agreement.
     pub solved: u32,
-    /// Number of chains at the optimum.
+    /// Number of chains whose SIR is at most 2e-4 (relative) below the optimum.
     pub best: u32,
-    /// Largest number of sweeps of a chain.
+    /// Largest number of message sweeps that one of the chains needed.
     pub sweeps: u32,
 }
 
 impl Mixed {
-    /// Solves an unlike chain: it meets its agreed target, which is not above the optimum.
+    /// Solves a chain of unlike relays, checks that it meets its agreed target SIR, and counts it.
+    ///
+    /// The SIR must not exceed the optimum.
     pub fn meet_what_they_agree_on(&mut self, link: &Link) {
         let Some((mission, own)) = of_link(link, 1e-4) else {
             return;
@@ -167,23 +174,25 @@ impl Mixed {
     }
 }
 
-/// Hop of a random link, its sender's position, and its gain.
+/// Hop of a random link, with the position of its sender.
 #[derive(Debug)]
 pub struct DrawnHop {
-    /// Link of 1 to 4 relays, in the relays' precision.
+    /// Random link of 1 to 4 relays that has the hop, with numbers rounded to the relays' f32.
     pub link: Link,
-    /// Hop in the crate's form.
+    /// Hop of the link as a value of the crate, for comparison with the reference.
     pub hop: Hop,
-    /// Relay at which the hop ends.
+    /// Index of the relay that receives the hop, from 1.
     pub index: u16,
-    /// Position of the sender, m.
+    /// Distance of the hop's sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// Limit of the SIR far from sender and interferer.
+    /// Limit of the hop's SIR, linear, far from the sender and the interferer.
     pub gain: f64,
     relays: u16,
 }
 
-/// Draws a hop; `None` if a relay would reject the link.
+/// Draws a hop of a random link, with receiver noise if `noisy`.
+///
+/// `None` if a relay would reject the link.
 pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
     let style = Style {
         relays: 1..=4,
@@ -216,18 +225,21 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
     })
 }
 
-/// Kinds of reaches seen.
+/// Counters of tested reaches. A reach is the farthest position at which a hop meets a target SIR.
 #[derive(Debug, Default)]
 pub struct Reaches {
-    /// Reaches before the end of the line.
+    /// Number of reaches that end before Rx, so that the target limits them.
     pub inside: u32,
-    /// Reaches beyond positions that miss the target.
+    /// Number of reaches with nearer positions that miss the target, because the interferer is there.
     pub leaps: u32,
-    /// Number of targets that no position meets.
+    /// Number of target SIRs that no position meets.
     pub infeasible: u32,
 }
 
-/// Compares `count` reaches with exact ones of targets a millionth lower and higher. The tolerance is two f32 steps.
+/// Checks the farthest positions at which `count` random hops meet a target SIR.
+///
+/// Each must lie between the exact ones of a target 1e-6 lower and 1e-6 higher (relative), with a tolerance of two
+/// f32 steps. `target` draws the target of a hop.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,
@@ -278,7 +290,7 @@ pub fn reaches_agree(
     seen
 }
 
-/// Returns a random generator of the environment's `SEED`, or of `usual`.
+/// Returns a random generator, seeded with the environment variable `SEED`, or with `usual`.
 pub fn generator(usual: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(random::seed(usual))
 }

@@ -8,8 +8,9 @@ use rustix::fs::{FlockOperation, flock};
 
 const PACKAGES: &str = include_str!("../python.txt");
 
-/// Returns the interpreter of a virtual environment under `target/` with the packages of `python.txt`. The first call installs
-/// it.
+/// Returns the Python interpreter of a virtual environment with the packages of `python.txt`.
+///
+/// The first call installs the environment under `target/`.
 ///
 /// # Panics
 /// There is no Python, or no package index.
@@ -47,7 +48,7 @@ fn run(command: &mut Command) {
     );
 }
 
-/// Runs a script with `input`; returns its output.
+/// Runs a Python script with `input` on its standard input, and returns its output.
 ///
 /// # Panics
 /// The script fails.

@@ -7,20 +7,20 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use uav_relay::{ChannelLoad, Duration};
 
-/// Largest data rate, bit/s.
+/// Largest data rate that the commands accept for `--baud`, bit/s.
 pub const MOST_BAUD: u32 = 10_000_000;
 
-/// Error of a command: the line on standard error, and the exit status.
+/// Error of a command: the line that is printed on standard error, and the exit status.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Failure {
-    /// 1: the request cannot be met. 2: the input is wrong.
+    /// Exit status: 1 if the request cannot be met, 2 if the input is wrong.
     pub status: u8,
     /// Error message, one line.
     pub line: String,
 }
 
 impl Failure {
-    /// Creates an error for wrong input.
+    /// Creates an error for wrong input, with exit status 2 and the message `line`.
     pub fn input(line: impl Into<String>) -> Self {
         Self {
             status: 2,
@@ -28,7 +28,7 @@ impl Failure {
         }
     }
 
-    /// Creates an error for a request that cannot be met.
+    /// Creates an error for a request that cannot be met, with exit status 1 and the message `line`.
     pub fn unmet(line: impl Into<String>) -> Self {
         Self {
             status: 1,
@@ -37,7 +37,7 @@ impl Failure {
     }
 }
 
-/// Prints the error, if any, and returns the exit status.
+/// Prints the error of a command, if any, and returns the command's exit status.
 pub fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -48,7 +48,9 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
     }
 }
 
-/// Prints help, or an option error as one line that says what is allowed, and returns the exit status.
+/// Prints the requested help, or the error in the options. Returns the exit status.
+///
+/// An error is one line that says what is allowed.
 pub fn usage(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
         print(&error.to_string());
@@ -88,35 +90,35 @@ fn wrong(error: &clap::Error) -> String {
     wrong.trim_start_matches("error: ").to_owned()
 }
 
-/// Prints `line` on standard error; a closed pipe is ignored.
+/// Prints the error message `line` on standard error; a closed pipe is ignored.
 pub fn complain(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Prints `text`; a closed pipe, such as that of `head`, is ignored.
+/// Prints `text` on standard output. A closed pipe, for example to `head`, is ignored.
 pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// Prints `line` on standard error; a closed pipe is ignored.
+/// Prints the message `line` on standard error; a closed pipe is ignored.
 pub fn say(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Formats a report as one JSON object.
+/// Formats a report as one JSON object and a line break.
 ///
 /// # Errors
-/// A number that JSON cannot represent.
+/// The report contains a value that JSON cannot represent.
 pub fn json(report: &impl serde::Serialize) -> Result<String, Failure> {
     serde_json::to_string(report)
         .map(|json| json + "\n")
         .map_err(|error| Failure::input(error.to_string()))
 }
 
-/// Writes the picture of `--svg`.
+/// Writes the picture `drawing`, SVG text, to the file of option `--svg`.
 ///
 /// # Errors
-/// Names the file and the reason.
+/// The file cannot be written: the message names the file and the reason.
 pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
     std::fs::write(file, drawing).map_err(|error| {
         Failure::input(format!(
@@ -126,7 +128,9 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
     })
 }
 
-/// Checks that a channel of `baud` carries relays with this load and this `probe_after`.
+/// Checks that a radio channel of `baud` bit/s is fast enough for the relays that share it.
+///
+/// `load` has the number of relays; `probe_after` is the silence after which a relay probes a neighbour.
 ///
 /// # Errors
 /// The least sufficient data rate, the number of relays on the channel, and the alternatives.
@@ -137,10 +141,10 @@ pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<()
     })
 }
 
-/// Parses a number of the command line within `least` to `most`.
+/// Parses a number on the command line, which must be within `least` to `most`.
 ///
 /// # Errors
-/// The allowed range.
+/// The text is not a number in this range; the message states the range.
 pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     let range = || format!("must be a number within {least:?} to {most:?}");
     let value: f64 = text.parse().map_err(|_| range())?;
@@ -151,7 +155,7 @@ pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-/// Returns a parser of whole numbers of the command line within `least` to `most`.
+/// Returns a parser for whole numbers on the command line, which must be within `least` to `most`.
 pub fn whole<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
 where
     T: std::str::FromStr + std::fmt::Display + PartialOrd + Copy + Send + Sync,
@@ -165,10 +169,10 @@ where
     }
 }
 
-/// Parses the name of an output file; `-` is rejected, because standard output carries the report.
+/// Parses the name of an output file; `-` is rejected, because the report goes to standard output.
 ///
 /// # Errors
-/// The name is empty or `-`, with the alternative.
+/// The name is empty or `-`; the message names the alternative.
 pub fn file(text: &str) -> Result<PathBuf, String> {
     match text {
         "" => Err("must be the name of a file".to_owned()),

@@ -12,7 +12,7 @@ use uav_relay::{
     Port, Profile, Relay, Settings, Wiring,
 };
 
-/// Returns the paper's multi-hop scenario: 1 km, and an interferer of 80 W beside its middle.
+/// Returns the paper's multi-hop mission: 1 km, and an interferer of 80 W beside its middle.
 ///
 /// # Panics
 /// Never: its numbers are in range.
@@ -45,7 +45,7 @@ pub fn paper(relays: u16) -> Mission {
 
 const FLIGHT: Duration = Duration::from_millis(2);
 
-/// Range of a shared channel, relays.
+/// Radio range on a shared channel: number of relays in each direction that receive a frame.
 const RANGE: usize = 4;
 
 struct Arrival {
@@ -55,7 +55,7 @@ struct Arrival {
     bytes: Vec<u8>,
 }
 
-/// Relays and the frames between them.
+/// Simulated chain: the relays, the frames in transit between them, and the virtual time.
 #[derive(Debug)]
 pub struct Chain {
     relays: Vec<Relay>,
@@ -75,7 +75,7 @@ impl Chain {
     /// Creates and starts the relays of `mission`, all with `settings`.
     ///
     /// # Errors
-    /// The error of the first relay that refuses them.
+    /// The error of the first relay that rejects the mission or the settings.
     pub fn new(mission: Mission, settings: Settings) -> Result<Self, SetupError> {
         let relay = |index| {
             let identity = Identity { network: 7, index };
@@ -94,34 +94,34 @@ impl Chain {
         })
     }
 
-    /// Returns the relays.
+    /// Returns the relays in the order of the chain, from Tx.
     pub fn relays(&self) -> &[Relay] {
         &self.relays
     }
 
-    /// Returns the relays, for inputs of their firmware.
+    /// Returns the relays as mutable, so that a test can call the functions that their firmware would call.
     pub fn relays_mut(&mut self) -> &mut [Relay] {
         &mut self.relays
     }
 
-    /// Returns the virtual time.
+    /// Returns the current virtual time.
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Disconnects relay `index`, from 1: it neither sends nor receives any more.
+    /// Disconnects relay `index`, counted from 1: it neither sends nor receives any more.
     pub fn silence(&mut self, index: usize) {
         if let Some(silent) = self.silent.get_mut(index.wrapping_sub(1)) {
             *silent = true;
         }
     }
 
-    /// Returns the CRC-32C of all bytes sent, in order.
+    /// Returns the CRC-32C of all bytes that the relays have sent, in order.
     pub fn said(&self) -> u32 {
         CRC_32C.checksum(&self.said)
     }
 
-    /// Advances the virtual time by `span`.
+    /// Runs the chain for `span` of virtual time.
     pub fn fly(&mut self, span: Duration) {
         let end = self.now + span;
         loop {
@@ -183,7 +183,9 @@ impl Chain {
     }
 }
 
-/// Returns the receivers and their ports for a frame from relay `index` (from 0) of `count`.
+/// Returns the indices, from 0, of the relays that receive a frame, each with its receiving port.
+///
+/// Relay `index` (from 0) of `count` sends the frame on `port`.
 fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     let next = |at: usize, port| (at < count).then_some((at, port));
     match port {
@@ -200,7 +202,7 @@ fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     }
 }
 
-/// Returns the settings of relays on a shared channel.
+/// Returns default settings, except that all relays share one radio channel.
 pub fn shared() -> Settings {
     Settings {
         wiring: Wiring::Shared,

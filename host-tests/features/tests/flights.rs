@@ -10,7 +10,7 @@ use uav_relay_features::{Chain, paper, shared};
 
 // Results of the full set of features; `-- --nocapture` prints them, for an update after a change of the arithmetic or the wire
 // format.
-/// Positions x of five relays and of four, m, as bits.
+/// Expected positions x, m, of a chain of five relays, each as the bits of an f32.
 const OF_FIVE: [u32; 5] = [
     0x439b_7618,
     0x43ac_5a98,
@@ -20,7 +20,7 @@ const OF_FIVE: [u32; 5] = [
 ];
 const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 
-/// CRCs of all bytes sent in the flights below.
+/// Expected CRC-32C of all bytes that the relays send, when they are connected by wires.
 const SAID_BY_WIRES: u32 = 0x81db_29ac;
 const SAID_ON_A_CHANNEL: u32 = 0xfa29_11d7;
 
@@ -42,8 +42,10 @@ fn bits(places: &[f32]) -> Vec<u32> {
     places.iter().map(|x_m| x_m.to_bits()).collect()
 }
 
-/// Returns the SIR of every hop, in f64 by the paper's formulas. The excess loss is 0.1 dB with line of sight in the air, 21 dB
-/// from the interferer to the receiver.
+/// Returns the SIR of every hop, linear, in f64 by the paper's formulas.
+///
+/// `places` are the relays' x, m. The excess loss is 0.1 dB with line of sight in the air, and 21 dB from the
+/// interferer to the receiver.
 fn hops(places: &[f32]) -> Vec<f64> {
     let squared = |x: f64, y: f64, h: f64| x * x + y * y + h * h;
     let mut before = (0.0, 0.0, 1.0);

@@ -11,30 +11,36 @@ use uav_relay_sim::cli::Prepared;
 use uav_relay_sim::report::seconds;
 use uav_relay_sim::simulator::outcome::{Outcome, Shot, Transmission};
 
-/// Largest number of moments; moments close to each other are merged.
+/// Largest number of times at which the recorded picture changes; if there are more, some are merged.
 const STANDS: usize = 600;
 
-/// Largest number of frames; the first ones are shown.
+/// Largest number of frames in a recording; later frames are left out.
 const FRAMES: usize = 20_000;
 
 #[derive(Serialize)]
 pub(crate) struct FilmTold {
-    /// Moments at which the picture changes, in order.
+    /// States of the chain at the times at which the picture changes, in order.
     stands: Vec<StandTold>,
-    /// Frames sent: time in s, relay, and direction: -1 toward Tx, 1 toward Rx, 0 to all in range.
+    /// Frames that were sent, each with its time in s, sender's index, and direction.
+    ///
+    /// Direction -1 is toward Tx, 1 toward Rx, and 0 to all relays in range.
     sent: Vec<(f64, u16, i8)>,
 }
 
 #[derive(Serialize)]
 struct StandTold {
     at_s: f64,
-    /// Relays that changed: index, on or off, and x, y, h in m; `None` without an agreed position.
+    /// Relays that changed: index, true if switched on, and x, y, altitude in m.
+    ///
+    /// The position is `None` before the relay has agreed on one.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
-    /// SIR of every hop between relays that are on and have a position, linear, at that time. Empty without relays.
+    /// SIR of every hop from Tx to Rx at that time, linear. Empty if there is no relay to count.
+    ///
+    /// Relays that are off or have no position do not count.
     sirs: Vec<f32>,
-    /// Number of frames sent on all links until this time.
+    /// Number of frames sent on all links from the start until this time.
     messages: u64,
-    /// Interferer as estimated by the first relay: W, m, m.
+    /// Estimated interferer: power in W, x and y in m. `None` if no interferer is estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     believed: Option<[f32; 3]>,
 }
@@ -43,7 +49,7 @@ struct StandTold {
 struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,
     messages: u64,
-    /// Estimate of relays that locate the interferer.
+    /// New interference estimate of the relays, if they measure the interference.
     believed: Option<InterferenceEstimate>,
 }
 
@@ -72,7 +78,9 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
     thinned(changes)
 }
 
-/// Merges moments that are close to each other into the later one.
+/// Merges changes of the picture that are close in time, until at most [`STANDS`] remain.
+///
+/// The merged change has the time of the later one.
 fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
     let mut all = all;
     let mut apart_us = 1_000;

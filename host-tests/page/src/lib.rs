@@ -22,16 +22,16 @@ use film::FilmTold;
 
 const NAME: &str = "the page";
 
-/// Simulator events between two checks of the virtual clock.
+/// Number of simulator events between two checks of the limit on virtual time.
 const HAPPENINGS: u64 = 20_000;
 
-/// Limit of a run, s of virtual time, so that the page stays responsive.
+/// Longest run, s of virtual time: a longer one is an error, so that the page stays responsive.
 const LONGEST_S: u64 = 3_600;
 
-/// Result for the page.
+/// Result of a run in the page, as JSON: the report, the recording, and an error message.
 #[derive(Serialize)]
 struct RunOutput {
-    /// Output of `cargo chain --json`, character by character.
+    /// Report of the run, with the same characters as the output of `cargo chain --json`.
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<Box<RawValue>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -40,9 +40,10 @@ struct RunOutput {
     wrong: Option<String>,
 }
 
-/// Runs a chain and returns the result as JSON. `report`, `film` if requested, and `wrong`, an error line, if something failed.
+/// Runs a simulated chain and returns the result as one JSON object.
 ///
-/// `options` are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML text.
+/// It has `report`, `film` (the recording) if requested, and `wrong`, an error line, if something failed. `options`
+/// are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML text.
 #[wasm_bindgen]
 #[must_use]
 pub fn chain(options: &str, scenario: &str, film: bool) -> String {

@@ -13,18 +13,20 @@ use uav_relay_tools::provision::config;
 
 use super::{MISSING, QEMU};
 
-/// Speed of the drone's clock relative to the wall clock, unless slowed down.
+/// Speed of an emulated drone's clock relative to the wall clock, unless slowed down.
+///
+/// QEMU's `SysTick` counts at 168 MHz, and the firmware assumes 16 MHz.
 pub const SPEED: f64 = 168.0 / 16.0;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Speed of a drone's clock.
+/// Choice of the speed of an emulated drone's clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Life {
-    /// [`SPEED`] times as fast as the wall clock.
+    /// Clock of the drone runs [`SPEED`] times as fast as the wall clock.
     #[default]
     Fast,
-    /// Real time.
+    /// Clock of the drone runs in real time.
     Real,
 }
 
@@ -38,41 +40,41 @@ impl Life {
     }
 }
 
-/// Serial port of the chip, in the order of QEMU's list.
+/// Serial port of the drone's microcontroller, in the order in which QEMU lists its ports.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Uart {
-    /// USART1: autopilot.
+    /// USART1, which leads to the autopilot.
     Usart1,
-    /// USART2: upstream neighbour, or radio.
+    /// USART2, which leads to the upstream neighbour, or to the radio.
     Usart2,
-    /// USART3: downstream neighbour.
+    /// USART3, which leads to the downstream neighbour.
     Usart3,
-    /// UART4: log.
+    /// UART4, which carries the log.
     Uart4,
 }
 
 const UARTS: [Uart; 4] = [Uart::Usart1, Uart::Usart2, Uart::Usart3, Uart::Uart4];
 
-/// Address in the flash, and the bytes stored from that address.
+/// Initial flash content of an emulated drone: an address, and the bytes stored from there.
 pub type Kept = (u32, Vec<u8>);
 
-/// Running emulated drone.
+/// Running emulated drone: a QEMU process, and the folder with its files.
 #[derive(Debug)]
 pub struct Emulator {
     process: Child,
     folder: PathBuf,
 }
 
-/// Serial ports of a drone, in the order of [`Uart`].
+/// Sockets of an emulated drone's serial ports, in the order of [`Uart`].
 pub type Sockets = [UnixStream; 4];
 
 impl Emulator {
-    /// Starts a drone with `image`, its configuration `block`, and further flash contents `kept`.
+    /// Starts a drone with the firmware `image`, its configuration `block`, and flash contents `kept`.
     ///
-    /// Its clock runs at the speed `life`. It creates the folder `name` in `folder` for itself.
+    /// Its clock runs at the speed `life`. It creates the folder `name` in `folder` for its files.
     ///
     /// # Errors
-    /// [`MISSING`] if there is no QEMU; otherwise the fault, with QEMU's own messages.
+    /// [`MISSING`] if QEMU is not installed; otherwise the fault, with QEMU's own messages.
     pub fn start(
         image: &Path,
         block: &[u8],
@@ -154,7 +156,7 @@ impl Emulator {
         }
     }
 
-    /// Returns QEMU's error output.
+    /// Returns the text that QEMU has written to its error output.
     pub fn complaint(&self) -> String {
         std::fs::read_to_string(self.folder.join("qemu.txt")).unwrap_or_default()
     }
@@ -164,7 +166,7 @@ impl Emulator {
         matches!(self.process.try_wait(), Ok(None))
     }
 
-    /// Kills the drone's process at once.
+    /// Kills the drone's QEMU process at once.
     pub fn kill(&mut self) {
         // A process that has already ended is no error.
         _ = self.process.kill();

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Target of the firmware.
+/// Target triple of the firmware: Arm Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Profile of flashed images.
+/// Cargo profile with which the firmware images are built.
 pub const PROFILE: &str = "firmware";
 
-/// Builds `examples`, with the log alone if `smallest`, else with all features. Returns their folder, valid until the next build.
+/// Builds the firmware `examples` and returns the folder of their images, valid until the next build.
+///
+/// The only feature is the log if `smallest`; otherwise all features are built.
 ///
 /// # Errors
 /// The output of cargo, if it fails.

@@ -11,7 +11,7 @@ use uav_relay::MAX_FRAME;
 use super::emulator::SPEED;
 use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 
-/// Maximum number of bytes without a delimiter; a longer sequence is forwarded in pieces.
+/// Maximum number of bytes without a frame delimiter; a longer sequence is forwarded in pieces.
 const LONGEST: usize = 2 * MAX_FRAME;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -34,7 +34,7 @@ impl PartialOrd for Flying {
     }
 }
 
-/// Medium between the drones. The owner numbers senders and receivers.
+/// Simulated links between drones, with latency and faults. The caller numbers senders and receivers.
 #[derive(Debug)]
 pub struct Medium {
     link: LinkSpec,
@@ -43,12 +43,14 @@ pub struct Medium {
     injected: Injected,
     flying: BinaryHeap<Reverse<Flying>>,
     order: u64,
-    /// Bytes of each sender since its last frame delimiter, and the time at which its line becomes idle.
+    /// State of each sender: bytes since its last frame delimiter, and the time when its link is idle.
     lines: Vec<(Vec<u8>, Instant)>,
 }
 
 impl Medium {
-    /// Creates the medium of `senders`, with `link` in the time of the drones' own clocks.
+    /// Creates the links of `senders` drones' ports, without bytes in transit at `now`.
+    ///
+    /// The times in `link` are those of the drones' own clocks. `seed` determines the random `faults`.
     pub fn new(senders: usize, link: LinkSpec, faults: Faults, seed: u64, now: Instant) -> Self {
         Self {
             link,
@@ -61,7 +63,7 @@ impl Medium {
         }
     }
 
-    /// Accepts bytes from `sender`; each complete frame goes to all `receivers`, with separate faults.
+    /// Accepts bytes from `sender`. Each complete frame goes to all `receivers`, with faults drawn for each.
     pub fn send(&mut self, now: Instant, sender: usize, bytes: &[u8], receivers: &[usize]) {
         for &byte in bytes {
             let Some((frame, _)) = self.lines.get_mut(sender) else {
@@ -96,7 +98,7 @@ impl Medium {
         }
     }
 
-    /// Returns the next bytes that have arrived by `now`, and their receiver.
+    /// Returns the next bytes that have arrived by `now` and the number of their receiver; `None` if none.
     pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
         if self.next()? > now {
             return None;
@@ -105,12 +107,12 @@ impl Medium {
         Some((flying.receiver, flying.bytes))
     }
 
-    /// Returns the next arrival time.
+    /// Returns the time of the next arrival; `None` if no bytes are in transit.
     pub fn next(&self) -> Option<Instant> {
         self.flying.peek().map(|Reverse(flying)| flying.at)
     }
 
-    /// Returns the counters of injected faults.
+    /// Returns the numbers of frames lost, corrupted, duplicated and reordered so far.
     pub const fn injected(&self) -> Injected {
         self.injected
     }

@@ -26,9 +26,9 @@ pub mod uploads;
 
 pub use uav_relay_kept::{epoch, journal, views};
 
-/// Name of the emulator.
+/// Program name of the emulator that runs the firmware.
 pub const QEMU: &str = "qemu-system-arm";
 
-/// Message if the emulator is missing.
+/// Error message if the emulator is not installed, with the command that installs it.
 pub const MISSING: &str =
     "qemu-system-arm is missing; type: sudo apt-get install --yes qemu-system-arm";

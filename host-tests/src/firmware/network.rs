@@ -15,13 +15,13 @@ use rustix::net::sockopt::set_socket_send_buffer_size;
 use super::medium::Medium;
 use uav_relay_sim::simulator::faults::Injected;
 
-/// Maximum time to write a frame once there is room for its beginning.
+/// Time limit for writing a frame to a socket that accepts the frame's beginning.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Kernel buffer for frames waiting at a port, bytes: some four frames with their overhead.
+/// Size of a port's send buffer in the kernel, bytes: some four frames with their overhead.
 const WAITING: usize = 16_384;
 
-/// Connected drones. It ends when all sockets of the drones are closed, or on drop.
+/// Running network of emulated drones. It ends on drop, or when the drones' sockets are closed.
 #[derive(Debug)]
 pub struct Network {
     carrier: Option<JoinHandle<()>>,
@@ -29,17 +29,19 @@ pub struct Network {
     injected: Arc<Mutex<Injected>>,
 }
 
-/// Bytes sent by a port; empty at the end.
+/// Bytes sent by the port with number `sender`. No bytes mean that the network is to end.
 #[derive(Debug)]
 struct Heard {
     sender: usize,
     bytes: Vec<u8>,
 }
 
-/// Receivers of each port, by their index in the list of ports.
+/// Topology of a network: for each port of the list, the ports that receive its bytes.
 pub type Hearers = Vec<Vec<usize>>;
 
-/// Returns the receivers in a chain with two ports per drone, upstream first. Each port leads to its neighbour.
+/// Returns the topology of a chain of `drones` with wires: each port leads to one neighbour.
+///
+/// Each drone has two ports, the upstream one first.
 pub fn chain(drones: usize) -> Hearers {
     let downstream_of = |drone: usize| drone.checked_sub(1).map(|before| 2 * before + 1);
     let upstream_of = |drone: usize| (drone < drones).then_some(2 * drone);
@@ -49,7 +51,9 @@ pub fn chain(drones: usize) -> Hearers {
         .collect()
 }
 
-/// Returns the receivers on a radio channel with one port per drone: all others within `range` drones.
+/// Returns the topology of a radio channel: each drone reaches all others within `range` drones.
+///
+/// Each drone has one port.
 pub fn radio(drones: usize, range: usize) -> Hearers {
     (0..drones)
         .map(|sender| {
@@ -61,10 +65,10 @@ pub fn radio(drones: usize, range: usize) -> Hearers {
 }
 
 impl Network {
-    /// Connects `ports` through `medium`. Frames that a drone has completed before are discarded.
+    /// Connects the drones' `ports` through `medium`. Frames that were complete before are discarded.
     ///
     /// # Errors
-    /// A socket can not be shared between two threads.
+    /// A socket cannot be read, configured, or shared between two threads.
     pub fn connect(
         ports: Vec<UnixStream>,
         hearers: Hearers,
@@ -88,7 +92,7 @@ impl Network {
         })
     }
 
-    /// Returns the counters of injected faults.
+    /// Returns the numbers of frames lost, corrupted, duplicated and reordered so far.
     pub fn injected(&self) -> Injected {
         *self.injected.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -106,7 +110,7 @@ impl Drop for Network {
     }
 }
 
-/// Reads what has arrived at a port, and returns the bytes of the frame that is not complete.
+/// Reads the bytes that have arrived at a port, and returns those of the last, incomplete frame.
 fn begun(mut port: &UnixStream) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     port.set_nonblocking(true)?;
@@ -120,7 +124,7 @@ fn begun(mut port: &UnixStream) -> std::io::Result<Vec<u8>> {
     Ok(bytes.split_off(complete.map_or(0, |at| at + 1)))
 }
 
-/// Forwards bytes from a port until the drone closes its end.
+/// Forwards the bytes that a drone sends on a port to `out`, until the drone closes the port.
 fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
     let mut buffer = [0; 1024];
     while let Ok(count @ 1..) = port.read(&mut buffer) {
@@ -131,7 +135,7 @@ fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
     }
 }
 
-/// Returns true if a frame can be written without waiting.
+/// Returns true if bytes can be written to the port without waiting.
 fn has_room(port: &UnixStream) -> bool {
     let mut asked = [PollFd::new(port, PollFlags::OUT)];
     poll(&mut asked, Some(&Timespec::default())).is_ok_and(|ready| ready > 0)

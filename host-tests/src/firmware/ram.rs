@@ -5,29 +5,31 @@ use rand::{RngExt, SeedableRng};
 
 use super::journal::{BLANK, Flash};
 
-/// Sectors, their faults and the number of erases.
+/// Mock of two flash sectors in RAM, with wear, loss of power, and a record of the erases.
 #[derive(Debug)]
 pub struct Ram {
-    /// Words of each sector.
+    /// Content of each flash sector, in words of 32 bits.
     pub sectors: [Vec<u32>; 2],
-    /// Number of word writes and erases until power fails during one; `None` for no failure.
+    /// Number of word writes and erases after which power fails during the last of them.
+    ///
+    /// 0 while the power is off; `None` if it does not fail.
     pub power: Option<usize>,
-    /// Number of next writes that fail.
+    /// Number of writes that fail from now on, because the flash is worn.
     pub worn: usize,
-    /// Sectors that were erased, in order.
+    /// Numbers of the sectors that were erased, in order.
     pub erased: Vec<usize>,
     rng: ChaCha8Rng,
 }
 
 enum Power {
     On,
-    /// Power fails in the middle: only a random part of the bits changes.
+    /// Power that fails in the middle of the operation: only a random part of the bits changes.
     Fails,
     Off,
 }
 
 impl Ram {
-    /// Creates two blank sectors of `words` words each.
+    /// Creates two blank flash sectors of `words` words each; `seed` is that of the random faults.
     pub fn blank(words: usize, seed: u64) -> Self {
         Self {
             sectors: [vec![BLANK; words], vec![BLANK; words]],
@@ -38,7 +40,7 @@ impl Ram {
         }
     }
 
-    /// Creates a copy of the sectors and their faults, whose random numbers come from `seed`.
+    /// Creates a copy of the flash sectors and their faults, with random numbers from a new `seed`.
     pub fn copy(&self, seed: u64) -> Self {
         Self {
             sectors: self.sectors.clone(),
@@ -49,12 +51,12 @@ impl Ram {
         }
     }
 
-    /// Restores the power for good; returns true if it had failed.
+    /// Switches the power on and cancels a planned failure. Returns true if the power had failed.
     pub fn switch_on(&mut self) -> bool {
         self.power.take() == Some(0)
     }
 
-    /// Returns the content of both sectors as bytes.
+    /// Returns the content of both flash sectors, one after the other, as little-endian bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let words = self.sectors.iter().flatten();
         words.flat_map(|word| word.to_le_bytes()).collect()

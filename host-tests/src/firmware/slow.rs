@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Returns the library that QEMU must preload. The first call builds it, with the C compiler.
+/// Returns the path of the library that QEMU must preload, so that a drone runs in real time.
+///
+/// The first call builds it with the C compiler.
 ///
 /// # Errors
 /// The output of the compiler.

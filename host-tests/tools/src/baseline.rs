@@ -12,23 +12,25 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Number of draws used in the paper.
+/// Number of random chains over which the paper takes its means.
 pub const DRAWS: u32 = 1000;
 
-/// Statistics over many random chains.
+/// Mean results of many chains whose relays are at random positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
     /// Mean SIR of the worst hop, linear.
     pub sir: f64,
     /// Standard error of the mean SIR, linear.
     pub error: f64,
-    /// Mean over the draws of the worst hop's SIR in dB.
+    /// Mean over the random chains of the worst hop's SIR in dB.
     pub db: f64,
-    /// Mean of log2(1 + SIR) of the worst hop, bit/s/Hz.
+    /// Mean over the random chains of the worst hop's log2(1 + SIR), bit/s/Hz.
     pub rate: f64,
 }
 
-/// Returns the statistics of `draws` (at least 2) random chains from `seed`. Work: `draws` sorted chains, N + 1 SIRs each.
+/// Returns the mean results of `draws` (at least 2) chains of randomly placed relays.
+///
+/// `seed` is that of the random positions. Work: `draws` sorted chains, N + 1 SIRs each.
 pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut places = vec![0.0; scene.relays.len()];
@@ -64,12 +66,13 @@ pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
 // The outer hops are at least as long as the altitude. If the hops span more than the distance even then, many chains are
 // equally good; the one that shortens every hop in the same proportion is used.
 
-/// Bisection steps on the common received power: enough for any f64 bracket to close.
+/// Number of bisection steps for the common received power. It suffices for any f64 bracket to close.
 const HALVINGS: u32 = 200;
 
-/// Returns the positions of the relays in order, m from Tx.
+/// Returns the relays' x, m from Tx, that maximise the weakest received signal, without interference.
 ///
-/// The altitude and power of the first relay are used for all. Empty without relays. Work: 200 chain lengths and N positions.
+/// All relays get the altitude and power of the first one. Empty without relays. Work: 200 chain lengths and N
+/// positions.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
         return Vec::new();
@@ -95,20 +98,22 @@ pub fn blind_places(scene: &Scene) -> Vec<f64> {
         .collect()
 }
 
-/// Hop lengths as a function of the received power, W.
+/// Computes hop lengths, m, from the received power that each hop must have, W.
 struct Hops<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
 }
 
 impl Hops<'_> {
-    /// Returns the strongest signal possible on the weaker outer hop, W. Its relay straight above the ground station.
+    /// Returns the largest power, W, that the first and the last hop can both receive.
+    ///
+    /// Each has it with its relay straight above Tx or Rx.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)
     }
 
-    /// Returns the horizontal length, m, of a first or last hop that receives `signal_w`.
+    /// Returns the horizontal length, m, of a first or last hop that receives `signal_w` from `power_w`.
     fn outer(&self, power_w: f64, signal_w: f64) -> f64 {
         let height = self.relay.altitude_m;
         let squared = power_w / (self.scene.eta * signal_w) - height * height;
@@ -129,7 +134,7 @@ impl Hops<'_> {
     }
 }
 
-/// Returns the positions k D / (N + 1), m from Tx. Work: one division per relay.
+/// Returns equally spaced relay positions k D / (N + 1), m from Tx, for k from 1 to N.
 pub fn equal_places(scene: &Scene) -> Vec<f64> {
     let hops = (scene.relays.len() + 1) as f64;
     (1..=scene.relays.len())

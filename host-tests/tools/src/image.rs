@@ -9,26 +9,26 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 use uav_relay_block::ADDRESS;
 
-/// A supported board.
+/// Board for which `cargo image` can build a flash image.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Board {
     /// Name of the board, as given by `--board`.
     pub name: &'static str,
-    /// Rust target triple.
+    /// Rust target triple of the board's microcontroller.
     pub target: &'static str,
     manifest: &'static str,
     package: &'static str,
-    /// True if the images are examples of the package, false if they are binaries.
+    /// True if the board's images are examples of `package`, false if they are binaries of it.
     examples: bool,
-    /// Image names: with a UART to each neighbour, and with a shared radio.
+    /// Names of the board's two images: with a UART to each neighbour, and with one UART to a shared radio.
     images: [&'static str; 2],
-    /// Flash address of the configuration block.
+    /// Flash address at which the board's firmware reads the configuration block.
     pub block: u32,
-    /// UF2 family that the boot ROM accepts, if any.
+    /// Family number of UF2 files that the board's boot ROM accepts; `None` if it reads no UF2 files.
     pub uf2: Option<Family>,
 }
 
-/// The supported boards.
+/// Boards for which `cargo image` can build a flash image.
 pub const BOARDS: [Board; 4] = [
     Board {
         name: "stm32f405",
@@ -73,12 +73,14 @@ pub const BOARDS: [Board; 4] = [
 ];
 
 impl Board {
-    /// Returns the board with that name.
+    /// Returns the board called `name`; `None` if there is none.
     pub fn named(name: &str) -> Option<Self> {
         BOARDS.into_iter().find(|board| board.name == name)
     }
 
-    /// Returns cargo's arguments and the path of the resulting ELF, both relative to the checkout's root.
+    /// Returns the arguments of cargo that build the board's image, and the path of the resulting ELF.
+    ///
+    /// `radio` selects the image for a shared radio. All paths are relative to the root of the checkout.
     pub fn build(&self, radio: bool) -> (Vec<String>, PathBuf) {
         let [wires, radios] = self.images;
         let image = if radio { radios } else { wires };
@@ -111,28 +113,30 @@ impl Board {
         (words.map(str::to_owned).into(), elf.join(image))
     }
 
-    /// Returns the file name of an image, without extension.
+    /// Returns the file name of the board's image without extension; `radio` selects the one for a radio.
     pub fn stem(&self, radio: bool) -> String {
         format!("{}-{}", self.name, if radio { "radio" } else { "wires" })
     }
 }
 
-/// Largest span from the first byte of an image to the last: no supported flash is larger.
+/// Largest distance between the first bytes of an image's first and last piece.
+///
+/// No supported flash is larger than this.
 pub const LARGEST: u32 = 16 * 1024 * 1024;
 
-/// Value of an erased flash byte.
+/// Value of a byte of erased flash.
 pub const BLANK: u8 = 0xFF;
 
-/// Contiguous bytes at an address.
+/// Part of an image: contiguous bytes, and the flash address of the first one.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Piece {
     /// Address of the first byte.
     pub address: u32,
-    /// Content.
+    /// Bytes from that address on.
     pub bytes: Vec<u8>,
 }
 
-/// Returns the loadable segments of an ELF, by physical (load) address.
+/// Returns the pieces of an ELF file that are loaded into flash, by physical (load) address.
 ///
 /// # Errors
 /// A line that says why the file is not a loadable ELF.
@@ -159,10 +163,10 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     Ok(pieces)
 }
 
-/// Joins pieces into one contiguous image, with erased bytes in the gaps.
+/// Joins the pieces of an image into one, with erased bytes in the gaps.
 ///
 /// # Errors
-/// If pieces overlap, or lie more than [`LARGEST`] bytes apart.
+/// The pieces overlap, or one begins more than [`LARGEST`] bytes behind the first.
 pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
     let first = pieces.first().ok_or("nothing to load")?.address;
     let mut bytes = Vec::new();
@@ -192,7 +196,7 @@ pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
 
 const RECORD: u8 = 16;
 
-/// Returns the HEX hex_file, with 32-bit addresses.
+/// Returns the image as the text of an Intel HEX file, with 32-bit addresses.
 pub fn hex(pieces: &[Piece]) -> Result<String, String> {
     let mut records = Vec::new();
     let mut above = None;
@@ -240,30 +244,30 @@ pub fn hex(pieces: &[Piece]) -> Result<String, String> {
 //
 // All numbers are little-endian.
 
-/// Magic numbers at the start of a block.
+/// Two words that each 512-byte block of a UF2 file begins with.
 pub const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
 
-/// Magic number at the end of a block.
+/// Word that each 512-byte block of a UF2 file ends with.
 pub const END: u32 = 0x0AB1_6F30;
 
-/// Payload bytes per block.
+/// Number of image bytes in each block of a UF2 file.
 pub const PAGE: u32 = 256;
 
 const FAMILY_STATED: u32 = 0x2000;
 
-/// Chip family that accepts a block; other chips ignore it.
+/// Family number in a UF2 file: only chips of this family accept the file.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Family(pub u32);
 
 impl Family {
-    /// RP2350, Arm cores, secure state.
+    /// Family number of the RP2350 with Arm cores in secure state.
     pub const RP2350: Self = Self(0xE48B_FF59);
 }
 
-/// Returns the UF2 file. Bytes of a page that no piece covers are erased-flash bytes.
+/// Returns the image as a UF2 file. Bytes of a page that no piece covers are those of erased flash.
 ///
 /// # Errors
-/// If there are more blocks than the format can count.
+/// The image has more pages than the format can count.
 pub fn uf2(pieces: &[Piece], family: Family) -> Result<Vec<u8>, String> {
     let mut pages = BTreeMap::new();
     for piece in pieces {

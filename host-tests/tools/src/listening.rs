@@ -17,19 +17,22 @@ use super::multi_interferer::optimum;
 
 const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 
-/// A random scene: 1 km, interferers of 1 to 100 W at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D.
+/// Random scene: relays on 1 km, and interferers that the relays may have to locate.
+///
+/// The interferers have 1 to 100 W. They are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D, with D the distance
+/// from Tx to Rx.
 #[derive(Clone, Debug)]
 pub struct RandomScene {
     /// Geometry, powers and the true interferers.
     pub scenario: Scenario,
     /// Number of relays.
     pub relays: u16,
-    /// Seed of all random numbers.
+    /// Seed of the scene's and of its simulation's random numbers.
     pub seed: u64,
 }
 
 impl RandomScene {
-    /// Draws a scene with that many relays and sources.
+    /// Draws a random scene with `relays` relays and `sources` interferers.
     pub fn new(seed: u64, relays: u16, sources: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut scenario = Scenario::default();
@@ -52,7 +55,7 @@ impl RandomScene {
         }
     }
 
-    /// Moves the first source to (`x_m`, `y_m`), m.
+    /// Moves the scene's first interferer to (`x_m`, `y_m`), m.
     pub fn place(&mut self, x_m: f64, y_m: f64) {
         if let Known::Sources(sources) = &mut self.scenario.interference
             && let Some(source) = sources.first_mut()
@@ -61,19 +64,19 @@ impl RandomScene {
         }
     }
 
-    /// Returns a copy with the sources of `scene`.
+    /// Returns a copy of this scene with the interferers of `scene`.
     pub fn with(&self, scene: &Scene) -> Self {
         let mut wild = self.clone();
         wild.scenario.interference = Known::Sources(scene.sources.clone());
         wild
     }
 
-    /// Returns the true scene.
+    /// Returns the scene with its true interferers, for exact SIRs.
     pub fn scene(&self) -> Result<Scene, FigureError> {
         Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
     }
 
-    /// Returns the mission of the relays, with `guess` as its interference.
+    /// Returns the mission that the relays are loaded with, with `guess` as its interference.
     pub fn mission(&self, guess: Interference) -> Result<Mission, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-4)?;
         let config = MissionConfig {
@@ -83,9 +86,9 @@ impl RandomScene {
         Mission::try_new(config).map_err(|_| NO_SCENE)
     }
 
-    /// Returns the best SIR with the interferers known, linear.
+    /// Returns the best SIR that relays can have if they know the interferers, linear.
     ///
-    /// For one source it is the SIR of the chain that knows it, for several the exact optimum.
+    /// For one interferer it is the SIR of a simulated chain that knows it, for several the exact optimum.
     pub fn optimum(&self) -> Result<f64, FigureError> {
         let scene = self.scene()?;
         if scene.sources.len() > 1 {
@@ -94,9 +97,9 @@ impl RandomScene {
         Ok(scene.chain_sir(&self.told()?))
     }
 
-    /// Returns the positions of a chain that knows the interferer.
+    /// Simulates a chain that knows the interferer, and returns the positions of its relays.
     ///
-    /// For several sources it knows the paper's hypothetical interferer instead.
+    /// If there are several, it knows the paper's hypothetical interferer instead of them.
     pub fn told(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
@@ -104,7 +107,9 @@ impl RandomScene {
         places.ok_or(FigureError::Unsettled("a chain that knows the interferer"))
     }
 
-    /// Returns a simulation in which relays reach their positions instantly and measure every five seconds.
+    /// Returns a simulation whose relays measure the interference every 5 s, and move instantly.
+    ///
+    /// `guess` is the interference that they assume at first.
     pub fn setup(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = Setup::new(self.mission(guess)?);
         setup.seed = self.seed;
@@ -118,7 +123,9 @@ impl RandomScene {
         Ok(setup)
     }
 
-    /// Returns a simulation with drones of 10 m/s. They start beside the transmitter and measure every second in flight.
+    /// Returns a simulation whose relays are drones of 10 m/s, and measure the interference every second.
+    ///
+    /// They start beside Tx. `guess` is the interference that they assume at first.
     pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = self.setup(guess)?;
         let start = (1..=self.relays)
@@ -132,7 +139,9 @@ impl RandomScene {
     }
 }
 
-/// Returns the SIR after each agreement, linear; the first element is the SIR before any measurement.
+/// Returns the chain's true SIR after each agreement on positions, linear.
+///
+/// The first agreement precedes all measurements. `stands` are the states of the simulated chain in order.
 pub fn by_agreement(scene: &Scene, stands: &[Stand]) -> Vec<f64> {
     let mut sirs = Vec::new();
     for stand in stands {
@@ -145,13 +154,15 @@ pub fn by_agreement(scene: &Scene, stands: &[Stand]) -> Vec<f64> {
     sirs
 }
 
-/// Last agreement that is reported.
+/// Largest number of agreements based on measurements for which results are given.
 pub const LAST: usize = 8;
 
-/// Shares of the optimum after 0 to [`LAST`] agreements based on measurements, one per scene.
+/// Ratios SIR / optimum after 0 to [`LAST`] agreements based on measurements, one for each scene.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// Returns the shares in `scenes` random scenes, each run with `setup`.
+/// Simulates `scenes` random scenes and returns SIR / optimum after each agreement.
+///
+/// `setup` returns the simulation of a scene.
 pub fn shares(
     scenes: u64,
     relays: u16,
@@ -176,12 +187,12 @@ pub fn shares(
     }))
 }
 
-/// Setup without prior knowledge of the interference.
+/// Returns a simulation whose relays know nothing about the interference at first, and measure it.
 pub fn unknown(wild: &RandomScene) -> Result<Setup, FigureError> {
     wild.setup(Interference::Unknown)
 }
 
-/// The setup of [`unknown`] with 1 dB of shadowing, independent at each position.
+/// Returns the simulation of [`unknown`] with 1 dB of shadowing, independent at each position.
 pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     if let Some(sky) = &mut setup.sky {
@@ -190,7 +201,9 @@ pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
     Ok(setup)
 }
 
-/// Setup without measurements. The relays know the interferer, or the paper's hypothetical one for several sources.
+/// Returns a simulation without measurements, whose relays know the interferer.
+///
+/// For several interferers they know the paper's hypothetical one instead.
 pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     (setup.mission, _) = mission(&wild.scenario, wild.relays, 1e-4)?;
@@ -198,7 +211,7 @@ pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     Ok(setup)
 }
 
-/// Returns the `part`-quantile of `numbers`; NaN if empty.
+/// Returns the quantile of `numbers` at `part`, 0 to 1 (0.5 is the median); NaN if there are none.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -211,19 +224,23 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
     numbers.get(at).copied().unwrap_or(f64::NAN)
 }
 
-/// Start of the evaluation, s after the start of the run.
+/// Time after the start of a run from which its SIRs count, s.
 const BEGUN_S: u32 = 60;
 
-/// Mean ratios of a chain's SIR to the optimum at the same moment, per scene, after the first minute.
+/// Ratios SIR / optimum while the interferer moves: a mean over time for each scene.
+///
+/// The first minute of a run does not count. The optimum is that of the same moment.
 #[derive(Clone, Debug, Default)]
 pub struct MovingShares {
-    /// Ratios of the chain that tracks the interferer.
+    /// Ratios of chains that track the interferer.
     pub followed: Vec<f64>,
-    /// SIR of a chain that keeps its first optimal positions, relative to the current optimum.
+    /// Ratios of chains that keep the positions that were optimal after the first minute.
     pub stayed: Vec<f64>,
 }
 
-/// Returns the ratios in `scenes` scenes while a single interferer passes at a distance of 300 m.
+/// Simulates `scenes` scenes in which an interferer passes at a distance of 300 m from the line.
+///
+/// Returns SIR / optimum of chains that track the interferer, and of chains that do not move.
 pub fn moving_shares(
     scenes: u64,
     relays: u16,
@@ -279,7 +296,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     }
 }
 
-/// Returns the arithmetic mean of `shares`; NaN if there are no shares.
+/// Returns the arithmetic mean of `shares`; NaN if there are none.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

@@ -48,7 +48,9 @@ fn number(value: &Value) -> f64 {
         .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// Returns the scenario of a reference case with the paper's channel, as a file.
+/// Writes a scenario file with the geometry and powers of a reference case, and `interference`.
+///
+/// It has the default channel, which is the paper's.
 fn scenario(case: &Case, interference: &str) -> tempfile::NamedTempFile {
     let p = &case.params;
     let mut text = String::new();
@@ -77,7 +79,7 @@ fn interferer(case: &Case) -> String {
     )
 }
 
-/// Returns the cases of `function` with the paper's channel, the default of a scenario file.
+/// Returns the reference cases of `function` with the paper's channel, the default of a scenario file.
 fn with_the_papers_channel(function: &str) -> Vec<Case> {
     let mut cases = cases::of(function).unwrap();
     cases.retain(|case| (case.params.mu_los - 7_191.811_792).abs() < 1e-3);
@@ -118,7 +120,7 @@ fn the_theorems_of_the_reference_come_out_of_the_command() {
     }
 }
 
-/// The only relay leaves the line if there is lateral room, and no position is better.
+/// Checks that a single relay with lateral room is placed beside the line, at the reference's optimum.
 #[test]
 fn one_relay_aside_is_the_judges_of_three_dimensions() {
     let side = example("side.toml");
@@ -248,7 +250,7 @@ fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
     assert!(number(&fewer["rate_bps"]) < half, "{fewer}");
 }
 
-/// Compares with path losses of the paper's channel, written anew.
+/// Checks the SIR of each hop on the way from Rx to Tx against the formulas, written anew.
 #[test]
 fn the_way_back_is_reported_for_every_hop() {
     let file = tempfile::NamedTempFile::new().unwrap();
@@ -373,7 +375,7 @@ fn relays_are_planned_for_both_directions_on_request() {
     );
 }
 
-/// Chain in noise with `[link]` and `more`.
+/// Writes a scenario file of a chain with noise, whose table `[link]` has the lines `more`.
 fn linked(more: &str) -> tempfile::NamedTempFile {
     let file = tempfile::NamedTempFile::new().unwrap();
     let text = "[geometry]\ndistance_m = 10000\naltitude_m = 20\n[power]\ntx_w = 1\nuav_w = 1\n[channel]\nexcess_loss_los_db = 30\n\
@@ -486,7 +488,7 @@ fn the_answer_names_what_the_model_leaves_out() {
     }
 }
 
-/// The planner flies nothing, but finds the mistake before the flight.
+/// Checks that the planner reports a wrong UDP port of the autopilot in one line, before the flight.
 #[test]
 fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     let drone = include_str!("../../../examples/drone.toml");
@@ -793,7 +795,7 @@ fn a_case_is_told_as_what_it_means_for_the_drone() {
     }
 }
 
-/// Map numbers are rounded for people: millimetres, thousandths of a decibel, whole counts.
+/// Checks that numbers on a map are rounded for people: to mm, thousandths of a dB, or whole counts.
 #[test]
 fn a_map_has_rounded_numbers_with_units_in_their_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -853,7 +855,7 @@ fn a_map_has_rounded_numbers_with_units_in_their_names() {
     assert!(numbers > 20, "{text}");
 }
 
-/// Returns the paper's scenario followed by the lines or tables of `sections`.
+/// Writes a copy of `examples/scenario.toml` with the lines `sections` at the start of table `[power]`.
 fn with(sections: &str) -> tempfile::NamedTempFile {
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let text = std::fs::read_to_string(example("scenario.toml")).unwrap();
@@ -871,7 +873,9 @@ fn json_of(file: &tempfile::NamedTempFile) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// k T0 B F: 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, which is -94.96489 dBm.
+/// Checks the planner's noise power k T0 B F.
+///
+/// It is 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, which is -94.96489 dBm.
 #[test]
 fn the_noise_is_k_t_b_f_and_says_of_what() {
     let noisy = "\n[noise]\nbandwidth_hz = 20e6\nfigure_db = 6.0\n";

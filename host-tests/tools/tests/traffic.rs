@@ -22,14 +22,14 @@ use uav_relay_sim::simulator::traffic::{Flow, Traffic, TrafficSpec, traffic};
 use uav_relay_tools::plan::rate::Rates;
 use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
 
-/// Relative tolerance of the SIR of planned and of agreed positions.
+/// Relative tolerance of the chain's SIR, for planned and for simulated positions.
 const TOLERANCE: f64 = 1e-4;
 
 fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-/// Random scene, data link and number of relays.
+/// Random test case: scenario, data link and number of relays.
 struct Case {
     scenario: Scenario,
     radio: Radio,
@@ -111,7 +111,7 @@ impl Case {
         }
     }
 
-    /// Returns the planner's rates for both ways at once, bit/s, each with half of the time.
+    /// Returns the planner's data rates toward Rx and toward Tx, bit/s, when both share the time equally.
     fn both_bps(&self, plan: &Plan) -> [f64; 2] {
         let relays = u16::try_from(plan.places.len()).unwrap();
         let scene = Scene::new(&self.scenario, relays).unwrap();
@@ -120,7 +120,9 @@ impl Case {
         [&plan.sirs, &back].map(|sirs| self.radio.chain_bps(sirs) / 2.0)
     }
 
-    /// Sends packets through the simulated chain. `offered_bps` is `None` for the promised rate.
+    /// Simulates a chain of `relays` relays that carries packets, toward Rx or in `both` directions.
+    ///
+    /// `offered_bps` are the data rates offered; `None` for the rates that the chain promises.
     fn send(&self, relays: u16, both: bool, offered_bps: Option<[f64; 2]>) -> Traffic {
         let (mission, profiles) = mission::mission(&self.scenario, relays, TOLERANCE).unwrap();
         let setup = Setup {
@@ -152,10 +154,11 @@ impl Case {
     }
 }
 
-/// Returns the delivered share of the planner's rate, and checks its bounds and the count of packets.
+/// Returns the delivered data rate as a fraction of the planner's, and checks its limits.
 ///
-/// The rate at the agreed positions is never exceeded. These differ from the planned ones: the rate to Rx by the tolerance, and that
-/// of the way back, for which positions are not chosen, by up to `most`.
+/// It also checks that no packet is unaccounted for. The rate at the agreed positions is never exceeded. These differ
+/// from the planned ones: the rate to Rx by the tolerance, and that of the way back, for which positions are not
+/// chosen, by up to `most`.
 fn share(flow: &Flow, promised_bps: f64, most: f64, what: &str) -> f64 {
     let packets = flow.packets;
     let gone = packets.delivered + packets.dropped + packets.lost + flow.queued;

@@ -6,28 +6,28 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Stack use and calls of one function.
+/// Stack use of one function of an image, and the functions that it calls.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Function {
-    /// Linker name.
+    /// Name of the function as the linker has it, mangled.
     pub name: String,
     /// Size of the function's own stack frame, bytes.
     pub frame: u64,
-    /// Addresses of functions that it calls or jumps to.
+    /// Addresses of the functions that this function calls or jumps to.
     pub calls: BTreeSet<u64>,
-    /// True if the function calls through a pointer.
+    /// True if this function calls another one through a pointer.
     pub indirect: bool,
 }
 
-/// Reason why there is no bound.
+/// Reason why the stack of a function has no bound. Each variant has the function's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StackError {
-    /// A function can call itself, directly or not.
+    /// Error: the function with this name can call itself, directly or not.
     Recursion(String),
-    /// The stack frame of the function has no constant size.
+    /// Error: the stack frame of the function with this name has no constant size.
     Dynamic(String),
-    /// The function does not exist.
+    /// Error: no function of the image has this name.
     Unknown(String),
 }
 
@@ -43,7 +43,7 @@ impl std::fmt::Display for StackError {
 
 impl std::error::Error for StackError {}
 
-/// Functions of an image by address, and those whose address is a constant.
+/// Call graph of an image: its functions by address, and those that may be called through a pointer.
 #[derive(Clone, Debug, Default)]
 pub struct Calls {
     functions: BTreeMap<u64, Function>,
@@ -51,9 +51,10 @@ pub struct Calls {
 }
 
 impl Calls {
-    /// Parses `disassembly` (`llvm-objdump -d --no-show-raw-insn`).
+    /// Parses a `disassembly` by `llvm-objdump -d --no-show-raw-insn` into a call graph.
     ///
-    /// `constants` are the words of the read-only data, in which the address of a Thumb function has its lowest bit set.
+    /// `constants` are the words of the read-only data: an odd one that is a function's address plus 1 is a pointer
+    /// to that Thumb function.
     ///
     /// # Errors
     /// [`StackError::Dynamic`] for a function that moves the stack pointer by a register.
@@ -103,10 +104,10 @@ impl Calls {
             .ok_or_else(|| StackError::Unknown(name.to_owned()))
     }
 
-    /// Returns the largest stack of `name` and all functions it calls, bytes, and the call path.
+    /// Returns the largest stack of the function `name` with all its callees, bytes, and the call path.
     ///
     /// # Errors
-    /// [`StackError`] if the function does not exist or has no bound.
+    /// [`StackError`] if the function does not exist or its stack has no bound.
     pub fn deepest(&self, name: &str) -> Result<(u64, Vec<String>), StackError> {
         let mut known = BTreeMap::new();
         let from = self.address_of(name)?;
@@ -164,7 +165,7 @@ impl Calls {
     }
 }
 
-/// Parses `08000194 <name>:`.
+/// Parses the first line of a function, `08000194 <name>:`, into its address and name.
 fn heading(line: &str) -> Option<(u64, &str)> {
     let (address, rest) = line.split_once(" <")?;
     let name = rest.strip_suffix(">:")?;
@@ -199,13 +200,15 @@ fn instruction(line: &str, function: &mut Function) -> Result<(), StackError> {
     Ok(())
 }
 
-/// Returns the number of registers in `{r4, r5, lr}`; objdump does not abbreviate ranges here.
+/// Returns the number of registers in a list such as `{r4, r5, lr}`.
+///
+/// objdump does not abbreviate ranges in such a list.
 fn registers(operands: &str) -> u64 {
     let list = operands.split_once('{').map_or("", |(_, list)| list);
     list.split(',').count() as u64
 }
 
-/// Parses the number after `#` or `#-`, decimal or hexadecimal.
+/// Parses the number after `#` or `#-` in operands, decimal or hexadecimal, without its sign.
 fn immediate(operands: &str) -> Option<u64> {
     let (_, text) = operands.split_once('#')?;
     let text = text.trim_start_matches('-');
@@ -219,7 +222,7 @@ fn immediate(operands: &str) -> Option<u64> {
     }
 }
 
-/// Parses the address of `0x8000194 <name> @ imm = #0x10`.
+/// Parses the address in operands such as `0x8000194 <name> @ imm = #0x10`.
 fn target(operands: &str) -> Option<u64> {
     let word = operands
         .split([' ', ','])

@@ -3,25 +3,25 @@
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
-/// Folder of the files that all templates share, in the folder of the templates.
+/// Name of the folder with the files that all firmware templates share.
 const COMMON: &str = "common";
 
-/// Dependency on this crate in each template: its folder relative to that of the firmware.
+/// Dependency of each firmware template on this crate. The path is replaced when a template is written.
 const CRATE: &str = "path = \"../uav-relay\"";
 
-/// Main loops with a template, by the name of their folder.
+/// Names of the firmware templates, one for each kind of main loop, and of their folders.
 pub const TEMPLATES: [&str; 3] = ["blocking", "rtic", "embassy"];
 
-/// Returns the root of the checkout.
+/// Returns the root folder of this project's checkout.
 pub fn checkout() -> PathBuf {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
     own.ancestors().nth(2).unwrap_or(own).to_owned()
 }
 
-/// Writes the template `name` into `folder`, with a dependency on the crate of this checkout.
+/// Writes the firmware template `name` into `folder`, with a dependency on the crate of this checkout.
 ///
 /// # Errors
-/// If `folder` is not empty or inside this checkout, or if a file cannot be read or written.
+/// The folder is not empty or inside this checkout, or a file cannot be read or written.
 pub fn generate(name: &str, folder: &Path) -> io::Result<()> {
     if fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some()) {
         let text = format!("{} is not empty", folder.display());

@@ -14,7 +14,7 @@ use wasm_bindgen_cli_support::Bindgen;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// Scripts of the page, in an order in which each follows the scripts that it needs.
+/// Scripts of the page in loading order: each one follows the scripts that it uses.
 const SCRIPTS: [&str; 7] = [
     "drawing.js",
     "wish.js",
@@ -25,7 +25,9 @@ const SCRIPTS: [&str; 7] = [
     "page.js",
 ];
 
-/// First run of the page, as in its `wish.js`. Its outcome is embedded, so that it is visible before the code is loaded.
+/// Options of the run that the page shows first, the same as in its `wish.js`.
+///
+/// The result is embedded in the page, so that it is visible before the WebAssembly code is loaded.
 const FIRST_OPTIONS: &str = "--uavs 8 --method align";
 const FIRST_SCENARIO: &str = "[geometry]
 distance_m = 1000.0
@@ -48,7 +50,9 @@ Usage: cargo page
 It has no options but -h, --help; the target folder is that of CARGO_TARGET_DIR, else `target`
 ";
 
-/// Returns the text to print for command line arguments, and true for valid arguments. `None` without arguments.
+/// Returns the text to print for the command line arguments, and true if they are valid.
+///
+/// `None` without arguments: then the page is built.
 fn answer(arguments: &[String]) -> Option<(String, bool)> {
     match arguments {
         [] => None,
@@ -128,7 +132,7 @@ fn build() -> Result<PathBuf, Box<dyn Error>> {
     Ok(file)
 }
 
-/// Returns cargo's target folder: `target`, or that of `CARGO_TARGET_DIR` or of a configuration file.
+/// Returns cargo's target folder: `target`, or that of `CARGO_TARGET_DIR` or of the configuration.
 fn target_directory(cargo: &mut Command, root: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let output = cargo
         .current_dir(root)

@@ -111,15 +111,17 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Plan, requested number or SIR, and data rates.
+/// Result of planning: the plan, the request that it answers, and the data rates if requested.
 struct Planned {
-    /// `None` if no number of relays carries the target rate.
+    /// Planned positions; `None` if no number of relays carries the requested data rate.
     plan: Option<Plan>,
     number: Number,
     rates: Option<RateReport>,
 }
 
-/// Returns the data link if data rates are requested, by an option or by `[link]` in the file.
+/// Returns the data link if data rates are requested by an option, or if the scenario has `[link]`.
+///
+/// `None` if neither is so.
 fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failure> {
     let target_bps = options.wanted.target_rate_bps;
     let is_asked = options.rates || target_bps.is_some() || options.bandwidth_hz.is_some();
@@ -147,7 +149,7 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
     Ok(Some(radio))
 }
 
-/// Plans for a number of relays or an SIR, with data rates over `radio` if there is one.
+/// Plans for a number of relays or an SIR. Adds the data rates over the link `radio`, if there is one.
 fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Result<Planned, NoPlan> {
     let plan = plan::plan(scenario, ask)?;
     let rates = match radio {
@@ -223,7 +225,10 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
     }
 }
 
-/// Prints the report, and fails with its error message, if any.
+/// Prints the report as a table or as JSON.
+///
+/// # Errors
+/// The error message in the report, if it has one.
 fn show(options: &Options, report: &PlanReport) -> Result<(), Failure> {
     command::print(&if options.json {
         command::json(report)?
@@ -303,7 +308,7 @@ struct Wanted {
     target_rate_bps: Option<f64>,
 }
 
-/// Parses a position along the line; its range depends on the scenario.
+/// Parses a distance from Tx, m. The allowed range depends on the scenario, and is checked later.
 fn along(text: &str) -> Result<f64, String> {
     text.parse()
         .map_err(|_| "must be a number, metres from Tx".to_owned())
@@ -332,7 +337,9 @@ impl Options {
         }
     }
 
-    /// Returns the requested number of relays; 1 if a data rate is requested.
+    /// Returns the requested number of relays, or the SIR that the fewest relays shall reach.
+    ///
+    /// For a requested data rate it is 1 relay: the number of relays is then found by that rate.
     fn number(&self) -> Number {
         let wanted = &self.wanted;
         match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {
@@ -344,7 +351,9 @@ impl Options {
     }
 }
 
-/// Checks, before planning, that relays can fly the request by themselves.
+/// Checks the options that concern `--out` before planning, so that a mistake is found at once.
+///
+/// Relays choose x themselves and hold their altitude in a field, so options that say otherwise are rejected.
 fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let Some(file) = &options.out else {
         return Ok(());
@@ -376,7 +385,9 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes the scenario with the plan that its relays will fly, and returns the next command.
+/// Writes the file of `--out`: the scenario with the positions on which its relays will settle.
+///
+/// Returns the text that tells the user the next command; empty without `--out`.
 fn write_out(
     options: &Options,
     scenario: &Scenario,
@@ -438,7 +449,9 @@ fn write_out(
     ))
 }
 
-/// Loads the other sections of the scenario file, which must state the plan's number of relays or none.
+/// Loads the sections of the scenario file about the network and the companion computers.
+///
+/// If they state a number of relays, it must be `relays`.
 fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Deployment::default());

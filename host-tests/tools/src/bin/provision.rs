@@ -16,7 +16,7 @@ use uav_relay_tools::provision::config::{ADDRESS, LEN, MOST_PROBE_AFTER_MS, Secr
 use uav_relay_tools::provision::folder::{Heading, summary};
 use uav_relay_tools::provision::{block, folder};
 
-/// Options, completed with values of the scenario and its plan.
+/// Request of the user: the options, completed with values of the scenario and of its plan.
 struct Asked<'a> {
     options: &'a Options,
     scenario: Scenario,
@@ -26,7 +26,7 @@ struct Asked<'a> {
     uavs: u16,
     method: Method,
     tolerance: f64,
-    /// Silence before a neighbour is probed, ms; 0 for the default.
+    /// Silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
     probe_after_ms: u32,
 }
 
@@ -212,7 +212,10 @@ impl<'a> Asked<'a> {
             .asking_after(self.probe_after_ms))
     }
 
-    /// Returns the positions that the relays settle on, if needed. Rejects a hypothetical interferer that loses too much.
+    /// Predicts the positions on which the relays will settle; `None` if they are not needed or not known.
+    ///
+    /// # Errors
+    /// The plan in the scenario is out of date, or the hypothetical interferer costs too much SIR.
     fn flown(&self) -> Result<Option<Flown>, String> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
@@ -304,7 +307,9 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// Rejects a channel too slow for the relays when a silent neighbour is probed after `probe_after`.
+/// Checks that the radio channel is fast enough for `uavs` relays.
+///
+/// `probe_after` is the silence after which a relay probes a neighbour. Relays with wires have no channel.
 fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
     if options.wires {
         return Ok(());
@@ -450,7 +455,9 @@ fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
         .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
 }
 
-/// Reports options that override the section. Nobody then relies on a value in the file that is not used.
+/// Tells the user which options override the scenario's section `network`.
+///
+/// Then nobody relies on a value in the file that is not used.
 fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
     let say = |option: &str, key: &str| {
         command::complain(&format!("{option} replaces network.{key} of {name}"));
@@ -481,9 +488,10 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
     }
 }
 
-/// Returns the method of the command line or plan, else of section `network`, else `align`.
+/// Returns the method of the command line or plan, otherwise that of section `network`, or `align`.
 ///
-/// Rejects a plan made with a method other than the section's; reports an option that overrides the section.
+/// `of_file` is the section's. A plan made with another method is rejected; an option that overrides the section is
+/// reported.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,

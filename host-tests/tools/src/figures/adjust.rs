@@ -9,25 +9,25 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use super::walk::{Flown, fly};
 
-/// Number of relays.
+/// Number of relays in the figures of Algorithm 2.
 pub const RELAYS: u16 = 50;
 
-/// Initial altitude, m.
+/// Common altitude of the relays before Algorithm 2, m: the paper's best one.
 pub const START_M: f64 = 220.0;
 
-/// Largest change of altitude per round, m.
+/// Largest change of a relay's altitude in one round of Algorithm 2, m.
 pub const EXPLORE_M: f32 = 10.0;
 
-/// Rounds after which the chain is drawn.
+/// Numbers of rounds of Algorithm 2 after which the figure shows the relays' positions.
 pub const ROUNDS: [u16; 4] = [0, 10, 50, 500];
 
-/// Grid search, for comparison with the coarse-to-fine search.
+/// Search of each relay's best position on a grid, for comparison with the coarse-to-fine search.
 pub const GRID: Local = Local::Grid {
     columns: 41,
     rows: 21,
 };
 
-/// Position of a relay after a number of rounds.
+/// Table row: position of one relay after a number of rounds of Algorithm 2.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct ShapeRow {
     round: u16,
@@ -36,10 +36,10 @@ struct ShapeRow {
     altitude_m: f32,
 }
 
-/// SIR of the chain after one round.
+/// Table row: SIR of the chain after one round of Algorithm 2, with two kinds of search.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct RoundRow {
-    /// Round number; 0 is the chain of Algorithm 1.
+    /// Round number of Algorithm 2; 0 is the chain of Algorithm 1 before it.
     round: u16,
     /// SIR of the worst hop with the coarse-to-fine search, linear.
     sir_fine_linear: f32,
@@ -47,7 +47,9 @@ struct RoundRow {
     sir_grid_linear: f32,
 }
 
-/// Runs Algorithm 2 for `relays` relays from `altitude_m` on, with the interferer at (500, 150) m.
+/// Simulates at most `rounds` rounds of Algorithm 2, for `relays` relays that start at `altitude_m`.
+///
+/// Each relay searches its best position by `local`. The interferer is at (500, 150) m.
 pub fn adjusted(
     relays: u16,
     altitude_m: f64,
@@ -74,7 +76,7 @@ fn mission(relays: u16, altitude_m: f64) -> Result<Mission, FigureError> {
     paper::flown(&paper::altitudes(150.0, altitude_m), relays)
 }
 
-/// Returns the relays' positions after each of these numbers of rounds.
+/// Returns the relays' positions after each of these numbers of rounds of Algorithm 2.
 fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
     let chains: Result<Vec<Vec<ShapeRow>>, FigureError> = rounds
         .par_iter()
@@ -94,7 +96,9 @@ fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
     Ok(chains?.concat())
 }
 
-/// Returns the SIR after each round up to `rounds`; a search that has ended keeps its last SIR.
+/// Returns the chain's SIR after each round of Algorithm 2, from 0 to `rounds`, by both searches.
+///
+/// A search that has ended keeps its last SIR.
 fn rounds(rounds: u16) -> Result<Vec<RoundRow>, FigureError> {
     let (fine, grid) = rayon::join(
         || adjusted(RELAYS, START_M, rounds, Local::Fine),
@@ -132,7 +136,9 @@ fn taken() -> Vec<String> {
     ]
 }
 
-/// Describes the horizontal spacing at the head, middle and tail after a number of rounds.
+/// Formats the horizontal distances between two neighbours at the head, middle and tail of the chain.
+///
+/// They are those after `round` rounds of Algorithm 2.
 fn steps(rows: &[ShapeRow], round: u16) -> String {
     let x = |relay: u16| {
         let mut of = rows.iter().filter(|row| row.round == round);
@@ -142,7 +148,7 @@ fn steps(rows: &[ShapeRow], round: u16) -> String {
     format!("{head:.1} m, {middle:.1} m and {tail:.1} m for k = {round}")
 }
 
-/// Returns the figure of the positions.
+/// Computes the figure of the relays' positions after some rounds of Algorithm 2.
 pub fn shapes_sheet() -> Result<Sheet, FigureError> {
     let rows = shapes(&ROUNDS)?;
     let mut lines: Vec<Line> = ROUNDS
@@ -188,7 +194,7 @@ pub fn shapes_sheet() -> Result<Sheet, FigureError> {
     })
 }
 
-/// Returns the figure of the SIR by round.
+/// Computes the figure of the chain's SIR by round of Algorithm 2.
 pub fn rounds_sheet() -> Result<Sheet, FigureError> {
     let most = ROUNDS.iter().copied().fold(0, u16::max);
     let rows = rounds(most)?;

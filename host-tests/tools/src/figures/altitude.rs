@@ -9,35 +9,39 @@ use super::chart::{Axis, Chart, Line, Look, Panel, Stroke};
 use super::sheet::{FigureError, Sheet, Table};
 use super::{convergence, paper, walk};
 
-/// Number of relays.
+/// Number of relays in the figure of the SIR by altitude.
 pub const RELAYS: u16 = 50;
 
-/// Lateral offsets of the interferer, m.
+/// Distances of the interferer from the line Tx-Rx, m, one for each curve of the figure.
 pub const OFFSETS_M: [f64; 5] = [100.0, 150.0, 200.0, 300.0, 400.0];
 
-/// Offset of the paper's curve from which it reads h = 220 m.
+/// Distance of the interferer from the line, m, at which the paper reads a best altitude of 220 m.
 pub const PAPERS_OFFSET_M: f64 = 150.0;
 
-/// SIR at one altitude with one interferer.
+/// Table row: SIR of the chain at one common altitude, with the interferer at one offset.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     interferer_y_m: f64,
     altitude_m: f64,
     /// SIR of the worst hop by Algorithm 1, linear.
     sir_linear: f64,
-    /// SIR with the paper's step of 0.1, linear; only near the paper's best altitude.
+    /// SIR of the worst hop with the paper's fixed step of 0.1, linear.
+    ///
+    /// Only for altitudes near the paper's best one, otherwise `None`.
     sir_by_step_linear: Option<f64>,
 }
 
-/// Altitude range around the paper's best one that is computed in steps of 0.5 m, m.
+/// Lowest and highest altitude, m, of the close-up around the paper's best one, in steps of 0.5 m.
 const CLOSE_UP_M: (u32, u32) = (195, 230);
 
-/// Computes the chain for each pair of an interferer offset, m, and an altitude, m, 10 to 500.
+/// Computes a table row for each pair of an interferer's offset and a common altitude, both in m.
 fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }
 
-/// Returns the pairs that are drawn: 5 m apart per offset, denser around the paper's best altitude.
+/// Returns the pairs of interferer's offset and altitude, m, that are drawn.
+///
+/// Altitudes are 5 m apart; near the paper's best one and at its offset they are 0.5 m apart.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {
@@ -74,9 +78,10 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
     })
 }
 
-/// Returns the best common altitude, m, and SIR, linear. The interferer is at (500, `y_m`) m, the band is 20 m to 300 m.
+/// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// Scans every 5 m, then refines to 0.1 m by ternary search if that gains more than the tolerance of a chain.
+/// The interferer is at (500, `y_m`) m. Scans every 5 m, then refines to 0.1 m by ternary search if that gains more
+/// than the tolerance of a chain.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;
@@ -139,7 +144,7 @@ fn close_up(rows: &[Row]) -> Panel {
     }
 }
 
-/// Returns the figure.
+/// Computes the figure of the chain's SIR by the relays' common altitude.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&all_pairs())?;
     let of = |y_m: f64| {

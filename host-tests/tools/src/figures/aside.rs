@@ -10,47 +10,49 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
-/// Power of the relay, W.
+/// Power of the single relay, W.
 pub const RELAY_W: f64 = 0.5;
 
-/// Lowest and highest altitude, m.
+/// Lowest and highest altitude permitted to the relay, m.
 pub const ALTITUDES_M: (f64, f64) = (20.0, 300.0);
 
-/// Interferer offsets in the figure of positions, m.
+/// Distances of the interferer from the line Tx-Rx, m, one for each curve in the figure of positions.
 pub const OFFSETS_M: [f64; 4] = [50.0, 100.0, 150.0, 250.0];
 
-/// Largest lateral room to each side, m.
+/// Largest distance from the line permitted to the relay on each side, m, in the figure of positions.
 pub const MOST_ROOM_M: u16 = 400;
 
 const ROOM_STEP_M: u16 = 4;
 
-/// Lateral room in the figure of the gain, m: as large as the highest altitude.
+/// Largest distance from the line permitted to the relay on each side, m, in the figure of the gain.
+///
+/// It equals the highest altitude.
 pub const ROOM_M: f64 = 300.0;
 
-/// Largest interferer offset in the figure of the gain, m, and its step.
+/// Largest distance of the interferer from the line in the figure of the gain, m.
 const MOST_OFFSET_M: u16 = 400;
 const OFFSET_STEP_M: u16 = 5;
 
-/// Best position for one lateral room.
+/// Table row: best position of the relay for one limit of its distance from the line.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     interferer_y_m: f64,
     room_m: f64,
     x_m: f32,
     y_m: f32,
-    /// SIR of the worse hop, linear.
+    /// SIR of the worse of the two hops at the best position, linear.
     sir_linear: f32,
 }
 
-/// SIR with and without lateral and vertical freedom, for one interferer.
+/// Table row: best SIRs of a relay that may or may not leave the line, and the lowest altitude.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
     /// Best SIR of a relay above the line at the lowest altitude, linear.
     line_sir_linear: f32,
-    /// SIR above the line at a free altitude, linear.
+    /// Best SIR of a relay above the line at any permitted altitude, linear.
     altitude_sir_linear: f32,
-    /// Best SIR with a free lateral position at the lowest altitude, linear.
+    /// Best SIR of a relay at the lowest altitude that may leave the line, linear.
     side_sir_linear: f32,
     both_sir_linear: f32,
     both_altitude_m: f32,
@@ -74,7 +76,9 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
     Ok(found)
 }
 
-/// Returns the best positions at the lowest altitude for each offset, every `step_m` of room.
+/// Returns the relay's best positions at the lowest altitude, for each interferer's offset.
+///
+/// The distance from the line that the relay may use rises by `step_m`.
 fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
@@ -94,7 +98,9 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the SIRs with and without lateral and vertical freedom. The interferer's offset rises by `step_m`.
+/// Returns the relay's best SIRs if it may or may not leave the line, and the lowest altitude.
+///
+/// The interferer's distance from the line rises by `step_m`.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
@@ -122,7 +128,7 @@ fn taken() -> Vec<String> {
     )]
 }
 
-/// Returns the figure of the positions.
+/// Computes the figure of a single relay's best positions beside the line.
 pub fn places_sheet() -> Result<Sheet, FigureError> {
     let rows = data(ROOM_STEP_M)?;
     let lines = |of: fn(&Row) -> (f64, f64)| -> Vec<Line> {
@@ -171,7 +177,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
     })
 }
 
-/// Returns the figure of the gain.
+/// Computes the figure of the SIR gained if a single relay may leave the line, or the lowest altitude.
 pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {

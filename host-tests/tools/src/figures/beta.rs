@@ -7,25 +7,25 @@ use uav_relay::FieldPoint;
 use super::chart::{Axis, Chart, Line, Look};
 use super::sheet::{FigureError, Sheet, Table};
 
-/// Shape parameters alpha and beta.
+/// Shape parameters (alpha, beta) of the drawn Beta distributions.
 pub const SHAPES: [(f64, f64); 5] = [(1.5, 4.0), (2.0, 2.0), (3.0, 1.2), (4.0, 8.0), (8.0, 4.0)];
 
-/// Steps along the axis from 0 to 1.
+/// Number of equal steps in which the horizontal axis, from 0 to 1, is divided.
 pub const STEPS: u32 = 100;
 
-/// A point of a density.
+/// Table row: one point of the density of a Beta distribution.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     alpha: f64,
     beta: f64,
-    /// E[`I_max` / I] as used by relays: Upsilon times `I_max`.
+    /// Expected value E[`I_max` / I] of the distribution, as used by relays: Upsilon times `I_max`.
     upsilon_times_i_max: f64,
-    /// Interference as a fraction of `I_max`, 0 to 1.
+    /// Interference power I as a fraction of its maximum `I_max`, 0 to 1.
     interference_over_i_max: f64,
     density: f64,
 }
 
-/// Returns the densities at `steps` + 1 points each, from 0 to 1.
+/// Returns the densities of all distributions at `steps` + 1 equally spaced points from 0 to 1.
 fn data(steps: u32) -> Vec<Row> {
     let mut rows = Vec::new();
     for (alpha, beta) in SHAPES {
@@ -46,13 +46,15 @@ fn data(steps: u32) -> Vec<Row> {
     rows
 }
 
-/// Returns y^(alpha - 1) (1 - y)^(beta - 1) / B(alpha, beta); both shape parameters above 1.
+/// Returns the Beta density y^(alpha - 1) (1 - y)^(beta - 1) / B(alpha, beta) at `y`.
+///
+/// Both shape parameters must be above 1.
 fn density(alpha: f64, beta: f64, y: f64) -> f64 {
     let scale = lgamma(alpha + beta) - lgamma(alpha) - lgamma(beta);
     scale.exp() * y.powf(alpha - 1.0) * (1.0 - y).powf(beta - 1.0)
 }
 
-/// Returns the figure.
+/// Computes the figure of the Beta distributions of the interference power.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(STEPS);
     let lines = SHAPES

@@ -6,74 +6,76 @@ use plotters::coord::ranged1d::{
     KeyPointHint, KeyPointWeight, NoDefaultFormatting, Ranged, ValueFormatter,
 };
 
-/// Panels, stacked vertically, that share one legend.
+/// Chart: one or several pairs of axes, stacked vertically, with one common legend.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Chart {
-    /// Panels from top to bottom.
+    /// Panels of the chart from top to bottom; each has axes of its own.
     pub panels: Vec<Panel>,
 }
 
-/// A pair of axes and its lines.
+/// Panel of a chart: a pair of axes and the curves drawn in it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Panel {
-    /// Heading that distinguishes the panel; empty for a single panel.
+    /// Heading that tells this panel from the chart's others; empty for a single panel.
     pub heading: String,
     /// Horizontal axis.
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// Lines; later ones are drawn on top.
+    /// Curves in drawing order: later ones are on top.
     pub lines: Vec<Line>,
 }
 
-/// An axis.
+/// Axis of a chart's panel.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Axis {
-    /// Quantity and unit.
+    /// Label of the axis: quantity and unit.
     pub title: String,
-    /// Linear or logarithmic.
+    /// Scale of the axis, linear or logarithmic.
     pub kind: Kind,
-    /// End values; `None` to fit the data.
+    /// Values at the two ends of the axis; `None` to fit the data.
     pub ends: Option<(f64, f64)>,
 }
 
-/// A series of points.
+/// Curve of a chart: a series of points with a name and a style.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Line {
-    /// Name in the legend; lines of the same name share one entry, with the look of the first.
+    /// Name of the curve in the legend.
+    ///
+    /// Curves of the same name share one entry, in the style of the first.
     pub name: String,
-    /// Colour, stroke and signs.
+    /// Style of the curve: colour, stroke and markers.
     pub look: Look,
-    /// Points, all finite, in drawing order.
+    /// Points of the curve in drawing order, all finite.
     pub points: Vec<(f64, f64)>,
 }
 
-/// Look of a line. Lines of a chart differ in every field, so that no single one has to be recognised.
+/// Style of a curve. Curves of a chart differ in colour, stroke and marker, so one of these is enough.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
-    /// Index of the colour and its sign, 0 to 6.
+    /// Number of the colour, from 0 to 6, which also selects the shape of the markers.
     pub hue: usize,
-    /// Stroke between the points.
+    /// Stroke of the line between the points.
     pub stroke: Stroke,
-    /// Points that are drawn with a marker.
+    /// Choice of the points that get a marker.
     pub signs: Signs,
 }
 
-/// Points of a line that have a sign.
+/// Choice of the points of a curve that get a marker.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Signs {
-    /// Draws no signs.
+    /// Curve without markers.
     None,
-    /// Every point.
+    /// Marker at every point.
     All,
-    /// Points well apart in the picture, and the last one.
+    /// Markers at points that are well apart in the picture, and at the last point.
     Spaced,
 }
 
-/// Stroke between points.
+/// Stroke of the line between the points of a curve.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Stroke {
-    /// Draws only the signs.
+    /// Points are not connected; only their markers are drawn.
     None,
     /// Solid line.
     Full,
@@ -84,7 +86,7 @@ pub enum Stroke {
 }
 
 impl Axis {
-    /// Creates a linear axis.
+    /// Creates a linear axis with the label `title`, whose ends fit the data.
     pub fn linear(title: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -93,7 +95,7 @@ impl Axis {
         }
     }
 
-    /// Creates a logarithmic axis.
+    /// Creates a logarithmic axis with the label `title`, whose ends fit the data.
     pub fn log(title: &str) -> Self {
         Self {
             kind: Kind::Log,
@@ -101,7 +103,7 @@ impl Axis {
         }
     }
 
-    /// Sets the ends of the axis.
+    /// Sets the values at the two ends of the axis.
     pub fn between(self, from: f64, to: f64) -> Self {
         Self {
             ends: Some((from, to)),
@@ -120,7 +122,9 @@ impl Axis {
 }
 
 impl Look {
-    /// Returns look number `index`: colour, sign and stroke change from one to the next.
+    /// Returns the style of curve number `index` of a chart, from 0.
+    ///
+    /// Consecutive styles differ in colour, marker and stroke.
     pub const fn number(index: usize) -> Self {
         let stroke = match index % 3 {
             0 => Stroke::Full,
@@ -134,7 +138,7 @@ impl Look {
         }
     }
 
-    /// Draws signs well apart.
+    /// Changes the style to markers that are well apart in the picture.
     pub const fn spaced(self) -> Self {
         Self {
             signs: Signs::Spaced,
@@ -142,7 +146,7 @@ impl Look {
         }
     }
 
-    /// Draws no signs.
+    /// Changes the style to a curve without markers.
     pub const fn unsigned(self) -> Self {
         Self {
             signs: Signs::None,
@@ -150,14 +154,14 @@ impl Look {
         }
     }
 
-    /// Sets the stroke.
+    /// Changes the stroke of the line between the points.
     pub const fn joined(self, stroke: Stroke) -> Self {
         Self { stroke, ..self }
     }
 }
 
 impl Line {
-    /// Creates a line through `points`.
+    /// Creates a curve through `points`, with a name for the legend.
     pub fn new(name: &str, look: Look, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self {
             name: name.to_owned(),
@@ -168,7 +172,7 @@ impl Line {
 }
 
 impl Chart {
-    /// Creates a chart with one panel.
+    /// Creates a chart with a single panel.
     pub fn of(x: Axis, y: Axis, lines: Vec<Line>) -> Self {
         Self {
             panels: vec![Panel {
@@ -180,7 +184,7 @@ impl Chart {
         }
     }
 
-    /// Returns true if all numbers are finite, and positive on logarithmic axes.
+    /// Returns true if all points are finite, and positive on logarithmic axes.
     pub fn is_drawable(&self) -> bool {
         let fits = |axis: &Axis, value: f64| {
             value.is_finite() && (axis.kind == Kind::Linear || value > 0.0)
@@ -194,22 +198,24 @@ impl Chart {
 
 const STEPS: f64 = 6.0;
 
-/// Number of decades up to which 2 and 5 are labelled on a logarithmic axis.
+/// Largest number of decades on a logarithmic axis with labels at 2 and 5, too, not only at 1.
 const FEW_DECADES: f64 = 2.4;
 
-/// Tolerance of ticks beyond an end, as a fraction of the axis.
+/// Distance that a tick may lie beyond an end of the axis, as a fraction of its length.
+///
+/// It allows for rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Kind of axis.
+/// Scale of an axis, linear or logarithmic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// Linear axis.
     Linear,
-    /// Logarithmic; all values above 0.
+    /// Logarithmic axis; all its values are above 0.
     Log,
 }
 
-/// An axis with fixed ends.
+/// Axis with known end values, which positions and labels its ticks.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Scale {
     kind: Kind,
@@ -218,12 +224,14 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Creates an axis from `from` to `to`, finite, `from` < `to`, and positive on a logarithmic axis.
+    /// Creates an axis that begins at `from` and ends at `to`.
+    ///
+    /// Both are finite, `from` < `to`, and positive on a logarithmic axis.
     pub const fn new(kind: Kind, from: f64, to: f64) -> Self {
         Self { kind, from, to }
     }
 
-    /// Creates an axis that contains `least` to `most`, widened to the next round numbers.
+    /// Creates an axis for data from `least` to `most`, with its ends at the next round numbers.
     pub fn around(kind: Kind, least: f64, most: f64) -> Self {
         match kind {
             Kind::Linear => {
@@ -240,7 +248,9 @@ impl Scale {
         }
     }
 
-    /// Returns a tick label; large numbers of a logarithmic axis in thousands (k) and millions (M).
+    /// Returns the label of a tick at `value`.
+    ///
+    /// A logarithmic axis has large numbers in thousands (k) and millions (M).
     pub fn label(&self, value: f64) -> String {
         match self.kind {
             Kind::Log if value >= 1e6 => digits(value / 1e6) + " M",
@@ -284,7 +294,7 @@ impl Scale {
         }
     }
 
-    /// Returns these multiples of every power of ten within the axis, rising.
+    /// Returns the products of `multiples` and powers of ten that lie on the axis, in rising order.
     fn in_decades(&self, multiples: &[f64]) -> Vec<f64> {
         let (first, last) = (decade(self.from), decade(self.to));
         (first..=last)
@@ -294,19 +304,19 @@ impl Scale {
     }
 }
 
-/// Returns the exponent of the power of ten at or below `value` > 0.
+/// Returns the exponent of the largest power of ten that is at most `value`, which is above 0.
 #[expect(clippy::cast_possible_truncation, reason = "the exponent of an f64")]
 fn decade(value: f64) -> i32 {
     (value.log10() + ROUNDING).floor() as i32
 }
 
-/// Returns the step between ticks over `span`: 1, 2 or 5 times a power of ten.
+/// Returns the distance between ticks on an axis of length `span`: 1, 2 or 5 times a power of ten.
 fn step(span: f64) -> f64 {
     let least = span.max(f64::MIN_POSITIVE) / STEPS;
     round_number(least * (1.0 - ROUNDING), true)
 }
 
-/// Rounds up or down to 1, 2 or 5 times a power of ten.
+/// Rounds `value` to 1, 2 or 5 times a power of ten, upward if `up`, otherwise downward.
 fn round_number(value: f64, up: bool) -> f64 {
     let power = 10_f64.powi(decade(value));
     let mut candidates = [1.0, 2.0, 5.0, 10.0].map(|of| of * power).into_iter();

@@ -7,24 +7,24 @@ use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::sheet::{FigureError, Sheet, Table};
 use super::{paper, walk};
 
-/// Numbers of relays.
+/// Numbers of relays, one for each curve of the figure.
 pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 
-/// The paper's step of the target SIR, linear.
+/// Step by which the paper's Algorithm 1 lowers the target SIR in each sweep, linear.
 pub const STEP: f64 = 0.1;
 
-/// SIR of a chain after one sweep.
+/// Table row: SIR of a chain after one sweep of messages along it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
     sweep: u32,
-    /// Target SIR of every hop, linear.
+    /// Target SIR of every hop in this sweep, linear.
     target_linear: f32,
-    /// SIR of the worst hop with the relays as far toward Rx as the target allows, linear.
+    /// SIR of the worst hop, linear, with every relay as far toward Rx as the target allows.
     sir_linear: f64,
 }
 
-/// Returns the sweeps of each chain until it settles, thinned out for drawing.
+/// Returns the sweeps of each chain until it settles. Some are left out, because all are too many to draw.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let chains: Result<Vec<Vec<Row>>, FigureError> =
         relays.par_iter().map(|&relays| sweeps(relays)).collect();
@@ -48,7 +48,7 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Keeps every hundredth sweep, every tenth of the last thousand, and the last twenty.
+/// Selects sweeps to draw: the first, every hundredth, every tenth of the last 1 000, the last twenty.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()
@@ -63,7 +63,7 @@ fn thinned(rows: &[Row]) -> Vec<Row> {
         .collect()
 }
 
-/// Returns the figure.
+/// Computes the figure of the chain's SIR by sweep of Algorithm 1.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let lines = |from: u32| -> Vec<Line> {

@@ -10,31 +10,31 @@ use super::walk::{Flown, fly};
 use super::{convergence, paper};
 use uav_relay_scenario::Scenario;
 
-/// Numbers of relays.
+/// Numbers of relays for which the figure shows the cost.
 pub const RELAYS: [u16; 10] = [1, 2, 3, 5, 8, 14, 24, 40, 65, 100];
 
-/// Cost for one number of relays.
+/// Table row: cost until a chain of `relays` relays settles, by three ways to choose the target SIRs.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
-    /// Passes with the paper's step of 0.1.
+    /// Number of sweeps along the chain if the target SIR falls by the paper's step of 0.1.
     step_sweeps: u32,
     step_messages: u64,
     step_bytes: u64,
     step_sir_linear: f64,
-    /// Passes with bracketed targets, without prediction.
+    /// Number of sweeps along the chain if the target SIRs bracket the optimum, without a prediction.
     bracketed_sweeps: u32,
     bracketed_messages: u64,
     bracketed_bytes: u64,
     bracketed_sir_linear: f64,
-    /// Passes if the leader first solves the chain from the mission.
+    /// Number of sweeps along the chain if the leader first predicts the solution from the mission.
     predicted_sweeps: u32,
     predicted_messages: u64,
     predicted_bytes: u64,
     predicted_sir_linear: f64,
 }
 
-/// Simulates each chain with the three schedules.
+/// Simulates a chain of each number of relays, with each of three ways to choose the target SIRs.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     relays.par_iter().map(|&relays| row(relays)).collect()
 }
@@ -90,7 +90,7 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     }
 }
 
-/// Returns the figure.
+/// Computes the figure of the sweeps, messages and bytes until a chain settles.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let ratio = rows.last().map_or(0.0, |row| {

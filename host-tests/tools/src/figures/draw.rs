@@ -18,17 +18,19 @@ const LETTER: u32 = 17;
 const SAMPLE: u32 = 104;
 
 const FONT: &str = "Helvetica, Arial, 'DejaVu Sans', sans-serif";
-/// Font size; the backend divides it by 1.24.
+/// Font size of all text. The factor 1.24 makes up for the drawing backend, which divides by it.
 const LETTERS: f64 = 28.0 * 1.24;
 const INK: RGBColor = RGBColor(34, 34, 34);
 const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
 const PEN: u32 = 4;
 const APART: f64 = 105.0;
-/// Offset of the first sign per hue, units.
+/// Distance of a curve's first marker from its beginning, picture units per colour number.
+///
+/// Markers of curves that coincide are then side by side.
 const APART_BY_HUE: u8 = 25;
 
-/// Error message of the drawing backend.
+/// Error: the chart cannot be drawn, with the reason.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NotDrawn(pub String);
 
@@ -38,7 +40,7 @@ impl NotDrawn {
     }
 }
 
-/// Draws `chart` as SVG; `title` is for screen readers.
+/// Draws `chart` as SVG text; `title` is read by screen readers.
 pub fn draw(chart: &Chart, title: &str) -> Result<String, NotDrawn> {
     if !chart.is_drawable() {
         return Err(NotDrawn(
@@ -169,7 +171,9 @@ fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
     }
 }
 
-/// Returns the lengths of a dash and of the gap after it, units; no gap for a solid line.
+/// Returns the lengths of a stroke's dashes and gaps, in picture units.
+///
+/// The gap of a solid line is 0; `None` if no line is drawn.
 const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     match stroke {
         Stroke::None => None,
@@ -179,7 +183,7 @@ const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     }
 }
 
-/// Returns the legend entries: each name once, with the look of its first line.
+/// Returns the entries of the legend: each curve's name once, with the style of its first curve.
 fn entries(chart: &Chart) -> Vec<(&str, Look)> {
     let mut entries: Vec<(&str, Look)> = Vec::new();
     for line in chart.panels.iter().flat_map(|panel| &panel.lines) {
@@ -243,7 +247,7 @@ fn with_title(svg: &str, title: &str) -> String {
     }
 }
 
-/// Palette of Okabe and Ito, darkest first, without yellow, which is faint on paper.
+/// Colours of the curves: the palette of Okabe and Ito, black first, without its faint yellow.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),
@@ -256,13 +260,15 @@ const COLOURS: [RGBColor; 7] = [
 
 const SIZE: i32 = 9;
 
-/// Returns colour number `hue`, modulo the palette.
+/// Returns the colour with the number `hue`; the numbers begin again after the last colour.
 pub(super) fn colour_of_hue(hue: usize) -> RGBColor {
     let [black, ..] = COLOURS;
     COLOURS.get(hue % COLOURS.len()).copied().unwrap_or(black)
 }
 
-/// The sign of a hue: disc, square, diamond, triangle, cross, ring, inverted triangle.
+/// Marker of a point, with a shape for each colour.
+///
+/// The shapes are disc, square, diamond, triangle, cross, ring and inverted triangle.
 pub(super) struct Sign<C> {
     pub(super) at: C,
     pub(super) hue: usize,

@@ -9,10 +9,10 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
-/// Largest target, linear SIR; every whole number from 1 to it is computed.
+/// Largest target SIR of the figure, linear. Every whole number from 1 to it is computed.
 pub const MOST_TARGET: u16 = 40;
 
-/// Positions of the interferer, X and Y, m.
+/// Positions (X, Y) of the interferer, m, one for each curve of the figure.
 pub const PLACES_M: [(f64, f64); 6] = [
     (500.0, 400.0),
     (100.0, 400.0),
@@ -22,26 +22,28 @@ pub const PLACES_M: [(f64, f64); 6] = [
     (900.0, 100.0),
 ];
 
-/// Powers of the relays, W.
+/// Powers of the relays, W, one for each curve of the figure.
 pub const POWERS_W: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
 
-/// Result for one target in one scenario.
+/// Table row: fewest relays for one target SIR, with one interferer and one relay power.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     interferer_x_m: f64,
     interferer_y_m: f64,
     relay_w: f64,
     target_linear: u16,
-    /// Fewest relays that reach it, if any number does.
+    /// Smallest number of relays that reaches the target SIR; `None` if no number does.
     relays: Option<u16>,
 }
 
-/// Returns the fewest relays by target and position of the interferer, with relays of 1 W.
+/// Returns the fewest relays of 1 W for each position of the interferer and each target SIR.
 fn by_place(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &PLACES_M.map(|place| (place, 1.0)))
 }
 
-/// Returns the fewest relays by target and power of the relays, with the interferer at (500, 400) m.
+/// Returns the fewest relays for each relay power and each target SIR.
+///
+/// The interferer is at (500, 400) m.
 fn by_power(targets: &[u16]) -> Result<Vec<Row>, FigureError> {
     rows(targets, &POWERS_W.map(|power| ((500.0, 400.0), power)))
 }
@@ -93,7 +95,7 @@ fn chart(rows: &[Row], name: fn(&Row) -> String) -> Chart {
     )
 }
 
-/// Returns the figure of the smallest number of relays by the interferer's position.
+/// Computes the figure of the fewest relays for a target SIR, by the interferer's position.
 pub fn by_place_sheet() -> Result<Sheet, FigureError> {
     let rows = by_place(&all_targets())?;
     let at = |target: u16| {
@@ -129,7 +131,7 @@ pub fn by_place_sheet() -> Result<Sheet, FigureError> {
     })
 }
 
-/// Returns the figure by power of the relays.
+/// Computes the figure of the fewest relays for a target SIR, by the relays' power.
 pub fn by_power_sheet() -> Result<Sheet, FigureError> {
     let rows = by_power(&all_targets())?;
     Ok(Sheet {

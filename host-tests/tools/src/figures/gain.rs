@@ -9,13 +9,13 @@ use super::{paper, walk};
 use crate::baseline::{DRAWS, blind_places, equal_places, mean};
 use uav_relay_scenario::scene::Scene;
 
-/// Largest number of relays; every N from 1 to it is drawn.
+/// Largest number of relays in the figure; every number from 1 to it is drawn.
 pub const MOST_RELAYS: u16 = 100;
 
-/// Seed of the random chains; N relays use this seed plus N.
+/// Seed of the random chains: a chain of N relays uses this seed plus N.
 pub const SEED: u64 = 1000;
 
-/// SIRs and gains for one number of relays.
+/// Table row: SIRs of four placements, and the gains of Algorithm 1, for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
@@ -25,7 +25,7 @@ struct Row {
     random_sir_linear: f64,
     /// Standard error of `random_sir_linear`, linear.
     random_error_linear: f64,
-    /// SIR of the worst hop of the interference-blind chain, linear.
+    /// SIR of the worst hop if relays maximise the weakest signal and ignore interference, linear.
     blind_sir_linear: f64,
     /// SIR of the worst hop with equal spacing, linear.
     equal_sir_linear: f64,
@@ -34,7 +34,7 @@ struct Row {
     gain_over_equal_percent: f64,
 }
 
-/// Returns the results for these numbers of relays, against the mean of `draws` random chains.
+/// Returns a table row for each number of relays; the random mean is over `draws` chains.
 fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()
@@ -63,7 +63,7 @@ fn row(relays: u16, draws: u32) -> Result<Row, FigureError> {
     })
 }
 
-/// Returns the figure.
+/// Computes the figure of the gain of Algorithm 1 over placements that ignore the interferer.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let relays: Vec<u16> = (1..=MOST_RELAYS).collect();
     let rows = data(&relays, DRAWS)?;

@@ -11,36 +11,36 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use super::walk::fly;
 
-/// Numbers of relays.
+/// Numbers of relays for which the figure compares the methods.
 pub const RELAYS: [u16; 10] = [2, 5, 8, 12, 16, 20, 30, 50, 70, 100];
 
-/// Rounds of Algorithm 2.
+/// Largest number of rounds of Algorithm 2.
 pub const ROUNDS: u16 = 500;
 
 const OFFSET_M: f64 = 150.0;
 
-/// Results for one number of relays.
+/// Table row: SIRs and messages of three methods for one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
     common_altitude_m: f64,
-    /// SIR at the best common altitude by Algorithm 1, linear.
+    /// SIR of Algorithm 1 at the best common altitude, linear.
     common_sir_linear: f64,
-    /// SIR after Algorithm 2 from the common altitude, linear.
+    /// SIR of Algorithm 2, which starts from the best common altitude, linear.
     adjust_sir_linear: f64,
-    /// Messages of both algorithms together.
+    /// Number of messages that Algorithm 1 and then Algorithm 2 send.
     adjust_messages: u64,
-    /// SIR of the joint method, linear.
+    /// SIR of the joint method, which chooses positions and altitudes together, linear.
     joint_sir_linear: f64,
     joint_passes: u32,
     joint_messages: u64,
-    /// Gain of Algorithm 2 over the common altitude, percent.
+    /// SIR gain of Algorithm 2 over the best common altitude, percent.
     adjust_gain_percent: f64,
     /// SIR gain of the joint method over the best common altitude, percent.
     joint_gain_percent: f64,
 }
 
-/// Returns the results for these numbers of relays, with at most `rounds` rounds of Algorithm 2.
+/// Returns a table row for each number of relays, with at most `rounds` rounds of Algorithm 2.
 fn data(relays: &[u16], rounds: u16) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()
@@ -67,7 +67,7 @@ fn row(relays: u16, rounds: u16) -> Result<Row, FigureError> {
     })
 }
 
-/// Returns the figure.
+/// Computes the figure that compares a common altitude, Algorithm 2 and the joint method.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS, ROUNDS)?;
     let line = |name: &str, index: usize, value: fn(&Row) -> f64| {

@@ -9,7 +9,7 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
-/// Power of Tx, W, and position of the interferer, m, for each line.
+/// Power of Tx, W, and position (X, Y) of the interferer, m, for each curve of the figure.
 pub const CHOICES: [(f64, (f64, f64)); 4] = [
     (20.0, (30.0, 30.0)),
     (20.0, (30.0, 60.0)),
@@ -22,20 +22,20 @@ pub const DISTANCE_M: f64 = 35.0;
 
 const FINENESS: u8 = 20;
 
-/// Equal-SIR altitudes at one position, with one interferer.
+/// Table row: altitudes at one x at which both hops of a single relay have the same SIR.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     tx_w: f64,
     interferer_x_m: f64,
     interferer_y_m: f64,
     x_m: f32,
-    /// Lower altitude of equal SIR, m, if any.
+    /// Lower altitude at which both hops have the same SIR, m; `None` if there is none.
     lower_altitude_m: Option<f32>,
-    /// Upper altitude of equal SIR, m, if any.
+    /// Upper altitude at which both hops have the same SIR, m; `None` if there is none.
     upper_altitude_m: Option<f32>,
 }
 
-/// Returns the mission of one relay of 1 W.
+/// Returns the mission of one relay of 1 W, for a power of Tx, W, and an interferer's position, m.
 pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, FigureError> {
     let scenario = Scenario {
         distance_m: DISTANCE_M,
@@ -45,7 +45,7 @@ pub fn mission((tx_w, (x_m, y_m)): (f64, (f64, f64))) -> Result<Mission, FigureE
     paper::mission(&scenario, 1)
 }
 
-/// Returns the altitudes at `per_m` positions per metre from Tx to Rx.
+/// Returns the altitudes of equal SIR at `per_m` positions per metre of the line Tx-Rx.
 fn data(per_m: u8) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for choice in CHOICES {
@@ -70,7 +70,7 @@ fn data(per_m: u8) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the figure.
+/// Computes the figure of the positions at which both hops of a single relay have the same SIR.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(FINENESS)?;
     let mut lines = Vec::new();

@@ -37,16 +37,16 @@ pub mod walk;
 
 use sheet::{FigureError, Sheet};
 
-/// A figure.
+/// Figure that `cargo figures` can make, with its name.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure {
-    /// Name on the command line, and of its file without `.svg`.
+    /// Name of the figure on the command line, and of its file without `.svg`.
     pub name: &'static str,
-    /// Function that makes the figure.
+    /// Function that computes the figure.
     pub make: fn() -> Result<Sheet, FigureError>,
 }
 
-/// The figures in the order of the paper, then this project's own.
+/// Figures that `cargo figures` can make: those of the paper in its order, then this project's own.
 pub const ALL: [Figure; 16] = [
     figure("locus", locus::sheet),
     figure("single", single::sheet),

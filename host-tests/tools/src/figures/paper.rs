@@ -5,16 +5,18 @@ use uav_relay::Mission;
 use super::sheet::FigureError;
 use uav_relay_scenario::{Interference, Scenario, Source, mission};
 
-/// Relative target tolerance for chains computed without messages: ten times the resolution of an f32.
+/// Relative tolerance of the target SIR, for chains computed without messages.
+///
+/// It is some ten times the relative spacing of f32 numbers.
 pub(super) const FINE: f64 = 1e-6;
 
-/// Relative target tolerance for simulated chains, as in `cargo chain`.
+/// Relative tolerance of the target SIR, for simulated chains: the default of `cargo chain`.
 const FLOWN: f64 = 1e-4;
 
-/// Returns the multi-hop scenario (fourth and fifth sub-table).
+/// Returns the paper's multi-hop scenario, with the parameters of its fourth and fifth sub-table.
 ///
-/// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no least separation: Algorithms 1 and 4 as
-/// printed have none, and 4 m would not bind at any of the optima.
+/// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no least separation:
+/// Algorithms 1 and 4 as printed have none, and 4 m would not bind at any of the optima.
 pub fn multi_hop() -> Scenario {
     Scenario {
         min_separation_m: 0.0,
@@ -22,7 +24,7 @@ pub fn multi_hop() -> Scenario {
     }
 }
 
-/// Returns the scenario of the paper's section on altitudes.
+/// Returns the scenario of the paper's section on altitudes, with relays at `altitude_m`.
 ///
 /// The interferer is at (500, `y_m`) m, altitudes are 20 m to 300 m, and relays are at least 4 m apart.
 pub fn altitudes(y_m: f64, altitude_m: f64) -> Scenario {
@@ -34,7 +36,7 @@ pub fn altitudes(y_m: f64, altitude_m: f64) -> Scenario {
     }
 }
 
-/// Returns `scenario` with an interferer of 80 W at (`x_m`, `y_m`).
+/// Returns `scenario` with a single interferer of 80 W at (`x_m`, `y_m`), m.
 pub fn with_interferer(scenario: Scenario, x_m: f64, y_m: f64) -> Scenario {
     Scenario {
         interference: Interference::Sources(vec![Source {
@@ -47,11 +49,15 @@ pub fn with_interferer(scenario: Scenario, x_m: f64, y_m: f64) -> Scenario {
 }
 
 /// Returns the mission of `relays` relays in `scenario`, for a chain computed without messages.
+///
+/// The relative tolerance of its target SIR is 1e-6.
 pub fn mission(scenario: &Scenario, relays: u16) -> Result<Mission, FigureError> {
     Ok(mission::mission(scenario, relays, FINE)?.0)
 }
 
 /// Returns the mission of `relays` relays in `scenario`, for a simulated chain.
+///
+/// The relative tolerance of its target SIR is 1e-4, the default of `cargo chain`.
 pub fn flown(scenario: &Scenario, relays: u16) -> Result<Mission, FigureError> {
     Ok(mission::mission(scenario, relays, FLOWN)?.0)
 }

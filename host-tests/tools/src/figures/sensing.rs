@@ -10,41 +10,41 @@ use crate::listening::{
 };
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Random scenes per line.
+/// Number of random scenes for each curve of the figure with interferers that do not move.
 pub const SCENES: u64 = 60;
 /// Number of random scenes for each speed of a moving interferer.
 pub const PASSES: u64 = 6;
 
-/// Speeds of the interferer, m/s.
+/// Speeds of the moving interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// Share of the optimum after a number of agreements.
+/// Table row: SIR relative to the optimum after a number of agreements, over many scenes.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct Found {
     scene: &'static str,
     relays: u16,
-    /// Number of agreements based on measurements.
+    /// Number of agreements on positions that used measurements of the interference.
     agreements: usize,
-    /// Median over the scenes of the share of the optimum, linear.
+    /// Median over the scenes of SIR / optimum, linear.
     median_linear: f64,
-    /// Share of the optimum that nine of ten scenes reach, linear.
+    /// Ratio SIR / optimum that nine of ten scenes reach, linear.
     tenth_linear: f64,
 }
 
-/// Mean share of the optimum for one speed.
+/// Table row: mean SIR relative to the optimum while the interferer moves at one speed.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct Tracked {
     relays: u16,
     speed_mps: f64,
-    /// Mean ratio to the optimum at the same moment, for the chain that tracks the interferer.
+    /// Mean of SIR / optimum at the same moment, for a chain that tracks the interferer, linear.
     followed_linear: f64,
-    /// Mean ratio to the optimum at the same moment, for the chain that keeps its first positions.
+    /// Mean of SIR / optimum at the same moment, for a chain that keeps its first positions, linear.
     stayed_linear: f64,
 }
 
 type Run = fn(&RandomScene) -> Result<Setup, FigureError>;
 
-/// Kinds of scene: name, relays, sources, setup.
+/// Kinds of scenes, each with its name, number of relays, number of interferers, and setup function.
 const KINDS: [(&str, u16, usize, Run); 6] = [
     ("3 relays, one source", 3, 1, unknown),
     ("8 relays, one source", 8, 1, unknown),
@@ -54,7 +54,7 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ("8, two sources, hypothetical one", 8, 2, hypothetical),
 ];
 
-/// Returns the share by agreement, in `scenes` scenes each.
+/// Returns SIR / optimum after each number of agreements, over `scenes` random scenes of each kind.
 fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
@@ -72,7 +72,7 @@ fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the share by speed, in `scenes` scenes each.
+/// Returns mean SIR / optimum for each speed of the interferer, over `scenes` random scenes each.
 fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {
@@ -89,7 +89,9 @@ fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the figure of the SIR lost by the number of agreements, and of the share kept by speed.
+/// Computes the figure of chains that must locate an unknown interferer.
+///
+/// The first panel has the SIR lost by the number of agreements, the second the SIR kept by the interferer's speed.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
     let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {

@@ -12,36 +12,36 @@ use uav_relay_scenario::mission::Refusal;
 use super::chart::Chart;
 use super::draw::{NotDrawn, draw};
 
-/// A figure.
+/// Figure that is ready to be written: chart, tables and text.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sheet {
-    /// Name on the command line, and of its file without `.svg`.
+    /// Name of the figure on the command line, and of its file without `.svg`.
     pub name: &'static str,
-    /// Title.
+    /// Title of the figure.
     pub title: &'static str,
-    /// Findings that the figure shows, one paragraph each.
+    /// Findings that the figure shows; each is a paragraph of its caption.
     pub says: Vec<String>,
-    /// Parameters of the figure; those that the paper omits are marked.
+    /// Parameters with which the figure is computed, and notes on those that the paper omits.
     pub taken: Vec<String>,
-    /// Chart.
+    /// Chart of the figure, written as an SVG file.
     pub chart: Chart,
-    /// Tables, written as CSV files.
+    /// Tables with the figure's numbers, written as CSV files.
     pub tables: Vec<Table>,
-    /// Short table beside the chart: head, then rows.
+    /// Cells of a short table in the figure's caption: a row of headings, then the other rows.
     pub shown: Vec<Vec<String>>,
 }
 
-/// A table.
+/// Table of a figure's numbers, in CSV format.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Table {
-    /// Name of its file without `.csv`.
+    /// Name of the table's file without `.csv`.
     pub name: &'static str,
-    /// CSV text: a header line, then the rows.
+    /// Content of the table as CSV text: a header line, then the rows.
     pub rows: String,
 }
 
 impl Table {
-    /// Creates the table of `rows`; the head has the names of their fields.
+    /// Creates a table of `rows`. The column headings are the names of the rows' fields.
     ///
     /// # Errors
     /// [`FigureError::Table`] if a row cannot be serialised, [`FigureError::NotFinite`] if a number is not finite.
@@ -66,7 +66,7 @@ impl Table {
 }
 
 impl Sheet {
-    /// Returns the CSV file of `table`, with title and parameters as comments.
+    /// Returns the content of the CSV file of `table`, with the figure's title and parameters as comments.
     pub fn csv(&self, table: &Table) -> String {
         let mut text = format!("# {}\n", self.title);
         for line in &self.taken {
@@ -82,7 +82,7 @@ h2{font-size:1.15rem;margin:0 0 .5rem}figcaption{max-width:46rem}p,ul{margin:.5r
 .taken{color:#555;font-size:.9rem}table{border-collapse:collapse;font-size:.85rem;margin:.7rem 0}\
 th,td{border-bottom:1px solid #ccc;padding:.15rem .7rem .15rem 0;text-align:right}th:first-child,td:first-child{text-align:left}";
 
-/// Writes a figure's picture and tables to `dir`.
+/// Writes a figure's picture (SVG) and tables (CSV) to the folder `dir`.
 pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
     let svg = draw(&sheet.chart, sheet.title)?;
     write(&dir.join(format!("{}.svg", sheet.name)), &svg)?;
@@ -92,7 +92,7 @@ pub fn write_sheet(dir: &Path, sheet: &Sheet) -> Result<(), FigureError> {
     Ok(())
 }
 
-/// Writes `index.html` with the figures of `sheets` to `dir`; returns the file's path.
+/// Writes the page `index.html` with all figures to the folder `dir`; returns the page's path.
 pub fn write_index(dir: &Path, sheets: &[Sheet]) -> Result<PathBuf, FigureError> {
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>uav-relay: figures</title>\n\
@@ -173,23 +173,23 @@ fn escape(words: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// Error of making a figure. The numbers are fixed, so any error except `File` is a bug.
+/// Reason why a figure cannot be made. The inputs are fixed, so any reason except `File` is a bug.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum FigureError {
-    /// The scenario is not a valid mission.
+    /// Error: the scenario of the figure is not a valid mission, for this reason.
     Mission(Refusal),
-    /// A relay rejects its settings.
+    /// Error: a relay rejects the settings of the figure, for this reason.
     Setup(SetupError),
-    /// The target cannot be met, or the simulated chain has not settled.
+    /// Error: a target SIR cannot be met, or a simulated chain has not settled. The text names the chain.
     Unsettled(&'static str),
-    /// The chart could not be drawn.
+    /// Error: the chart of the figure cannot be drawn, for this reason.
     Drawing(NotDrawn),
-    /// A table could not be written.
+    /// Error: a table of the figure cannot be written as CSV, for this reason.
     Table(csv::Error),
-    /// A table contains a number that is not finite.
+    /// Error: the table with this file name contains a number that is not finite.
     NotFinite(String),
-    /// A file could not be written.
+    /// Error: the file with this path cannot be written, for this reason.
     File(String, std::io::Error),
 }
 

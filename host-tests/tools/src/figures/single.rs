@@ -11,38 +11,40 @@ use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::sheet::{FigureError, Sheet, Table};
 use crate::baseline::{DRAWS, blind_places, equal_places, mean};
 
-/// Powers of Tx and of the relay in the figure, W.
+/// Powers of Tx and of the relay, W, one pair for each panel of the figure.
 pub const REALISATIONS: [(f64, f64); 2] = [(100.0, 0.5), (80.0, 2.0)];
 
-/// First and last altitude, m, in steps of 1 m.
+/// First and last altitude of the figure, m; the step between is 1 m.
 pub const ALTITUDES_M: (u32, u32) = (10, 50);
 
-/// Seed of the random positions; each altitude uses this seed plus the altitude in metres.
+/// Seed of the relay's random positions: each altitude uses this seed plus the altitude in metres.
 pub const SEED: u64 = 2000;
 
-/// Results for one altitude and one pair of powers.
+/// Table row: SIRs of a single relay at different positions, for one altitude and pair of powers.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     tx_w: f64,
     relay_w: f64,
     altitude_m: u32,
     x_m: f32,
-    /// SIR of the worse hop at the best position, linear.
+    /// SIR of the worse hop with the relay at its best position (Theorem 1), linear.
     sir_linear: f32,
-    /// Mean SIR of the worse hop over random positions, linear.
+    /// Mean SIR of the worse hop over random positions of the relay, linear.
     random_sir_linear: f64,
-    /// Standard error of that mean, linear.
+    /// Standard error of `random_sir_linear`, linear.
     random_error_linear: f64,
-    /// Mean SIR over random positions, in dB.
+    /// Mean over random positions of the worse hop's SIR in dB.
     random_sir_db: f64,
-    /// Mean of log2(1 + SIR) over random positions, bit/s/Hz.
+    /// Mean over random positions of log2(1 + SIR) of the worse hop, bit/s/Hz.
     random_rate_bit_per_s_hz: f64,
-    /// SIR at the interference-blind position, linear.
+    /// SIR of the worse hop with the relay where the weaker received signal is strongest, linear.
+    ///
+    /// That position ignores the interference.
     blind_sir_linear: f64,
     middle_sir_linear: f64,
 }
 
-/// Returns the dual-hop scenario of the paper's third sub-table.
+/// Returns the paper's dual-hop scenario (its third sub-table), with one relay at `altitude_m`.
 pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
     let altitude_m = f64::from(altitude_m);
     Scenario {
@@ -62,7 +64,9 @@ pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
     }
 }
 
-/// Returns the results for each pair of powers and altitude, against `draws` random positions.
+/// Returns a table row for each pair of powers (Tx, relay) and altitude.
+///
+/// The mean over random positions is that of `draws` positions.
 fn data(powers_w: &[(f64, f64)], altitudes_m: &[u32], draws: u32) -> Result<Vec<Row>, FigureError> {
     let choices: Vec<(f64, f64, u32)> = powers_w
         .iter()
@@ -102,43 +106,45 @@ fn row(tx_w: f64, relay_w: f64, altitude_m: u32, draws: u32) -> Option<Row> {
 // The paper prints an average gain in SIR of 30.14 % over a random position and of 25.73 % over the interference-blind method,
 // and up to 65 %, without the powers. This file computes many powers and several ways of averaging.
 
-/// Transmit powers of Tx in the figure, W.
+/// Powers of Tx, W, for which the average gain of one relay is computed.
 pub const TX_W: [f64; 17] = [
     5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 31.5, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0,
     200.0,
 ];
 
-/// Powers of the relay, W.
+/// Powers of the relay, W, for which its average gain is computed.
 pub const RELAY_W: [f64; 17] = [
     0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0,
 ];
 
-/// Printed averages, percent: over random, over the blind method.
+/// Average gains that the paper prints, percent: over random positions, and over the blind method.
+///
+/// The blind method ignores the interference.
 pub const PRINTED_PERCENT: (f64, f64) = (30.14, 25.73);
 
 const PRINTED_LARGEST_PERCENT: f64 = 65.0;
 
-/// Difference up to which an average counts as the printed one, percentage points.
+/// Largest difference between a computed and a printed average that counts as equal, percentage points.
 const NEAR: f64 = 0.5;
 
-/// Quantity that is averaged over the altitudes.
+/// Interpretation of the paper's "average gain": the quantity that is averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub enum Reading {
-    /// Gain in linear SIR at each altitude.
+    /// Average gain as the mean, over the altitudes, of the gains in linear SIR.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Linear SIR; the gain is that of the means.
+    /// Average gain as the gain of the mean linear SIR over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
-    /// SIR in dB; the gain is that of the means.
+    /// Average gain as the gain of the mean SIR in dB over the altitudes.
     #[serde(rename = "gain of mean dB")]
     Decibels,
-    /// log2(1 + SIR); the gain is that of the means.
+    /// Average gain as the gain of the mean log2(1 + SIR) over the altitudes.
     #[serde(rename = "gain of mean log2(1 + SIR)")]
     Rates,
 }
 
-/// The four readings.
+/// List of all interpretations of the paper's "average gain".
 pub const READINGS: [Reading; 4] = [
     Reading::LinearGains,
     Reading::LinearMeans,
@@ -157,24 +163,32 @@ impl Reading {
     }
 }
 
-/// Gains over other positions, by one kind of average ([`Reading`]), for one pair of powers.
+/// Table row: gains of the best position over other positions, for one pair of powers.
+///
+/// They are averaged over the altitudes in the way that `reading` states.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct GainRow {
     tx_w: f64,
     relay_w: f64,
     reading: Reading,
-    /// Gain over a random position, percent; none if the mean in dB is not above 0.
+    /// Average gain over a random position, percent.
+    ///
+    /// `None` if the random position's average is not above 0, as an average in dB may be.
     over_random_percent: Option<f64>,
-    /// Gain over the interference-blind position, percent.
+    /// Average gain over the position that ignores the interference, percent.
+    ///
+    /// `None` if that position's average is not above 0, as an average in dB may be.
     over_blind_percent: Option<f64>,
     over_middle_percent: Option<f64>,
-    /// Largest gain over random at one altitude, percent of linear SIR.
+    /// Largest gain in linear SIR over a random position among all altitudes, percent.
     largest_over_random_percent: f64,
-    /// Largest gain over the blind position at one altitude, percent of linear SIR.
+    /// Largest gain in linear SIR over the position that ignores the interference, percent.
     largest_over_blind_percent: f64,
 }
 
-/// Returns every reading for every pair of these powers, over these altitudes.
+/// Returns the average gains for every pair of powers (Tx, relay), W, and every kind of average.
+///
+/// The averages are over the altitudes, m; random positions are averaged over `draws`.
 fn gains(
     tx_w: &[f64],
     relay_w: &[f64],
@@ -193,7 +207,9 @@ fn gains(
         .collect())
 }
 
-/// Returns the quantity of a reading at the best, random, blind and middle positions for one altitude.
+/// Returns the quantity that `reading` averages, at four positions of the relay, for one altitude.
+///
+/// The positions are the best one, a random one, the one that ignores interference, and the middle.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
     let linear = [
         f64::from(row.sir_linear),
@@ -215,7 +231,9 @@ fn four(row: &Row, reading: Reading) -> [f64; 4] {
     }
 }
 
-/// Evaluates a reading over the altitudes of one pair of powers; `None` without rows.
+/// Averages the gains in `rows`, the altitudes of one pair of powers, as `reading` states.
+///
+/// `None` without rows.
 fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     let first = rows.first()?;
     let percent = |best: f64, under: f64| 100.0 * (best / under - 1.0);
@@ -252,9 +270,10 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger difference of a row from the paper's two averages, percentage points.
+/// Returns the larger of a row's two differences from the averages that the paper prints.
 ///
-/// With `middle` the second average is that over the relay in the middle, instead of the blind method.
+/// It is in percentage points. The second average is that over the blind method, or over the relay in the middle if
+/// `middle`.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent
@@ -267,7 +286,7 @@ fn off(row: &GainRow, middle: bool) -> f64 {
     from(row.over_random_percent, PRINTED_PERCENT.0).max(from(other, PRINTED_PERCENT.1))
 }
 
-/// Describes which readings reproduce the printed averages.
+/// Describes in two paragraphs how many computed averages agree with those that the paper prints.
 fn findings(gains: &[GainRow]) -> Vec<String> {
     let least = |reading: Reading| {
         let of = gains.iter().filter(|row| row.reading == reading);
@@ -300,7 +319,9 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// Returns the nearest pair of powers per reading. The linear readings of the drawn pairs follow.
+/// Returns the cells of the table in the caption: the printed averages, and the nearest computed ones.
+///
+/// For each kind of average it has the pair of powers with the smallest difference. The drawn pairs follow.
 fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",
@@ -380,7 +401,7 @@ fn panel(rows: &[Row], (tx_w, relay_w): (f64, f64)) -> Panel {
     }
 }
 
-/// Returns the figure, with the table of average gains.
+/// Computes the figure of a single relay at its best position, with the table of average gains.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let altitudes: Vec<u32> = (ALTITUDES_M.0..=ALTITUDES_M.1).collect();
     let rows = data(&REALISATIONS, &altitudes, DRAWS)?;

@@ -10,42 +10,42 @@ use super::sheet::{FigureError, Sheet, Table};
 use super::{convergence, paper, walk};
 use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 
-/// Numbers of relays.
+/// Numbers of relays, one for each curve of the figure.
 pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];
 
-/// Seed of the uneven field.
+/// Seed of the random values in the uneven field of interference.
 pub const SEED: u64 = 4;
 
 const SPACING_M: u32 = 20;
 
 const ALPHA: f64 = 3.0;
 
-/// Largest interference power as a multiple of Lambda.
+/// Largest interference power `I_max` as a multiple of Lambda, the power received from 1 W below.
 const MOST: f64 = 2.0;
 
-/// Kind of field.
+/// Kind of interference field, by Upsilon = E[1 / I] along x.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Upsilon from 0.6 / Lambda to 1 / Lambda.
+    /// Field whose Upsilon varies along x between 0.6 / Lambda and 1 / Lambda.
     Uneven,
-    /// Upsilon 0.8 / Lambda everywhere.
+    /// Field whose Upsilon is 0.8 / Lambda everywhere.
     Even,
 }
 
-/// Expected SIR of a chain after one sweep.
+/// Table row: expected SIR of a chain after one sweep of messages along it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     field: Kind,
     relays: u16,
     sweep: u32,
-    /// Target expected SIR of every hop, linear.
+    /// Target expected SIR of every hop in this sweep, linear.
     target_linear: f32,
-    /// Expected SIR of the worst hop, linear.
+    /// Expected SIR of the worst hop after this sweep, linear.
     sir_linear: f64,
 }
 
-/// A point of the field.
+/// Table row: distribution of the interference power at one x of the interference field.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PointRow {
     field: Kind,
@@ -53,7 +53,7 @@ struct PointRow {
     /// First shape parameter of the Beta distribution of I / `I_max`.
     alpha: f64,
     beta: f64,
-    /// Largest interference power, W.
+    /// Largest interference power `I_max`, W.
     i_max_w: f64,
 }
 
@@ -63,7 +63,7 @@ fn lambda_w(mission: &Mission) -> f64 {
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// Returns the points of the field.
+/// Returns the points of the field, at which the interference's distribution is given.
 fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;
@@ -84,7 +84,7 @@ fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     })
 }
 
-/// Returns the mission of `relays` relays in the field.
+/// Returns the mission of `relays` relays in the interference field `kind`.
 pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     let points = field(kind)?;
     let spec = Field {
@@ -105,7 +105,7 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     paper::mission(&scenario, relays)
 }
 
-/// Returns the sweeps of both fields for these numbers of relays, until each chain settles.
+/// Returns a table row for each sweep of every chain, in both fields and for each number of relays.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for field in [Kind::Uneven, Kind::Even] {
@@ -125,7 +125,9 @@ fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the final SIRs with the paper's step, a tenth of it, and bracketed targets.
+/// Returns the cells of the table in the caption: final SIRs by three ways to choose the target SIRs.
+///
+/// These are the paper's step, a tenth of it, and targets that bracket the optimum.
 fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     let mut rows = vec![
         ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]
@@ -157,7 +159,7 @@ fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the line of one chain, with its last sweep extended to the end of the picture.
+/// Returns the curve of one chain, SIR by sweep; its last SIR is extended to the end of the picture.
 fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     let of = rows
         .iter()
@@ -176,7 +178,7 @@ fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     Line::new(&format!("N = {relays}"), Look::number(index), points)
 }
 
-/// Returns the figure.
+/// Computes the figure of the expected SIR by sweep of Algorithm 4, in an uneven and an even field.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let panel = |heading: &str, field: Kind| Panel {

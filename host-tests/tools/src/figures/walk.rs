@@ -12,18 +12,19 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::sheet::FigureError;
 
-/// Positions of identical relays.
+/// Chain of identical relays: their positions and its SIR.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Chain {
-    /// Positions from Tx to Rx.
+    /// Positions of the relays in order from Tx to Rx.
     pub places: Vec<Placement>,
     /// SIR of the worst hop, linear.
     pub sir: f64,
 }
 
-/// Returns the chain with every hop as long as `target` (linear, > 0) allows. `None` if a hop cannot meet the target.
+/// Places each relay as far along the chain as the target SIR `target` (linear, > 0) allows.
 ///
-/// If the target is too high, the chain ends short of its end, with a lower SIR on the last hop. Work: N reaches.
+/// `None` if a hop cannot meet the target. If the target is too high, the last relay is far from the end of the
+/// chain, and the last hop has a lower SIR. Work: one farthest position for each of N relays.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     let profile = mission.config().common;
     let mut from = PerTarget::from(
@@ -62,18 +63,22 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     Some(Chain { places, sir })
 }
 
-/// A sweep of the paper's schedule.
+/// Sweep (pass of messages along the chain) of Algorithm 1: its target SIR and the resulting chain.
+///
+/// The target falls by the paper's fixed step.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the sweep, from 1.
     pub number: u32,
-    /// Target SIR of every hop, linear.
+    /// Target SIR of every hop in this sweep, linear.
     pub target: f32,
-    /// Chain stretched for the target; `None` if a hop cannot meet it.
+    /// Chain with each relay as far as the target allows; `None` if a hop cannot meet the target.
     pub chain: Option<Chain>,
 }
 
-/// Returns the sweeps of Algorithm 1 (Algorithm 4 in a field) until the chain settles. `step` is in linear SIR.
+/// Returns all sweeps of Algorithm 1 (Algorithm 4 in a field) until the chain settles.
+///
+/// `step` is the decrease of the target SIR from one sweep to the next, linear.
 pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
@@ -123,7 +128,7 @@ pub fn settled(mission: &Mission) -> Result<Chain, FigureError> {
     stretched(mission, agreed.target).ok_or(FigureError::Unsettled("a chain"))
 }
 
-/// Returns the SIR of the worst hop of identical relays at `places`, linear; 0 if empty.
+/// Returns the SIR of the worst hop of identical relays at `places`, linear; 0 without relays.
 pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
     let power_w = mission.config().common.power_w;
     let standing: Vec<(Placement, Profile)> = places
@@ -143,24 +148,26 @@ pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
     sirs.into_iter().reduce(f64::min).unwrap_or(0.0)
 }
 
-/// Result of a settled chain.
+/// Result of a simulated chain that has settled.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
-    /// Positions from Tx to Rx.
+    /// Positions of the relays in order from Tx to Rx.
     pub places: Vec<Placement>,
     /// SIR of the worst hop, linear.
     pub sir: f64,
-    /// SIR before Algorithm 2 and after each of its rounds, linear.
+    /// SIR of the worst hop before Algorithm 2 and after each of its rounds, linear.
     pub rounds: Vec<f32>,
-    /// Passes along the chain.
+    /// Number of sweeps of messages along the chain.
     pub sweeps: u32,
-    /// Frames sent on all links.
+    /// Number of frames sent on all links.
     pub messages: u64,
-    /// Bytes sent on all links.
+    /// Number of bytes sent on all links.
     pub bytes: u64,
 }
 
-/// Simulates `mission` until it settles; `predict` lets the leader first solve the chain itself.
+/// Simulates the chain of `mission` until it settles.
+///
+/// With `predict` the leader first solves the whole chain from the mission.
 pub fn fly(
     mission: &Mission,
     method: Method,

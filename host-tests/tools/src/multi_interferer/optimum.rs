@@ -3,28 +3,33 @@
 use uav_relay_scenario::hypothetical::{Centre, graded};
 use uav_relay_scenario::scene::Scene;
 
-/// Relative bracket width at which the bisection of the target ends.
+/// Relative width of the bracket of the best target SIR at which the bisection ends.
 const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
 
-/// Relative rounding allowance on the least separation. A thousand relays that just fit are accepted.
+/// Relative allowance for rounding on the least separation.
+///
+/// Without it a thousand relays that just fit on the line could be rejected.
 const ROUNDING: f64 = 1e-12;
 
-/// A chain and its SIR.
+/// Best chain of relays at one altitude: their positions and the SIR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
-    /// Positions from Tx to Rx, (x, h) in metres. x in [0, D], rising by at least the least separation (less 1e-12 of it, for
-    /// rounding).
+    /// Positions (x, altitude) of the relays from Tx to Rx, m.
+    ///
+    /// x is in [0, D] and rises by at least the least separation (less 1e-12 of it, for rounding).
     pub places: Vec<(f64, f64)>,
-    /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`].
+    /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
-    /// SIR of the best chain without a least separation; equals `sir` where the separation does not bind.
+    /// SIR of the best chain without a least separation, linear.
+    ///
+    /// It equals `sir` where the separation does not restrict the chain.
     pub free_sir: f64,
 }
 
 impl Chain {
-    /// Returns true if the least separation, which the chain keeps, costs more than a millionth of the SIR.
+    /// Returns true if the least separation between relays costs more than a millionth of the SIR.
     pub fn separation_binds(&self) -> bool {
         self.sir < self.free_sir * (1.0 - 1e-6)
     }
@@ -33,14 +38,15 @@ impl Chain {
 /// Returns the best chain of relays at one common altitude, with any powers; exact except for rounding.
 ///
 /// Tested to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
-/// (`of_one_source_it_is_the_optimum_of_the_reference`, `brute_force_finds_the_same` in `host-tests/tests/several`).
+/// (`of_one_source_it_is_the_optimum_of_the_reference`, `brute_force_finds_the_same` in
+/// `host-tests/tests/multi_interferer`).
 ///
-/// If the least separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a position when
-/// another hop is the bottleneck. `None` without relays or interferers, if altitudes differ, if the relays do not fit on the
-/// line, and if no chain has an SIR above zero (an interferer at Rx).
+/// If the least separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a
+/// position when another hop is the bottleneck. `None` without relays or interferers, if altitudes differ, if the
+/// relays do not fit on the line, and if no chain has an SIR above zero (an interferer at Rx).
 ///
-/// Work: about 50 targets, twice with a least separation. For each target: some thousand points of the line per change of power
-/// along the chain, and a few intervals per relay.
+/// Work: about 50 targets, twice with a least separation. For each target: some thousand points of the line per
+/// change of power along the chain, and a few intervals per relay.
 pub fn optimum(scene: &Scene) -> Option<Chain> {
     let altitude_m = scene.relays.first()?.altitude_m;
     let same = |other: f64| other.total_cmp(&altitude_m).is_eq();
@@ -48,7 +54,7 @@ pub fn optimum(scene: &Scene) -> Option<Chain> {
     alike.then(|| at_altitude(scene, altitude_m)).flatten()
 }
 
-/// Returns the best chain at `altitude_m`, m, > 0, whatever the altitudes in the scene.
+/// Returns the best chain with all relays at `altitude_m` (> 0), whatever their altitudes in `scene`.
 pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
     let line = Line::new(scene, altitude_m);
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
@@ -68,7 +74,9 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
     })
 }
 
-/// Returns the best target (linear) with the least separation, to a relative `tolerance`. `None` as for [`optimum`].
+/// Returns the SIR of the best chain at `altitude_m` that keeps the least separation, linear.
+///
+/// `tolerance` is relative. `None` as for [`optimum`].
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)
@@ -106,20 +114,23 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
     Some(below)
 }
 
-/// Number of scanned altitudes with equal spacing; as many again have equal ratios.
+/// Number of steps of the scan over altitudes: so many of equal length, and so many of equal ratio.
 const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;
 
-/// Golden-section steps per refined maximum. The interval shrinks by about 5e-6, the loss in SIR by its square.
+/// Number of golden-section steps that refine a maximum over altitude.
+///
+/// The interval shrinks by about 5e-6, the loss in SIR by its square.
 const STEPS: u32 = 25;
 
 const COMMON_TOLERANCE: f64 = 1e-11;
 
-/// Returns the best chain whose relays share one altitude of the band. Never worse than at either end of the band.
+/// Returns the best chain whose relays share one altitude of the scene's band.
 ///
-/// Scans the band and refines the three highest maxima; a narrower maximum between scanned altitudes may be missed. `None` as for
-/// [`optimum`](super::optimum()), if a relay has a fixed altitude of its own, and for an empty band. Work: about 120 optima.
+/// It is never worse than at either end of the band. Scans the band and refines the three highest maxima; a narrower
+/// maximum between scanned altitudes may be missed. `None` as for [`optimum`](super::optimum()), if a relay has a
+/// fixed altitude of its own, and for an empty band. Work: about 120 optima.
 pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     let band = scene.band;
     if scene.relays.iter().any(|relay| relay.holds) || !(band.least_m <= band.most_m) {
@@ -156,7 +167,9 @@ pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     at_altitude(scene, best.0)
 }
 
-/// Returns the altitudes of the scan in rising order; a single one if the band is a point.
+/// Returns the altitudes from `least` to `most` to scan, m, in rising order.
+///
+/// It is a single one if both are equal.
 fn altitudes(least: f64, most: f64) -> Vec<f64> {
     let shares = (0..=SCANNED).map(|i| f64::from(i) / f64::from(SCANNED));
     let mut altitudes: Vec<f64> = shares
@@ -173,7 +186,7 @@ fn altitudes(least: f64, most: f64) -> Vec<f64> {
     altitudes
 }
 
-/// Returns the best argument found by golden-section search on [`low`, `high`], and its value.
+/// Maximises `f` on [`low`, `high`] by golden-section search. Returns the best argument and its value.
 pub(super) fn golden(
     mut low: f64,
     mut high: f64,
@@ -206,12 +219,14 @@ pub(super) fn golden(
 // d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
 // target can be bisected.
 
-/// Feasible hop: from a relay anywhere in `from`, some position of the next relay in `to` is reached.
+/// Feasible hop to the next relay, as two intervals of x.
+///
+/// From each x in `from` the hop reaches some x in `to` at the target SIR.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     from: Span,
     to: Span,
-    /// The receiver position in `to` with the farthest reach back.
+    /// Receiver position in `to` that allows the sender nearest to Tx.
     farthest: f64,
 }
 
@@ -220,18 +235,20 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Feasible positions of every relay for one target, computed from Rx; the first hop is unchecked.
+/// Feasible positions of every relay for one target SIR, computed from Rx to Tx.
+///
+/// The hop from Tx to the first relay is not checked.
 pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
     target: f64,
-    /// Stages of relays N - 1 down to 1.
+    /// Feasible hops sent by relays N - 1, N - 2, and so on to 1, in this order.
     before: Vec<Stage>,
-    /// Positions of relay 1 that are feasible for the hops after it.
+    /// Positions of relay 1 from which the rest of the chain can meet the target.
     first: Vec<Span>,
 }
 
-/// Hop ranges for one stride, computed once for consecutive relays of equal power.
+/// Cache of hop ranges at one target SIR and sender's power, for consecutive relays of equal power.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -239,10 +256,10 @@ struct Reach {
 }
 
 impl<'a> Stages<'a> {
-    /// Computes the feasible positions of each relay for `target` (linear, > 0), `apart` metres apart.
+    /// Computes the feasible positions of each relay for the SIR `target` (linear, > 0).
     ///
-    /// `None` if a relay has none. Work: a scan of the line's nodes per change of power along the chain, and a few intervals per
-    /// relay.
+    /// Relays are at least `apart` metres apart. `None` if a relay has no feasible position. Work: a scan of the
+    /// line's nodes per change of power along the chain, and a few intervals per relay.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
         let (last, others) = line.scene.relays.split_last()?;
         let mut spans = vec![Span {
@@ -277,15 +294,16 @@ impl<'a> Stages<'a> {
         })
     }
 
-    /// Returns true if the first hop meets the target as well.
+    /// Returns true if the whole chain meets the target, with the hop from Tx to the first relay.
     pub(super) fn is_met(&self) -> bool {
         let best = self.line.best_first(&self.first);
         best.is_some_and(|x| self.line.first_sir(x) >= self.target)
     }
 
-    /// Returns a chain that meets the target if [`Stages::is_met`], rising in x. `None` if the sets are not connected.
+    /// Returns the x of each relay, m, in a chain that meets the target if [`Stages::is_met`].
     ///
-    /// Each relay is as near to an even division of the remaining distance as the target allows.
+    /// They rise from Tx to Rx. Each relay is as near to an even division of the remaining distance as the target
+    /// allows. `None` if the feasible positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;
@@ -307,7 +325,9 @@ impl<'a> Stages<'a> {
         }))
     }
 
-    /// Returns the position of the next relay nearest to `wish` that hears a relay at `x`.
+    /// Returns the feasible x of the next relay that is nearest to `wish`, with its sender at `x`.
+    ///
+    /// `None` if no feasible hop starts at `x`.
     fn next_place(&self, stage: &Stage, x: f64, wish: f64) -> Option<f64> {
         let steps = stage.steps.iter().filter(|step| step.from.contains(x));
         let places = steps.map(|step| {
@@ -321,7 +341,9 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the positions from which the next relay, somewhere in `spans`, can be reached.
+/// Returns the feasible hops to receivers in `spans`, with the ranges `reach`.
+///
+/// Each is at least `apart` metres long.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -342,7 +364,9 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns the last point from `sure` toward `wish` at which `holds` is true. `holds` must be true at `sure`.
+/// Returns the last point from `sure` toward `wish` up to which `holds` is true.
+///
+/// `holds` must be true at `sure`.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(wish) {
         wish
@@ -351,23 +375,29 @@ fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
     }
 }
 
-/// Cell width relative to the distance to the nearest source.
+/// Distance between samples of the interference, relative to the distance to the nearest interferer.
 const STEP: f64 = 0.02;
 
 const CELLS: f64 = 500.0;
 
-/// Line above the ground at one altitude. Its samples catch every turn of the interference.
+/// Line of possible relay positions at one altitude above Tx-Rx, with samples of the interference.
+///
+/// The samples are dense enough to show every minimum and maximum of the interference.
 pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Inverse amplitude r = (I + N)^(-1/2) of interference plus noise at the nodes, W^(-1/2).
+    /// Values r = (I + N)^(-1/2) at the nodes, W^(-1/2), with interference power I and noise power N.
+    ///
+    /// The range of a hop is proportional to r at its receiver.
     quiet: Vec<f64>,
     slope: Vec<f64>,
     tops: Vec<f64>,
 }
 
-/// Hop range at some target SIR, per unit of r at the receiver: range = `stride` times r, m.
+/// Ratio of a hop's range, m, to r = (I + N)^(-1/2) at its receiver.
+///
+/// It depends on the target SIR and the sender's power. I and N are the powers of interference and noise, W.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stride(f64);
 
@@ -416,7 +446,7 @@ impl<'a> Line<'a> {
         (quiet, -0.5 * quiet * change / power)
     }
 
-    /// Returns half the relative slope of the first hop's SIR at `x`, 1/m.
+    /// Returns half of the derivative of ln(SIR) of the hop from Tx to a relay at `x`, 1/m.
     fn first_rise(&self, x: f64) -> f64 {
         let (quiet, slope) = self.quiet_and_slope(x);
         slope / quiet - x / (x * x + self.altitude_m * self.altitude_m)
@@ -426,7 +456,7 @@ impl<'a> Line<'a> {
         self.scene.sir_at(self.scene.tx(), (x, self.altitude_m))
     }
 
-    /// Returns the position in `spans` with the best first hop; `None` if there are no spans.
+    /// Returns the x in `spans` with the largest SIR of the hop from Tx; `None` if there are no spans.
     pub(super) fn best_first(&self, spans: &[Span]) -> Option<f64> {
         let ends = spans.iter().flat_map(|span| [span.low, span.high]);
         let inside = |x: &&f64| spans.iter().any(|span| span.contains(**x));
@@ -434,17 +464,21 @@ impl<'a> Line<'a> {
             .max_by(|&a, &b| self.first_sir(a).total_cmp(&self.first_sir(b)))
     }
 
-    /// Returns the stride of a relay with `power_w` watts at `target` (linear, > 0).
+    /// Returns the range factor of hops from a relay of `power_w` W, for the SIR `target` (linear, > 0).
     pub(super) fn stride(&self, power_w: f64, target: f64) -> Stride {
         Stride((power_w / (self.scene.mu_los * target)).sqrt())
     }
 
-    /// Returns the sender position nearest to Tx that a receiver at `x` still hears; may lie behind Tx.
+    /// Returns the sender position nearest to Tx from which a receiver at `x` gets the target SIR, m.
+    ///
+    /// The result may lie behind Tx (below 0).
     pub(super) fn heard_from(&self, stride: Stride, x: f64) -> f64 {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// Returns the local minima of [`Line::heard_from`] inside the line.
+    /// Returns the receiver positions at which [`Line::heard_from`] has a local minimum.
+    ///
+    /// There the sender can be nearest to Tx.
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
         // The slope of `heard_from` is 1 - stride x slope of the quiet.
         let level = 1.0 / stride.0;
@@ -453,7 +487,7 @@ impl<'a> Line<'a> {
         }))
     }
 
-    /// Returns the receiver positions whose hop range is at least `apart` metres (>= 0).
+    /// Returns the intervals of receiver positions with a hop range of at least `apart` metres (>= 0).
     pub(super) fn hearing(&self, stride: Stride, apart: f64) -> Vec<Span> {
         let level = apart / stride.0;
         let turns = crossings(&self.nodes, &self.quiet, level, |x| {
@@ -474,10 +508,10 @@ impl<'a> Line<'a> {
         spans
     }
 
-    /// Returns the position nearest to Tx at which the last relay meets `target` at Rx. The relay has `power_w` watts; `target` is
-    /// linear and above 0.
+    /// Returns the x nearest to Tx at which the last relay meets the SIR `target` at Rx, m.
     ///
-    /// At least 0; `None` if the target is missed even above Rx.
+    /// The relay has `power_w` watts; `target` is linear and above 0. At least 0; `None` if the target is missed even
+    /// above Rx.
     pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
         let scene = self.scene;
         let squared = power_w / (scene.eta * target * (scene.interference_rx_w() + scene.noise_w));
@@ -486,13 +520,13 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the falling crossings: points where the function drops below the level.
+/// Returns the positions of those crossings at which the function falls below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()
 }
 
-/// The interval [low, high]; a point where they are equal.
+/// Closed interval [low, high] of x, m; a single point if both are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     pub(super) low: f64,
@@ -555,19 +589,20 @@ mod tests {
     }
 }
 
-/// Bisection steps: more than enough to collapse any f64 interval in metres to adjacent numbers.
+/// Largest number of bisection steps; fewer reduce any f64 interval in metres to adjacent numbers.
 const HALVINGS: u32 = 200;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     pub(super) at: f64,
-    /// True if the function is below the level before the crossing and not below it after.
+    /// True if the function rises through the level at this point, false if it drops below it.
     pub(super) rising: bool,
 }
 
-/// Returns the crossings of `level` by `exact` in rising order. `values` are those at the rising `nodes`.
+/// Returns the points, in rising order, at which the function `exact` crosses `level`.
 ///
-/// Two crossings within one cell are missed. Work: about 60 evaluations per crossing.
+/// `values` are those of the function at the rising `nodes`. Two crossings between neighbouring nodes are missed.
+/// Work: about 60 evaluations per crossing.
 pub(super) fn crossings(
     nodes: &[f64],
     values: &[f64],
@@ -588,9 +623,10 @@ pub(super) fn crossings(
         .collect()
 }
 
-/// Returns the last point from `inside` towards `outside` at which `holds` is still true. Either direction.
+/// Returns the last point from `inside` towards `outside` at which `holds` is still true.
 ///
-/// `holds` must be true at `inside` and false at `outside`; if it changes more than once, one of the changes is found.
+/// `outside` may be the lower or the higher one. `holds` must be true at `inside` and false at `outside`; if it
+/// changes more than once, one of the changes is found.
 pub(super) fn boundary(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = inside.midpoint(outside);

@@ -9,48 +9,52 @@ use uav_relay_scenario::scene::{Corridor, Place, Relay, Scene, Sender};
 
 const ROUNDS: u32 = 200;
 
-/// Least relative gain for a round to count as progress.
+/// Smallest relative gain in SIR for a round of the search to count as progress.
 const GAIN: f64 = 1e-6;
 
-/// Rounds without progress before the search ends: a single one may only prepare the gain of the next.
+/// Number of consecutive rounds without progress after which the search ends.
+///
+/// It is above 1, because a round without progress may prepare the gain of the next.
 const PATIENCE: u32 = 3;
 
-/// Positions along x that are scanned before the best is refined.
+/// Number of equal steps in which the range along x is scanned before the best position is refined.
 const PLACES: u32 = 16;
 
-/// Altitudes and lateral positions scanned in the first round. Later rounds search this fraction of the range on either side.
+/// Number of equal steps in which the first round scans the altitudes, and the lateral positions.
+///
+/// Later rounds search only one such step on either side of the present value.
 const LEVELS: u32 = 8;
 
-/// Golden-section steps: the interval shrinks by about 1e-7.
+/// Number of golden-section steps that refine a maximum: the interval shrinks by about 1e-7.
 const STEPS: u32 = 34;
 
-/// Result of the local search.
+/// Result of the local search: the improved chain and its SIR.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polished {
-    /// Positions from Tx to Rx.
+    /// Positions of the relays from Tx to Rx.
     pub places: Vec<Place>,
-    /// SIR (linear) of the worst hop, by [`Scene::hop_sirs`].
+    /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
-    /// Number of rounds, the last one included; each is a pass along the chain and one back.
+    /// Number of rounds of the search; in each, all relays move in turn from Tx to Rx and back.
     pub rounds: u32,
 }
 
-/// The move of one relay while its neighbours are fixed.
+/// Search of one relay's best position while its two neighbours stay where they are.
 struct Turn<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
     before: Sender,
     next: Option<Place>,
-    /// Least distance from the previous relay, m; 0 from Tx.
+    /// Least distance from the previous relay, m; 0 if the relay receives from Tx.
     apart_before: f64,
 }
 
-/// Returns the chain reached from `start` by moving relays within `room`; never worse than `start`.
+/// Improves the chain `start` by moving one relay at a time within the limits `room`.
 ///
-/// Order and least separation are kept if the start has them; a relay with a fixed altitude moves along x and sideways only. At
-/// most 200 rounds, fewer when three in a row gain less than a millionth each. A round is 2 N moves, a move about 50 SIRs at one
-/// altitude, 2 400 in a band and as many again with lateral room. `None` unless the start has one position per relay and at least
-/// one relay.
+/// The result is never worse than `start`. Order and least separation are kept if the start has them; a relay with a
+/// fixed altitude moves along x and sideways only. At most 200 rounds, fewer when three in a row gain less than a
+/// millionth each. A round is 2 N moves, a move about 50 SIRs at one altitude, 2 400 in a band and as many again with
+/// lateral room. `None` unless the start has one position per relay and at least one relay.
 pub fn polish(
     scene: &Scene,
     start: &[impl Copy + Into<Place>],
@@ -83,7 +87,9 @@ pub fn polish(
     })
 }
 
-/// Moves relay `at` (from 0) if a better position is found.
+/// Moves relay `at` (from 0) if that raises the SIR of the worse of its two hops.
+///
+/// `window` is the fraction of the altitude and lateral ranges that is searched on either side.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
     let relays = &scene.relays;
     let (Some(&own), Some(relay)) = (places.get(at), relays.get(at)) else {
@@ -119,7 +125,10 @@ impl Turn<'_> {
         heard.min(fed)
     }
 
-    /// Returns the best position found from `own`, first upward and then sideways, and its SIR. 0 if there is no room.
+    /// Returns the best position found for the relay, and the SIR of its worse hop.
+    ///
+    /// It first tries other altitudes and then other lateral positions than those of `own`. The SIR is 0 if no
+    /// position is allowed.
     fn best(&self, own: Place, room: Corridor, window: f64) -> (Place, f64) {
         let start = if self.relay.holds {
             own.h
@@ -145,7 +154,7 @@ impl Turn<'_> {
         best
     }
 
-    /// Returns the best position found at altitude `h` and lateral position `y`, and its SIR.
+    /// Returns the relay's best x at altitude `h` and lateral position `y`, and the SIR of its worse hop.
     fn best_at(&self, y: f64, h: f64) -> (Place, f64) {
         let (low, high) = self.room(y, h);
         if !(low <= high) {
@@ -166,7 +175,9 @@ impl Turn<'_> {
         }
     }
 
-    /// Returns the range along x open to the relay at altitude `h` and lateral position `y`, m. Reversed if there is no room.
+    /// Returns the smallest and largest x allowed to the relay at altitude `h` and lateral position `y`, m.
+    ///
+    /// The first is above the second if no x is allowed.
     fn room(&self, y: f64, h: f64) -> (f64, f64) {
         let ahead = |apart: f64, other: Place| {
             let across = (y - other.y).powi(2) + (h - other.h).powi(2);
@@ -185,7 +196,10 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
     if other.1 > one.1 { other } else { one }
 }
 
-/// Returns the best of `at` within a `window` of the range around `own`. A scan and a refinement of its maximum.
+/// Finds the altitude or lateral position near `own` that maximises the SIR of `at`.
+///
+/// Returns the relay's position and SIR there. `window` is the fraction of the range `least` to `most` that is
+/// searched on either side.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

@@ -15,19 +15,19 @@ use super::config::{
     Secret, Sites, autopilot_key, read, secret, write,
 };
 
-/// Reason for which a block cannot be built.
+/// Reason why a drone's configuration block cannot be built.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum BlockError {
-    /// The scenario is not a valid mission.
+    /// Error: the scenario is not a valid mission, for this reason.
     Refused(Refusal),
-    /// The field has this many points, more than a block can hold.
+    /// Error: the interference field has this many points, more than a block can hold.
     Points(usize),
-    /// The drone would reject the block.
+    /// Error: the drone would reject the configuration, for this reason.
     Config(ConfigError),
-    /// The drone would reject the sites.
+    /// Error: the drone would reject the sites of Tx and Rx, for this reason.
     Course(CourseError),
-    /// The drone would read back a different configuration.
+    /// Error: the drone would read a different configuration from the block.
     Changed,
 }
 
@@ -86,7 +86,7 @@ impl fmt::Display for BlockError {
 
 impl std::error::Error for BlockError {}
 
-/// Configuration that all drones of one flight share.
+/// Configuration of all drones of one flight, from which the block of each is built.
 #[derive(Clone, Debug)]
 pub struct Flight {
     mission: Mission,
@@ -100,12 +100,14 @@ pub struct Flight {
     sites: Option<Sites>,
     autopilot_key: Option<[u8; 32]>,
     network: u16,
-    /// Silence before a neighbour is probed, ms; 0 for the firmware's default.
+    /// Silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
     probe_after_ms: u32,
 }
 
 impl Flight {
-    /// Creates the flight of `uavs` relays in `scenario` on network `network`. The method is `align`, without measurements.
+    /// Creates the configuration of `uavs` relays in `scenario`, with the network number `network`.
+    ///
+    /// The method is `align`, without measurements. `tolerance` is the relative one of the SIR.
     ///
     /// # Errors
     /// [`BlockError`] if the scenario is not a valid mission, or does not fit into a block.
@@ -141,17 +143,17 @@ impl Flight {
         })
     }
 
-    /// Sets the method.
+    /// Sets the method by which the relays choose their positions.
     pub fn by(self, method: Method) -> Self {
         Self { method, ..self }
     }
 
-    /// Sets the measurement of the interference field.
+    /// Sets how the relays measure the interference field; `None` if they do not.
     pub fn measuring(self, measure: Option<Measure>) -> Self {
         Self { measure, ..self }
     }
 
-    /// Sets the silence before a neighbour is probed, ms; 0 for the firmware's default.
+    /// Sets the silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
     pub fn asking_after(self, probe_after_ms: u32) -> Self {
         Self {
             probe_after_ms,
@@ -159,12 +161,12 @@ impl Flight {
         }
     }
 
-    /// Sets the key and epoch that sign frames.
+    /// Sets the key and epoch with which the relays sign their frames; `None` for unsigned frames.
     pub fn signed(self, secret: Option<Secret>) -> Self {
         Self { secret, ..self }
     }
 
-    /// Sets the drones' greatest speed, m/s; ignored without sites.
+    /// Sets the drones' greatest speed, m/s. It has no effect without sites in the scenario.
     pub fn no_faster_than(mut self, speed_m_s: f32) -> Self {
         if let Some(sites) = &mut self.sites {
             sites.speed_m_s = speed_m_s;
@@ -172,7 +174,7 @@ impl Flight {
         self
     }
 
-    /// Sets the key that signs MAVLink messages to and from the autopilot.
+    /// Sets the key that signs MAVLink messages to and from the autopilot; `None` for unsigned messages.
     pub fn signed_to_autopilots(self, autopilot_key: Option<[u8; 32]>) -> Self {
         Self {
             autopilot_key,
@@ -180,37 +182,42 @@ impl Flight {
         }
     }
 
-    /// Returns true if the drones have sites, which setpoints for an autopilot need.
+    /// Returns true if the scenario has the sites of Tx and Rx, which setpoints for an autopilot need.
     pub const fn has_sites(&self) -> bool {
         self.sites.is_some()
     }
 
-    /// Returns the mission.
+    /// Returns the mission of the flight.
     pub const fn mission(&self) -> &Mission {
         &self.mission
     }
 
-    /// Returns the relays' own profiles, where they differ from the common one, by index from 1.
+    /// Returns the relays' own profiles (power, altitude) with their indices, from 1.
+    ///
+    /// Only relays whose profile differs from the common one are listed.
     pub fn profiles(&self) -> &[(u16, Profile)] {
         &self.own
     }
 
-    /// Returns the indices (from 1) of relays with a fixed altitude.
+    /// Returns the indices, from 1, of the relays that keep their altitude.
     pub fn held(&self) -> &[u16] {
         &self.held
     }
 
-    /// Returns the method.
+    /// Returns the method by which the relays choose their positions.
     pub const fn method(&self) -> Method {
         self.method
     }
 
-    /// Returns the settings for locating the interferer, if any.
+    /// Returns the relays' settings for locating the interferer; `None` if they do not locate it.
     pub const fn listen(&self) -> Option<Listen> {
         self.listen
     }
 
-    /// Returns the block of relay `index`, verified by reading it back.
+    /// Builds the configuration block of relay `index`, and checks it by reading it back.
+    ///
+    /// # Errors
+    /// The drone would reject the block, or read back another configuration.
     pub fn block(&self, index: u16) -> Result<Block, BlockError> {
         let own = self.own.iter().find(|(of, _)| *of == index);
         let config = Config {
@@ -243,7 +250,9 @@ impl Flight {
     }
 }
 
-/// Converts decibels to factors as [`uav_relay::Channel::from_db`] does. Both channels are equal to the bit.
+/// Converts a scenario's channel, with losses in dB, to the numbers of a block, with factors.
+///
+/// The result is that of [`uav_relay::Channel::from_db`] to the bit.
 fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     let factor = |db: f64| libm::pow(10.0, db / 10.0);
     ChannelNumbers {
@@ -258,7 +267,9 @@ fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     }
 }
 
-/// Returns the silence after which a neighbour is probed and that after which it is lost. 0 selects the default.
+/// Returns the silences after which a neighbour is probed and after which it counts as lost.
+///
+/// 0 selects the firmware's default.
 pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     let settings = match u64::from(probe_after_ms) {
         0 => Settings::default(),
@@ -267,7 +278,9 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     [settings.probe_after, settings.dead_after]
 }
 
-/// Returns `probe_after_ms` for the block: the command line's `given_ms`, else the section's. 0 for the firmware's default.
+/// Returns the `probe_after_ms` of a block: `given_ms` of the command line, otherwise the section's.
+///
+/// 0 means the firmware's default. `name` is that of the scenario, for errors.
 ///
 /// # Errors
 /// A line that names a key whose value no block can express, the value and the allowed one.

@@ -10,16 +10,16 @@ use uav_relay_scenario::Line;
 
 use super::config::ADDRESS;
 
-/// Returns the file name of relay `index`.
+/// Returns the file name of relay `index`'s configuration block.
 pub fn name(index: u16) -> String {
     format!("relay{index}.bin")
 }
 
-/// Writes `files` (name and content) to `dir`, and creates it if necessary.
+/// Writes `files`, each with its name and content, to the folder `dir`. Creates `dir` if necessary.
 ///
-/// With `force`, existing files are overwritten and other blocks in the folder removed, because a drone of another flight would
-/// accept them. Files are first written under temporary names and renamed at the end: an earlier failure leaves the folder as it
-/// was.
+/// With `force`, existing files are overwritten and other blocks in the folder removed, because a drone of another
+/// flight would accept them. Files are first written under temporary names and renamed at the end: an earlier failure
+/// leaves the folder as it was.
 ///
 /// # Errors
 /// A line that names the file or folder and the reason.
@@ -66,7 +66,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
     Ok(())
 }
 
-/// Writes `content` to a temporary file that is removed unless it is renamed.
+/// Writes `content` to a temporary file in `dir`. The file is deleted unless it is renamed.
 fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     let mut file = NamedTempFile::new_in(dir)?;
     file.write_all(content)?;
@@ -74,7 +74,7 @@ fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     Ok(file)
 }
 
-/// Returns the files in the folder that belong to a flight. Blocks of any relay, and the names in `files`.
+/// Returns the paths in `dir` of configuration blocks of any relay, and of the names in `files`.
 fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String> {
     if !dir.exists() {
         return Ok(Vec::new());
@@ -98,22 +98,25 @@ fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String
     Ok(there)
 }
 
-/// Flight data for the summary, apart from its relays.
+/// Data of a flight that its `summary.txt` begins with.
 #[derive(Clone, Debug)]
 pub struct Heading {
     /// Name of the scenario.
     pub scenario: String,
     /// Number of relays in the provisioned chain.
     pub uavs: u16,
-    /// Network number.
+    /// Network number of the relays.
     pub network: u16,
-    /// Method, as named on the command line.
+    /// Method by which the relays choose their positions, as named on the command line.
     pub method: String,
-    /// True if frames are signed.
+    /// True if the relays sign their frames.
     pub signed: bool,
 }
 
-/// Returns the text of `summary.txt`. `places` are the expected positions of the relays, empty if unknown.
+/// Returns the text of `summary.txt`: the flight, the expected positions, the commands for flashing.
+///
+/// `places` are the positions on which the relays settle, empty if unknown. `line` converts them to latitude and
+/// longitude.
 pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<&Line>) -> String {
     let Heading {
         scenario,

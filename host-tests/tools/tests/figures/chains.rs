@@ -82,7 +82,9 @@ fn the_fewest_relays_are_the_reference_programs() {
     }
 }
 
-/// Checks the page: an interferer nearer to the line costs more relays, more power fewer.
+/// Checks that an interferer nearer to the line costs more relays, and that more power costs fewer.
+///
+/// The page of the figures says so.
 #[test]
 fn the_fewest_relays_move_as_it_is_said() {
     let by_place = Table::read("fewest-by-place");
@@ -120,7 +122,7 @@ fn the_fewest_relays_move_as_it_is_said() {
     }
 }
 
-/// Returns the chain stretched for `target`, by bisection of the SIRs.
+/// Returns the x of each relay as far toward Rx as `target` (linear SIR) allows, by the reference.
 fn stretched(link: &Link, target: f64) -> Vec<f64> {
     let mut from = 0.0;
     (1..=link.len())
@@ -282,7 +284,7 @@ fn densities_are_beta_distributions() {
     }
 }
 
-/// Returns E[1 / y] of a Beta distribution by two integrals without its normalisation.
+/// Returns E[1 / y] of a Beta distribution as the ratio of two integrals, without its normalisation.
 ///
 /// Substitutes y = t^8 near 0 and 1 - s^8 near 1, to remove the singularities.
 fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {
@@ -300,7 +302,9 @@ fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {
     integral(alpha - 2.0) / integral(alpha - 1.0)
 }
 
-/// Returns the reference's link in one of the table's fields.
+/// Returns a reference link in the interference field called `field` of the figure's table.
+///
+/// It has `relays` relays of 1 W at 20 m.
 fn field_link(field: &str, relays: usize) -> StochasticLink {
     let table = Table::read("stochastic-field");
     let rows = table.rows(&[]);
@@ -404,7 +408,9 @@ fn algorithm_4_ends_where_the_reference_program_does() {
     }
 }
 
-/// Checks the page: with eight relays the step of 0.1 misses the optimum of 0.0912 and ends near 0.
+/// Checks that the step of 0.1 misses the optimum of eight relays, 0.0912, and ends near 0.
+///
+/// The page of the figures says so.
 #[test]
 fn a_step_of_a_tenth_finds_next_to_nothing_for_eight_relays() {
     let last = |relays: u16| {

@@ -108,7 +108,9 @@ fn tables_say_what_was_taken_and_their_heads_have_units() {
     }
 }
 
-/// Returns the horizontal extent of a text, with letters 0.6 times as wide as the font size.
+/// Returns the left and right end of a text in an SVG picture, px.
+///
+/// Letters are taken to be 0.6 times as wide as the font size.
 fn extent(text: &Node<'_, '_>) -> (f64, f64) {
     let number = |name: &str| text.attribute(name).unwrap().parse::<f64>().unwrap();
     let letters = text.text().unwrap().trim().chars().count() as f64;

@@ -109,7 +109,7 @@ fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }
 
-/// Panics unless `got` is at most `most` above and `least` below `want`, both relative.
+/// Panics unless `want` (1 - `least`) <= `got` <= `want` (1 + `most`).
 #[track_caller]
 fn within(got: f64, want: f64, least: f64, most: f64) {
     assert!(

@@ -7,7 +7,7 @@ use uav_relay_tools::figures::single::{ALTITUDES_M, REALISATIONS};
 
 use super::{Table, off, within};
 
-/// Returns the dual-hop scenario of the paper's third sub-table.
+/// Returns the paper's dual-hop link (its third sub-table) in the reference's form.
 fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     Link {
         distance_m: 35.0,
@@ -23,7 +23,7 @@ fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     }
 }
 
-/// Returns a link with one relay and the interferer of a row.
+/// Returns a reference link with a relay at `altitude_m`, Tx power and interferer of a table row.
 fn locus_link(row: &super::Row<'_>, altitude_m: f64) -> Link {
     Link {
         distance_m: 35.0,
@@ -94,7 +94,7 @@ fn the_locus_is_the_reference_programs() {
     }
 }
 
-/// Checks the page: more power shifts the locus toward Rx. An interferer nearer to the line shifts it down.
+/// Checks that more Tx power shifts the locus of equal SIR to Rx, a nearer interferer shifts it down.
 #[test]
 fn the_locus_moves_as_it_is_said_to() {
     let table = Table::read("locus");
@@ -155,7 +155,7 @@ fn the_best_place_and_the_baselines_are_the_references() {
     }
 }
 
-/// Returns the mean of `of` applied to the SIR, over all positions.
+/// Returns the mean of `of`(SIR) over all positions of the relay between Tx and Rx.
 fn mean(link: &Link, of: impl Fn(f64) -> f64) -> f64 {
     let points = 2000;
     let place = |k: u32| link.distance_m * (f64::from(k) + 0.5) / f64::from(points);
@@ -163,7 +163,9 @@ fn mean(link: &Link, of: impl Fn(f64) -> f64) -> f64 {
     sum / f64::from(points)
 }
 
-/// Returns the SIR at the interference-blind position, found by trying positions.
+/// Returns the chain's SIR with the relay where the weaker received signal is strongest, linear.
+///
+/// That position ignores the interference. It is found by trying 200 001 positions.
 fn blind(link: &Link) -> f64 {
     let relay = link.relays[0];
     let h2 = relay.altitude_m.powi(2);
@@ -231,7 +233,7 @@ fn every_reading_of_the_gain_is_what_it_says() {
     );
 }
 
-/// Checks the page: in linear SIR no powers come near the printed 30.14 % over random.
+/// Checks that no pair of powers has the printed gain of 30.14 % over random positions in linear SIR.
 #[test]
 fn no_linear_reading_comes_near_what_is_printed() {
     let table = Table::read("single-gains");

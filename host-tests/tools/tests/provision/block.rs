@@ -13,7 +13,10 @@ use uav_relay_tools::provision::config::{Config, ConfigError, LEN, MAX_POINTS};
 
 use super::{changed, example, field, in_a_field, paper, reads, with};
 
-/// Builds a block by hand. The method's number and parameters, and differences from the paper's scenario.
+/// Returns the expected bytes of a block of the paper's scenario with some changes, built by hand.
+///
+/// `method` has the number of the method, true for a fixed altitude, and the parameters of `adjust`. `band` has the
+/// lowest and the highest altitude. `noise` has the interferer, and the bytes from the number of field points on.
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
@@ -299,7 +302,7 @@ fn a_number_out_of_range_is_named() {
     assert_eq!(reads(&[0; LEN]), Err(ConfigError::Blank));
 }
 
-/// Checks the limits of `explore`, `rounds`, `i_max_w` and `samples`, from just inside and outside.
+/// Checks the limits of `explore`, `rounds`, `i_max_w` and `samples` from just inside and outside.
 #[test]
 fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
     for (explore_m, rounds, good) in [

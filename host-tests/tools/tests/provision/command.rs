@@ -112,7 +112,9 @@ fn what_is_wrong_is_said_in_one_line() {
     assert!(!folder.path().join("block.bin").exists());
 }
 
-/// A channel at the firmware's data rate carries 25 relays; more are refused with the numbers.
+/// Checks that relays that overload their radio channel are refused, with the numbers in the error.
+///
+/// At the firmware's data rate a channel carries 25 relays.
 #[test]
 fn a_channel_that_cannot_carry_the_chain_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -242,7 +244,9 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     }
 }
 
-/// The firmware has no UDP, but a wrong address in a shared file is reported.
+/// Checks that a wrong UDP address of the autopilot is reported, although the firmware has no UDP.
+///
+/// The scenario file may be shared with companion computers.
 #[test]
 fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -284,7 +288,7 @@ fn names(dir: &Path) -> BTreeSet<String> {
         .collect()
 }
 
-/// Asserts that the block of relay `index` matches the plan, and that the summary lists it.
+/// Checks that relay `index`'s block in `dir` matches the plan, and that the summary lists the relay.
 fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
     let plan = scenario.plan.as_ref().unwrap();
     let block: Block = std::fs::read(dir.join(format!("relay{index}.bin")))
@@ -502,7 +506,9 @@ fn what_does_not_go_together_is_said_in_one_line() {
     assert!(line.contains("--all"), "{line}");
 }
 
-/// The refused loss is the planner's best over what the relays settle on.
+/// Checks that a hypothetical interferer that costs too much SIR is refused.
+///
+/// The error states the loss against the planner's best positions.
 #[test]
 fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     let folder = tempfile::tempdir().unwrap();
@@ -549,7 +555,7 @@ fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
     assert!(output.status.success(), "{output:?}");
 }
 
-/// Returns drone.toml without the settings that the firmware does not support.
+/// Returns the text of `drone.toml` without the settings that the firmware does not support.
 fn for_the_firmware(text: &str) -> String {
     let own = ["baud = 57600", "probe_after_ms", "dead_after_ms"];
     let kept = text

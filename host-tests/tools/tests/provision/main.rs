@@ -48,7 +48,7 @@ fn field(points: usize) -> Block {
     flight.block(3).unwrap()
 }
 
-/// Writes a key file readable by its owner only.
+/// Writes a file with the key `key`, which only its owner can read.
 fn write_key(file: impl AsRef<Path>, key: &str) {
     use std::os::unix::fs::PermissionsExt as _;
     std::fs::write(&file, key).unwrap();
@@ -59,7 +59,7 @@ fn reads(block: &Block) -> Result<Config, ConfigError> {
     read(block, Box::leak(Box::new(EMPTY)))
 }
 
-/// Returns the block of the paper's scenario with `bytes` at `at`, and a matching CRC.
+/// Returns the block of the paper's scenario with `bytes` written at offset `at`, and a matching CRC.
 fn with(at: usize, bytes: &[u8]) -> Block {
     changed(paper(), at, bytes)
 }
@@ -83,7 +83,7 @@ fn provision(arguments: &str) -> Output {
         .unwrap()
 }
 
-/// Runs `provision`, which must exit with status 2, and returns its one error line.
+/// Runs `provision`, checks that it exits with status 2, and returns its one error line.
 fn refusal(arguments: &str) -> String {
     let output = provision(arguments);
     let text = String::from_utf8(output.stderr).unwrap();

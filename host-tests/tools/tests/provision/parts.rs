@@ -173,7 +173,7 @@ pub(super) fn flight() -> Flight {
     Flight::new(&scenario(), 5, 1e-4, 7).unwrap()
 }
 
-/// Latitude, longitude and height of both sites, as the table encodes them.
+/// Latitude (1e-7 deg), longitude (1e-7 deg) and height (mm) of Tx and Rx, as a block has them.
 const ENDS: [[i32; 3]; 2] = [
     [474_000_000, 85_400_000, 420_000],
     [474_100_000, 85_500_000, 431_000],
@@ -414,7 +414,7 @@ fn the_ranges_are_those_of_a_relay() {
     }
 }
 
-/// A mission with a field cannot locate an interferer, even if a program asks for it.
+/// Checks that relays in an interference field cannot be set to locate an interferer.
 #[test]
 fn a_field_has_nothing_to_find() {
     let mut scenario = super::in_a_field(3);

@@ -9,13 +9,15 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-/// Maximum length of a summary, characters.
+/// Maximum length of a doc comment's first sentence, characters.
 const LONGEST: usize = 100;
 
-/// Folders to check, with all their subfolders.
+/// Folders whose Rust files are checked, with all their subfolders.
 const FOLDERS: [&str; 3] = ["src", "examples", "host-tests"];
 
-/// Pronouns, prepositions, conjunctions, question words and auxiliaries that must not begin a summary.
+/// Words that must not begin a doc comment, several to a line.
+///
+/// They are pronouns, prepositions, conjunctions, question words, adverbs and auxiliary verbs.
 const WRONG: [&str; 8] = [
     "i he she it they we you me him her them us his its ours your yours mine itself themselves this that these those such",
     "who whom whose which what whether why how when where while until till since unless because although though as so if than",
@@ -27,22 +29,26 @@ const WRONG: [&str; 8] = [
     "did can could may might must shall should will would whoever whatever whichever wherever whenever our ones maybe perhaps",
 ];
 
-/// Doc comments that are exempt: path, colon, summary. The list is empty, and stays so.
+/// Doc comments exempt from the check, each as path, colon, first sentence. The list stays empty.
 const EXEMPT: [&str; 0] = [];
 
-/// Names that were replaced, one a line: words that nothing else uses.
+/// Names of items before a renaming, one a line, that must not be used any more.
+///
+/// Nothing else uses these words.
 const OLD_NAMES: &str = include_str!("../../data/old_names.txt");
 
-/// Files that may contain old names: the list of them, and the table of old and new names.
+/// Files that may contain replaced names: the list of these names, and the table of old and new names.
 const WITH_OLD_NAMES: [&str; 2] = ["host-tests/xtask/data/old_names.txt", "CHANGELOG.md"];
 
-/// Doc comment: its line, counted from 1, and its first paragraph.
+/// Doc comment in a source file: the number of its first line, from 1, and its first paragraph.
 struct Comment {
     line: usize,
     paragraph: String,
 }
 
-/// Returns the text after `///` or `//!`, and that marker.
+/// Returns the marker `///` or `//!` of a doc comment line, and the text after it.
+///
+/// `None` for other lines.
 fn text(line: &str) -> Option<(&str, &str)> {
     let line = line.trim();
     let marker = ["///", "//!"].into_iter().find(|m| line.starts_with(m))?;
@@ -50,7 +56,7 @@ fn text(line: &str) -> Option<(&str, &str)> {
     (!rest.starts_with('/')).then(|| (marker, rest.trim()))
 }
 
-/// Returns the doc comments of a source file.
+/// Returns all doc comments in the text of a source file.
 fn comments(source: &str) -> Vec<Comment> {
     let mut found: Vec<Comment> = Vec::new();
     let mut marker = "";
@@ -99,7 +105,7 @@ fn summary(paragraph: &str) -> &str {
     end.and_then(|at| paragraph.get(..=at)).unwrap_or(paragraph)
 }
 
-/// Returns the fault of a summary; `None` if it is correct.
+/// Returns an error message if a doc comment's first sentence breaks a rule; `None` if it is correct.
 fn fault(summary: &str) -> Option<String> {
     let length = summary.chars().count();
     if length > LONGEST {
@@ -112,7 +118,7 @@ fn fault(summary: &str) -> Option<String> {
     is_wrong.then(|| format!("begins with \"{word}\""))
 }
 
-/// Appends the Rust files in `folder` and its subfolders, without build output.
+/// Appends the paths of the Rust files in `folder` to `into`. Folders named `target` are skipped.
 fn sources(folder: &Path, into: &mut Vec<PathBuf>) -> std::io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
@@ -127,7 +133,7 @@ fn sources(folder: &Path, into: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Returns the old names in a text, each with its line, counted from 1.
+/// Returns the replaced names that a text still contains, each with its line number, from 1.
 fn old_names(text: &str) -> Vec<(usize, &'static str)> {
     let is_letter = |c: char| c.is_alphanumeric() || c == '_';
     let mut found = Vec::new();
@@ -139,14 +145,14 @@ fn old_names(text: &str) -> Vec<(usize, &'static str)> {
     found
 }
 
-/// Returns the tracked files of the project.
+/// Returns the paths of all files of the project that git tracks.
 fn tracked() -> std::io::Result<Vec<String>> {
     let output = Command::new("git").arg("ls-files").output()?;
     let names = String::from_utf8_lossy(&output.stdout);
     Ok(names.lines().map(str::to_owned).collect())
 }
 
-/// Returns each old name in a tracked text file.
+/// Returns an error message for each replaced name that a tracked text file still contains.
 fn check_names() -> std::io::Result<Vec<String>> {
     let mut faults = Vec::new();
     for file in tracked()? {

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The largest permitted number of public items.
+/// Largest permitted number of items in the library's public interface.
 const MOST: usize = 110;
 
 fn main() -> ExitCode {

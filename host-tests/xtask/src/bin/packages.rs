@@ -20,10 +20,12 @@ const ALLOWED: [&str; 10] = [
     "Zlib",
 ];
 
-/// Packages used only by tests, under a licence that restricts redistribution.
+/// Packages that only tests use, whose licence is not in [`ALLOWED`].
 const TESTS_ALONE: [&str; 2] = ["alterable_logger", "colored"];
 
-/// Returns true if each part of a licence expression between `AND`s offers one of [`ALLOWED`]. An older `/` is an `OR`.
+/// Returns true if [`ALLOWED`] licences are enough for a licence expression.
+///
+/// Each operand of `AND` must offer one of them. An older `/` is read as `OR`.
 fn is_allowed(expression: &str) -> bool {
     let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
     let one = |licence: &str| {
@@ -33,10 +35,15 @@ fn is_allowed(expression: &str) -> bool {
     plain.split(" AND ").all(|part| part.split(" OR ").any(one))
 }
 
-/// Allowed duplicates: embedded-hal 1.0 needs the older defmt, a re-export of the newer one.
+/// Packages that the library may need in two versions.
+///
+/// embedded-hal 1.0 needs the older defmt, which re-exports the newer one.
 const TWICE: [&str; 1] = ["defmt"];
 
-/// Returns the output of `cargo`.
+/// Runs `cargo` with `arguments` and returns its output.
+///
+/// # Errors
+/// The error output of cargo.
 fn cargo(arguments: &[&str]) -> Result<String, String> {
     let output = Command::new("cargo")
         .args(arguments)
@@ -74,7 +81,9 @@ fn licences() -> Result<Vec<String>, String> {
     Ok(refused.map(|line| format!("licence: {line}")).collect())
 }
 
-/// Returns the packages that the library needs in several versions, without tests and build.
+/// Returns an error message for each package that the library needs in several versions.
+///
+/// Packages that only tests or the build need are not counted, nor those in [`TWICE`].
 fn twice() -> Result<Vec<String>, String> {
     let text = tree(&[
         "--package=uav-relay",
@@ -101,14 +110,14 @@ fn elsewhere(lock: &str) -> Vec<String> {
         .collect()
 }
 
-/// Returns the files of this repository that `page` links to, without their anchors.
+/// Returns the files of this repository that the Markdown text `page` links to, without anchors.
 fn links(page: &str) -> impl Iterator<Item = &str> {
     let targets = page.split("](").skip(1);
     let targets = targets.filter_map(|rest| rest.split([')', '#']).next());
     targets.filter(|target| !target.is_empty() && !target.contains("://"))
 }
 
-/// Returns the links of the README to files that the packaged crate lacks.
+/// Returns an error message for each link of the README to a file that the packaged crate lacks.
 fn broken_links() -> Result<Vec<String>, String> {
     let list = cargo(&[
         "package",

@@ -9,7 +9,7 @@ use base64::Engine as _;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-/// Time limit of a page, however slow the machine is.
+/// Longest wait for a condition on the page, chosen so that slow machines pass.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 pub(crate) struct Browser {
@@ -142,7 +142,7 @@ impl Browser {
         }
     }
 
-    /// Drags the mouse from one point to another in a number of steps.
+    /// Drags the mouse from one screen point, px, to another in a number of steps.
     pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2], steps: u8) {
         let mut mouse = |kind: &str, [x, y]: [f64; 2]| {
             let parameters = json!({
@@ -161,7 +161,7 @@ impl Browser {
         mouse("mouseReleased", to);
     }
 
-    /// Drags a finger from one point to another in a number of steps.
+    /// Drags a finger on the touch screen from one point, px, to another in a number of steps.
     pub(crate) fn finger(&mut self, from: [f64; 2], to: [f64; 2], steps: u8) {
         let mut touch = |kind: &str, points: Value| {
             let parameters = json!({"type": kind, "touchPoints": points});
@@ -181,7 +181,7 @@ impl Browser {
         self.call("Emulation.setEmulatedMedia", &features);
     }
 
-    /// Returns the accessibility tree: every node.
+    /// Returns all nodes of the page's accessibility tree, which screen readers use.
     pub(crate) fn accessible(&mut self) -> Vec<Value> {
         let tree = self.call("Accessibility.getFullAXTree", &json!({}));
         tree["nodes"].as_array().unwrap().clone()
@@ -201,7 +201,7 @@ impl Browser {
         }
     }
 
-    /// Returns the whole page as PNG.
+    /// Returns a picture of the whole page as PNG bytes.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let parameters = json!({"format": "png", "captureBeyondViewport": true});
         let picture = self.call("Page.captureScreenshot", &parameters);
@@ -209,7 +209,7 @@ impl Browser {
         base64::prelude::BASE64_STANDARD.decode(data).unwrap()
     }
 
-    /// Returns the visible part of the page as PNG.
+    /// Returns a picture of the visible part of the page as PNG bytes.
     pub(crate) fn seen(&mut self) -> Vec<u8> {
         let picture = self.call("Page.captureScreenshot", &json!({"format": "png"}));
         let data = picture["data"].as_str().unwrap();

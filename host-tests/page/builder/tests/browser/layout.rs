@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::chromium::Browser;
 use super::opened::{address, choose, number, opened, press, root, settled};
 
-/// Script that lists overlapping or clipped signs and axis numbers.
+/// JavaScript that lists the labels in the page's pictures that overlap or are clipped.
 const CLASHES: &str = "(() => { const clashes = []; \
     for (const svg of document.querySelectorAll('svg')) { \
       const out = svg.getBoundingClientRect(); \
@@ -95,7 +95,7 @@ fn all_of_it_can_be_heard() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// An agreed chain has differences up to its tolerance, 1e-7.
+/// Checks that no hop is marked as the worst if all have the same SIR within the chain's tolerance.
 #[test]
 fn no_hop_is_red_where_all_are_equal() {
     let mut browser = opened(1280, 900);
@@ -107,7 +107,7 @@ fn no_hop_is_red_where_all_are_equal() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks small laptop and telephone screens, as the page is opened.
+/// Checks that the playback button is visible without scrolling, on common screen sizes.
 #[test]
 fn play_is_in_view() {
     for (width, height) in [
@@ -139,7 +139,9 @@ fn median(mut all: Vec<f64>) -> f64 {
     all[all.len() / 2]
 }
 
-/// Returns the computing time, ms, of a run without recording, as the page makes it during dragging.
+/// Returns the median computing time, ms, of `times` runs without recording.
+///
+/// The page makes such runs while the user drags something.
 fn took(browser: &mut Browser, times: u32) -> f64 {
     let all = (0..times).map(|_| {
         let runs = number(browser, "window.last.runs");
@@ -189,7 +191,7 @@ fn it_is_there_at_once_and_follows_a_hand() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks that during a long run the page is redrawn, and new input does not wait for its end.
+/// Checks that the page is redrawn during a long run, and that new input cancels the run.
 #[test]
 fn the_page_stays_awake_while_it_computes() {
     let mut browser = opened(1280, 900);

@@ -33,11 +33,11 @@ pub(crate) fn opened(width: u32, height: u32) -> Browser {
     browser
 }
 
-/// Condition: the last run matches the input, has a recording, and nothing is pending.
+/// JavaScript condition: the last run matches the input and is recorded, and no run is pending.
 const SETTLED: &str = "!engine.running && !engine.next && !hand.holds && window.last.toml === scenario() \
     && window.last.words === options() && window.last.runs > 1";
 
-/// Waits until the page has settled, and moves playback to the end.
+/// Waits until the page has no run pending, then moves the playback to its end.
 pub(crate) fn settled(browser: &mut Browser) {
     browser.until(SETTLED);
     browser.run("player.stop(); player.seek(Math.max(0, player.ticks.length - 1))");
@@ -57,7 +57,7 @@ pub(crate) fn press(browser: &mut Browser, id: &str) {
     settled(browser);
 }
 
-/// Returns the text of that element.
+/// Returns the text of the page's element with this `id`.
 pub(crate) fn said(browser: &mut Browser, id: &str) -> String {
     browser.text(&format!("byId('{id}').textContent"))
 }
@@ -70,7 +70,7 @@ pub(crate) fn sir(browser: &mut Browser) -> f64 {
     number(browser, "window.last.told.report.sir")
 }
 
-/// Returns the screen position of that sign.
+/// Returns the screen position, px, of the centre of the relay, interferer or other symbol `id`.
 pub(crate) fn middle(browser: &mut Browser, id: &str) -> [f64; 2] {
     let at = browser.value(&format!(
         "(() => {{ const box = document.querySelector('#{id} .halo').getBoundingClientRect(); \
@@ -94,7 +94,7 @@ fn native(browser: &mut Browser) -> String {
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
-/// Extracts the report, character by character, from the result for the page.
+/// Returns the report in the page's result `told`, which is JSON, without changing a character.
 pub(crate) fn report(told: &str) -> &str {
     let report = told.strip_prefix("{\"report\":").unwrap();
     let end = report.find(",\"film\":{\"stands\":").unwrap();
@@ -135,7 +135,7 @@ fn the_numbers_are_those_of_the_command_to_the_bit() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks the share of the optimum of relays that listen: one that is off does not count.
+/// Checks the page's percentage of the optimum SIR: a relay that is switched off does not count.
 #[test]
 fn a_relay_that_is_off_does_not_count_in_the_share_of_the_optimum() {
     let mut browser = opened(1280, 900);

@@ -5,7 +5,10 @@ use serde_json::Value;
 use crate::chromium::Browser;
 use crate::opened::{choose, middle, number, opened, press, said, settled};
 
-/// Returns each tick: time, relays that are on and have a position, least SIR, and sender.
+/// Returns the playback steps (ticks) of the page as JSON objects.
+///
+/// Each has the time in s, the sender of a frame, the least SIR, the number of hops, the relays that are off, and the
+/// number of relays with a position.
 fn ticks(browser: &mut Browser) -> Vec<Value> {
     let ticks = browser.value(
         "player.ticks.map((tick) => ({ at_s: tick.at_s, says: tick.says, worst: Math.min(...tick.sirs), hops: tick.sirs.length, \

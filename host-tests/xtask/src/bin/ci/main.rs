@@ -81,7 +81,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs a step and writes its output and result to `out`. Returns its name and the evidence of its failure; `None` if it passed.
+/// Runs step `number` of `all` and writes its output and result to `out`.
+///
+/// Returns `None` if it passed, otherwise its name and the relevant lines of its output.
 fn run<'a>(
     number: usize,
     all: usize,
@@ -102,23 +104,23 @@ fn run<'a>(
     failure.map(|evidence| (&**name, evidence))
 }
 
-/// Number of last lines kept of a step that runs no tests.
+/// Number of last output lines that are repeated at the end for a failed step without tests.
 const LAST_LINES: usize = 20;
 
-/// Number of lines kept of one test binary's panics, and of the names of its failed tests.
+/// Largest number of lines repeated for one test binary: of its panics, and of its failed tests' names.
 const LINES_OF_FAILURES: usize = 100;
 
-/// Relevant output of a failed step: each test binary's `failures:`, or else the last lines.
+/// Relevant output of a failed step: the `failures:` of each test binary, or else the last lines.
 #[derive(Default)]
 pub(crate) struct Evidence {
     failures: Vec<String>,
     last: VecDeque<String>,
-    /// Remaining lines of the current list of failures; `None` outside a list.
+    /// Number of lines still to keep of the list of failures that is being read; `None` outside a list.
     remaining: Option<usize>,
 }
 
 impl Evidence {
-    /// Copies `output` to `out`, line by line, and keeps the lines about failures.
+    /// Copies a step's `output` to `out`, line by line, and keeps the lines about failures.
     pub(crate) fn read(&mut self, mut output: impl BufRead, out: &mut impl Write) -> Result<()> {
         let mut line = Vec::new();
         while output.read_until(b'\n', &mut line)? > 0 {

@@ -6,11 +6,14 @@ use uav_relay_xtask::toolchain::{llvm_tool, succeeds};
 
 use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET, TARGET_V8M};
 
-/// Debian packages, each with a program of its name. The emulator that runs the firmware, Wireshark's command line, which reads
-/// captures, and a browser.
+/// Debian packages that the steps need, each with a program of the same name.
+///
+/// They are the emulator that runs the firmware, Wireshark's command line, which reads captures, and a browser.
 const OF_DEBIAN: [&str; 3] = ["qemu-system-arm", "tshark", "chromium"];
 
-/// Component: its name, a command that succeeds if it is present, and the rustup arguments that add it.
+/// Component or target of the Rust toolchain that the steps need.
+///
+/// It has a name, a command that succeeds if it is installed, and the rustup arguments that add it.
 type Needed = (
     &'static str,
     &'static [&'static str],
@@ -74,10 +77,13 @@ const FOR_THE_REST: [Needed; 5] = [
     ),
 ];
 
-/// Version of cargo-fuzz.
+/// Version of cargo-fuzz that is installed if it is missing.
 const CARGO_FUZZ_VERSION: &str = "0.13.2";
 
-/// Adds missing tools, for the quick steps or for all. Returns the command to type for a tool that cannot be added.
+/// Installs the missing tools: those of the quick steps if `quick`, otherwise all.
+///
+/// # Errors
+/// The command to type, for a tool that cannot be installed.
 pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     add(&TO_EDIT)?;
     if quick {
@@ -88,7 +94,7 @@ pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     OF_DEBIAN.into_iter().try_for_each(prepare_program)
 }
 
-/// Builds cargo-fuzz into the target folder, because only this project uses it.
+/// Installs cargo-fuzz in the target folder if it is missing there. Only this project uses that copy.
 fn prepare_fuzzer() -> Result<(), String> {
     if succeeds(CARGO_FUZZ, &["fuzz", "--version"]) {
         return Ok(());
@@ -139,7 +145,10 @@ fn add(needed: &[Needed]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs a Debian package. That needs root: for other users the error contains the command to type.
+/// Installs the Debian package of `program` if it is missing. That needs root.
+///
+/// # Errors
+/// The command to type, for a user without root rights.
 fn prepare_program(program: &str) -> Result<(), String> {
     if succeeds(program, &["--version"]) {
         return Ok(());
@@ -163,7 +172,10 @@ fn prepare_program(program: &str) -> Result<(), String> {
     }
 }
 
-/// Returns true if the target's folder exists: rustc prints its path even if it does not.
+/// Returns true if the libraries of a compilation target are installed.
+///
+/// `arguments` make rustc print their folder. rustc prints the path even if it does not exist, so the folder is
+/// looked for.
 fn target_is_there(arguments: &[&str]) -> bool {
     let output = Command::new("rustc").args(arguments).output();
     output.is_ok_and(|output| {

@@ -7,16 +7,18 @@ use uav_relay_xtask::FUZZ_TARGETS;
 
 use super::Evidence;
 
-/// Target of the firmware.
+/// Target triple of the STM32F4 firmware: Arm Cortex-M4F.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Target of the Embassy board that is not an STM32.
+/// Target triple of the one Embassy board that is not an STM32, the Pico 2: Arm Cortex-M33.
 pub(crate) const TARGET_V8M: &str = "thumbv8m.main-none-eabihf";
 
-/// Oldest supported compiler: `rust-version` in Cargo.toml.
+/// Version of the oldest supported Rust compiler: `rust-version` in Cargo.toml.
 pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 
-/// Feature sets for the library's tests and a flight; all other tests use the full set.
+/// Feature sets with which the library's tests and a simulated flight are run.
+///
+/// All other tests use the full set.
 const SETS: [&str; 7] = [
     "",
     "guard",
@@ -27,7 +29,7 @@ const SETS: [&str; 7] = [
     "guard,upload",
 ];
 
-/// Integration tests that take seconds, one or two for each part of the project.
+/// Integration tests of the quick check. They take seconds, and touch each area of the project.
 const QUICK_TESTS: [&str; 10] = [
     "asynch",
     "exact",
@@ -41,23 +43,26 @@ const QUICK_TESTS: [&str; 10] = [
     "wire",
 ];
 
-/// Command that must succeed.
+/// Step of `cargo ci`: a command that must succeed.
 pub(crate) struct Step {
     pub(crate) name: String,
     pub(crate) command: String,
     environment: &'static [(&'static str, &'static str)],
-    /// True for a step with a target folder of its own, which runs at low priority beside the other steps.
+    /// True for a step that runs beside the others, at low priority. It has a target folder of its own.
     pub(crate) is_background: bool,
 }
 
-/// Compiler of the fuzzer and of Miri, with a fixed date, so that a commit's result does not change.
+/// Nightly compiler for the fuzzer and for Miri.
+///
+/// Its date is fixed, so that the checks of a commit always have the same result.
 pub(crate) const NIGHTLY: &str = "nightly-2026-10-30";
 
-/// Path of the fuzzer that [`super::prepare`] installs.
+/// Path of the cargo-fuzz program that [`super::prepare`] installs.
 pub(crate) const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
 
-/// Executions of each fuzz target. With a fixed seed they are the same each time: this finds regressions, a long run finds new
-/// faults.
+/// Number of inputs that are run for each fuzz target.
+///
+/// With a fixed seed they are the same each time, so this finds regressions. A long run finds new faults.
 const EXECUTIONS: u32 = 10_000;
 
 fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
@@ -69,7 +74,9 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
     }
 }
 
-/// Moves steps to the background. They use idle time: many tests of the other steps wait for the wall clock.
+/// Returns `steps` marked to run beside the other steps, at low priority.
+///
+/// They use idle time: many tests of the other steps wait for the wall clock.
 fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
     let moved = |step| Step {
         is_background: true,
@@ -79,9 +86,12 @@ fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
 }
 
 impl Step {
-    /// Runs the command and writes its output to `out`. `Err` holds the evidence of the failure.
+    /// Runs the command of the step and copies its standard output to `out`.
     ///
-    /// The messages of a foreground step go to the standard error output instead.
+    /// The error output goes to `out` too for a background step, otherwise to this program's error output.
+    ///
+    /// # Errors
+    /// The relevant lines of the output, if the command fails.
     pub(crate) fn run(&self, out: &mut impl Write) -> Result<(), Evidence> {
         let mut evidence = Evidence::default();
         let passed = self.start().and_then(|(mut child, output)| {
@@ -98,7 +108,7 @@ impl Step {
         }
     }
 
-    /// Starts the command. Returns it with the reading end of its output.
+    /// Starts the command of the step. Returns its process, and the pipe from which its output is read.
     fn start(&self) -> Result<(Child, PipeReader), Error> {
         let (reader, writer) = pipe()?;
         let priority = if self.is_background {
@@ -118,7 +128,7 @@ impl Step {
     }
 }
 
-/// Returns the quick steps.
+/// Returns the steps of the quick check, in order.
 pub(crate) fn quick() -> Vec<Step> {
     let tests: Vec<String> = QUICK_TESTS.map(|test| format!("--test {test}")).into();
     let mut steps = first();
@@ -132,7 +142,7 @@ pub(crate) fn quick() -> Vec<Step> {
     steps
 }
 
-/// Returns all steps.
+/// Returns all steps of `cargo ci`, in order.
 pub(crate) fn all() -> Vec<Step> {
     let mut steps = first();
     steps.extend(clippy());
@@ -186,12 +196,12 @@ pub(crate) fn all() -> Vec<Step> {
     steps
 }
 
-/// Integration test whose processes mostly wait for the wall clock.
+/// Name of the integration test whose processes mostly wait for the wall clock.
 const WAITING_TEST: &str = "companion";
 
-/// Number of these tests at a time.
+/// Number of test functions of [`WAITING_TEST`] that run at a time.
 ///
-/// It exceeds the number of cores, because a companion uses a few per cent of one.
+/// It exceeds the number of cores, because each of them uses a few per cent of one.
 const WAITING_TESTS: &str = "6";
 
 /// Returns the steps that run all tests of the workspace.
@@ -268,8 +278,9 @@ fn clippy() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps of the Embassy examples, a separate workspace. Checked like the rest, for each chip; the application on the
-/// host, too.
+/// Returns the steps that check, test and build the Embassy examples, a separate workspace.
+///
+/// They build the examples for each chip, and test the application on the host.
 fn embassy() -> Vec<Step> {
     const MANIFEST: &str = "--manifest-path examples/embassy/Cargo.toml";
     const HOST: &str = "-p relay-app --locked --target-dir target/embassy";
@@ -307,7 +318,9 @@ fn embassy() -> Vec<Step> {
     steps
 }
 
-/// Returns the step that tests the library and a simulated chain with the features of `set` only.
+/// Returns the step that tests the library and a simulated chain with the features in `set` only.
+///
+/// `set` is a list of features with commas between them.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
@@ -345,9 +358,9 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps that need a nightly compiler: all fuzz targets, and Miri runs of their corpora.
+/// Returns the steps that need the nightly compiler: all fuzz targets, and the fuzz corpora with Miri.
 ///
-/// A fuzz target starts with its corpus.
+/// Each fuzz target starts from its stored inputs, the corpus.
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
     for target in FUZZ_TARGETS {

@@ -102,7 +102,7 @@ const SIGNED: &[Counted] = &[
     ),
 ];
 
-/// Figures of the runners, which move bytes between ports and a relay.
+/// Table rows for the runners: functions that move bytes between the ports and a relay.
 const RUNNERS: &[Counted] = &[
     (
         "a full sweep on polled ports, bytes in to bytes out",
@@ -137,7 +137,7 @@ const RUNNERS: &[Counted] = &[
     ),
 ];
 
-/// Figures of mission uploads.
+/// Table rows for the upload of a new mission in flight.
 const UPLOADED: &[Counted] = &[
     (
         "an offer of a new mission, taken",
@@ -148,7 +148,9 @@ const UPLOADED: &[Counted] = &[
     ("its frame", "bytes", &["offer_bytes"], Some(140)),
 ];
 
-/// A row of the table: description, unit, names of figures (the largest counts), and budget.
+/// Row of the cost table: description, unit, names of measured figures, and budget.
+///
+/// The row shows the largest of the figures.
 pub(crate) type Counted = (
     &'static str,
     &'static str,
@@ -312,7 +314,9 @@ const COUNTED: &[Counted] = &[
     ),
 ];
 
-/// Figures of the geographic line, in the image of the runners.
+/// Table rows for conversions between latitude, longitude and positions on the line Tx-Rx.
+///
+/// They are measured in the image that also measures the runners.
 const FLOWN: &[Counted] = &[
     (
         "the line between two sites",
@@ -334,7 +338,9 @@ const FLOWN: &[Counted] = &[
     ),
 ];
 
-/// Figures that are calls of a relay.
+/// Names of the measured figures that are single calls of a relay's functions.
+///
+/// The largest of them has a budget.
 const CALLS: &[&str] = &[
     "begin_sweep",
     "sweep",
@@ -353,7 +359,7 @@ const CALLS: &[&str] = &[
     "estimate",
 ];
 
-/// Runs the counting image in QEMU and returns its figures by name.
+/// Runs the image `elf`, which counts instructions, in QEMU and returns its figures by name.
 pub(crate) fn count(elf: &Path) -> Result<BTreeMap<String, u64>, String> {
     let arguments = [
         "300",

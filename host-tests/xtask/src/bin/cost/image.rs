@@ -13,10 +13,10 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 
 const RELAY: &str = "stm32f405";
 
-/// Name of the image with one port, to a radio.
+/// Name of the firmware image with one port, which leads to a shared radio.
 const RADIO: &str = "stm32f405_radio";
 
-/// Name of the image on asynchronous ports, compared with [`RELAY`] with Algorithm 1 alone.
+/// Name of the firmware image that uses asynchronous ports.
 const ASYNC: &str = "stm32f405_async";
 
 const ASYNC_FEATURES: &[&str] = &["--no-default-features", "--features", "async"];
@@ -37,7 +37,9 @@ pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
     Ok(rows)
 }
 
-/// Description, example, features, and budgets of an image: flash, static RAM, stack.
+/// Measured image: description, example, cargo options, and budgets in bytes.
+///
+/// The budgets are those of flash, static RAM and stack.
 type Image = (
     &'static str,
     &'static str,
@@ -45,8 +47,10 @@ type Image = (
     [u64; 3],
 );
 
-/// Images from the smallest to the largest. The endpoint that relay and ground station share costs an image with `auth` 0.4 KB of
-/// flash, and saves it 0.8 KB of stack.
+/// Firmware images whose costs are measured, from the smallest to the largest.
+///
+/// The code that relay and ground station share costs an image with `auth` 0.4 KB of flash, and saves it 0.8 KB of
+/// stack.
 const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
@@ -167,7 +171,7 @@ fn cargo(command: &str, example: &str) -> Command {
     cargo
 }
 
-/// Builds one example with the firmware profile and returns the path of its ELF.
+/// Builds a firmware example with the cargo options `more`, and returns the path of its ELF file.
 pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
     run(cargo("build", example).args(more))?;
     Ok(PathBuf::from("target")
@@ -193,8 +197,10 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
     Ok((flash, ram))
 }
 
-/// Returns the largest stack of the thread and of one interrupt. The thread begins with the entry that `Reset` calls; an interrupt
-/// includes its FPU frame.
+/// Returns the largest stacks of the main thread and of one interrupt, bytes.
+///
+/// The thread begins with the function that `Reset` calls; the interrupt includes the frame that the processor saves
+/// with its FPU registers. `pair` is true for two ports to neighbours, `flies` for a port to an autopilot.
 pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
@@ -236,7 +242,9 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Links every relay image with a panic handler that cannot be linked. And, as a control, one that does panic.
+/// Proves that no relay image can panic: links each with a panic handler that cannot be linked.
+///
+/// As a control, it checks that an image with a deliberate panic does not link.
 pub(crate) fn no_panic() -> Result<(), String> {
     only_finished_futures_panic()?;
     let link = |example: &str, features: &[&str], flags: &[&str]| {
@@ -261,8 +269,8 @@ pub(crate) fn no_panic() -> Result<(), String> {
 
 /// Checks that the asynchronous image has no panics except those for polling a completed future.
 ///
-/// The compiler adds such a panic to each `async fn`, so that image cannot be linked without a panic handler; an `await` never
-/// reaches it.
+/// The compiler adds such a panic to each `async fn`, so that image cannot be linked without a panic handler. An
+/// `await` never reaches the panic.
 fn only_finished_futures_panic() -> Result<(), String> {
     const FINISHED: &str = "panic_const_async_fn_resumed";
     let image = build(ASYNC, ASYNC_FEATURES)?;

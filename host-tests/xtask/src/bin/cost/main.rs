@@ -119,10 +119,10 @@ pub(crate) const fn row(
 const HEAD: &str =
     "| | measured | at 168 MHz, an instruction a cycle | budget |\n| --- | --- | --- | --- |\n";
 
-/// Clock of the STM32F405, in instructions per microsecond at one per cycle.
+/// Clock of the STM32F405, MHz: instructions per microsecond, at one instruction a cycle.
 const CLOCK_MHZ: u64 = 168;
 
-/// A document with its current and its expected text.
+/// Document that states costs: its present text, and the text with the measured costs.
 pub(crate) struct Document {
     name: &'static str,
     path: PathBuf,
@@ -131,7 +131,7 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Returns true if the document has the measured costs.
+    /// Returns true if the document states the measured costs.
     pub(crate) fn is_right(&self) -> bool {
         self.kept == self.measured
     }
@@ -162,7 +162,7 @@ pub(crate) fn table(rows: &[Row]) -> String {
     std::iter::once(HEAD.to_owned()).chain(lines).collect()
 }
 
-/// Formats the time of a number of instructions, to the microsecond.
+/// Formats the time that a number of instructions takes, in ms with three decimals.
 fn milliseconds(instructions: u64) -> String {
     let micros = (instructions + CLOCK_MHZ / 2) / CLOCK_MHZ;
     format!("{}.{:03} ms", micros / 1_000, micros % 1_000)
@@ -187,7 +187,9 @@ pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     Ok([results, readme])
 }
 
-/// Returns true if the documents are of this compiler and emulator, on which costs depend.
+/// Returns true if the documents state costs for these versions of compiler and emulator.
+///
+/// The costs depend on both, so other versions are not compared.
 pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
     let results = std::fs::read_to_string(root.join("examples/RESULTS.md"));
     results.is_ok_and(|text| text.contains(&format!("(rustc {rustc}, QEMU {qemu}, ")))
@@ -209,7 +211,7 @@ fn with(
     })
 }
 
-/// Returns the beginnings of the README's rows and their text.
+/// Returns the README's three table rows with costs, each as its fixed beginning and its measured text.
 fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;

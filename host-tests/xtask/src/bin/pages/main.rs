@@ -33,7 +33,7 @@ use clap::Parser;
 
 use page::{Block, Kind};
 
-/// Pages in the order in which a new user reads them.
+/// Pages of the documentation whose commands are run, in the order in which a new user reads them.
 const PAGES: [&str; 12] = [
     "README.md",
     "examples/LINUX.md",
@@ -77,7 +77,10 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs every runnable block; returns the number of blocks with different output.
+/// Runs the commands of all pages whose name contains `only`; returns the number of faulty blocks.
+///
+/// A block of commands is faulty if a command fails or its output differs from the page. If `slow`, the blocks marked
+/// as slow are run, otherwise the unmarked ones.
 fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
     let shell = page::Shell::build(root)?;
     let (mut faults, mut run, mut left_out, mut checked) = (0, 0, 0, 0);
@@ -132,10 +135,10 @@ fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
     Ok(faults)
 }
 
-/// Programs for Linux, and the aliases of `.cargo/config.toml` for them.
+/// Programs for Linux by name, each with its alias in `.cargo/config.toml`.
 const PROGRAMS: [(&str, &str); 2] = [("linux_companion", "companion"), ("linux_ground", "ground")];
 
-/// Aliases whose programs need no compiler.
+/// Cargo aliases of programs that are built beforehand and run without the compiler.
 const ALIASES: [&str; 6] = [
     "chain",
     "companion",
@@ -145,14 +148,15 @@ const ALIASES: [&str; 6] = [
     "provision",
 ];
 
-/// Exit statuses of a program that has accepted its options. It succeeded, it found no hardware, or it was still running at the
-/// time limit.
+/// Exit statuses of a program that has accepted its options.
+///
+/// It succeeded, found no hardware, or was still running at the time limit.
 const ACCEPTED: [i32; 3] = [0, 1, TIMEOUT];
 
-/// Exit status of `timeout` at its limit.
+/// Exit status of the command `timeout` when its time limit has passed.
 const TIMEOUT: i32 = 124;
 
-/// Returns this project's commands in a script, each as `cargo ALIAS OPTIONS`.
+/// Returns the commands of this project in a shell script, each as `cargo ALIAS OPTIONS`.
 pub(crate) fn own_commands(script: &str) -> Vec<String> {
     let joined = script.replace("\\\n", " ");
     let own = joined.lines().filter_map(own_command);
@@ -175,7 +179,9 @@ fn own_command(line: &str) -> Option<String> {
     with_alias(first.rsplit('/').next()?, rest)
 }
 
-/// Replaces the operator's confirmation of an upload, because there is no terminal.
+/// Adds `--dry-run` to a command that would ask the operator to confirm an upload.
+///
+/// There is no terminal to ask at.
 fn confirmed(command: String) -> String {
     let asks = command.starts_with("cargo ground ") && command.contains(" --version ");
     if asks && !command.contains(" --yes") {
@@ -190,10 +196,10 @@ fn with_alias(program: &str, options: &str) -> Option<String> {
     Some(format!("cargo {alias} {options}"))
 }
 
-/// Checks the exit status of a command.
+/// Checks that a program has accepted its options, by its exit status; `None` after a signal.
 ///
 /// # Errors
-/// The command, its status and its last line.
+/// The command, its status, and the last line of its output.
 pub(crate) fn accepted(command: &str, status: Option<i32>, output: &str) -> Result<(), String> {
     if status.is_some_and(|status| ACCEPTED.contains(&status)) {
         return Ok(());

@@ -5,30 +5,30 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 
-/// Words that mark a block of commands as not run.
+/// Words after the language of a code block that mark its commands as not run.
 const WHY_NOT: [&str; 6] = ["hardware", "itself", "root", "slow", "tested", "window"];
 
-/// Content of a block.
+/// Kind of a code block on a page.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
-    /// Commands, and the word that marks them as not run.
+    /// Shell commands. `Some` holds the word that marks them as not run.
     Commands(Option<String>),
-    /// Output of a command, or any other text.
+    /// Block `text`: the output of the commands before it, or any other text.
     Text,
     Other,
 }
 
-/// A fenced block.
+/// Fenced code block of a Markdown page.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
-    /// Line number of its first fence.
+    /// Line number, from 1, of the fence that opens the block.
     pub(crate) line: usize,
-    /// Number of its heading, from 1.
+    /// Number of headings on the page before this block.
     heading: usize,
     pub(crate) kind: Kind,
-    /// True for a `console`, where commands begin with `$ `.
+    /// True for a block `console`: lines that begin with `$ ` are commands, the others are output.
     is_console: bool,
-    /// True if numbers are not compared.
+    /// True if numbers in the output may differ from those on the page, such as times.
     pub(crate) noisy: bool,
     lines: Vec<String>,
 }
@@ -49,7 +49,7 @@ impl Block {
         commands.join("\n")
     }
 
-    /// Returns the expected output.
+    /// Returns the lines of output that the block expects, without commands.
     pub(crate) fn printed(&self) -> Vec<&str> {
         let lines = self.lines.iter().map(String::as_str);
         match self.kind {
@@ -58,23 +58,25 @@ impl Block {
         }
     }
 
-    /// Returns true if this block is the output of `commands`, the previous block.
+    /// Returns true if this block is the expected output of `commands`, the block before it.
     pub(crate) fn prints(&self, commands: &Self) -> bool {
         self.kind == Kind::Text && self.heading == commands.heading
     }
 }
 
-/// Returns the command and its exit status, if its comment begins with one.
+/// Returns a command and the exit status that its comment expects; `None` without such a comment.
+///
+/// The comment begins with `# exit status N`.
 fn status(line: &str) -> Option<(&str, u8)> {
     let (command, comment) = line.split_once(" # exit status ")?;
     let digits = comment.split(|sign: char| !sign.is_ascii_digit()).next()?;
     Some((command.trim_end(), digits.parse().ok()?))
 }
 
-/// Returns the blocks of a page.
+/// Returns the code blocks of a Markdown page.
 ///
 /// # Errors
-/// The line of a fence with an unknown word, or without an end.
+/// The line of a fence with an unknown word, or of one that is not closed.
 pub(crate) fn blocks(text: &str) -> Result<Vec<Block>, String> {
     let mut all: Vec<Block> = Vec::new();
     let (mut open, mut heading) = (None::<Block>, 0);
@@ -123,7 +125,7 @@ fn block(line: usize, heading: usize, info: &str) -> Result<Block, String> {
     })
 }
 
-/// Packages with the programs of the pages.
+/// Packages of this workspace whose programs the pages use.
 const PACKAGES: [&str; 4] = [
     "uav-relay-sim",
     "uav-relay-tools",
@@ -131,19 +133,19 @@ const PACKAGES: [&str; 4] = [
     "uav-relay-linux",
 ];
 
-/// Time limits of a block and of a slow one, s.
+/// Time limit for the commands of one block, s. Blocks marked as slow have a limit of their own.
 const LIMIT_S: u32 = 60;
 const SLOW_S: u32 = 1_800;
 
-/// Time limit of a command without its hardware, s.
+/// Time limit for a command whose hardware is missing, s. It is enough to check the options.
 const BEGUN_S: u32 = 2;
 
-/// Key files that commands of the pages name, which a user makes first.
+/// Names of key files that the pages use. The user is expected to have made them.
 const KEYS: [&str; 2] = ["network.key", "network7.key"];
 
 const NOT_CLONED: [&str; 2] = ["target", ".git"];
 
-/// Folder, and script that is run before each block.
+/// Shell in which the blocks of a page are run: its folder, and the script that precedes each block.
 #[derive(Debug)]
 pub(crate) struct Shell {
     folder: PathBuf,
@@ -180,7 +182,7 @@ impl Shell {
         })
     }
 
-    /// Recreates the folder, so that each page starts in a clean clone.
+    /// Empties the shell's folder and fills it like a new clone of the project, for the next page.
     pub(crate) fn clean(&self) -> Result<(), String> {
         let failed = |error: std::io::Error| format!("{}: {error}", self.folder.display());
         // The folder may not exist.
@@ -203,7 +205,12 @@ impl Shell {
             .map_err(failed)
     }
 
-    /// Runs a script like a user, until its first command that fails; returns its output.
+    /// Runs a script until its first command that fails, and returns its output.
+    ///
+    /// If `slow`, the time limit is longer.
+    ///
+    /// # Errors
+    /// The exit status and the last lines of the output, if a command fails.
     pub(crate) fn run(&self, script: &str, slow: bool) -> Result<String, String> {
         let limit_s = if slow { SLOW_S } else { LIMIT_S };
         let (status, said) = self.ended(script, limit_s)?;
@@ -217,7 +224,9 @@ impl Shell {
         Err(format!("ends with {status} after\n  {}", last.join("\n  ")))
     }
 
-    /// Starts a command without its hardware. Returns its exit status, `None` after a signal, and its output.
+    /// Starts a command whose hardware is missing, and returns its exit status and output.
+    ///
+    /// The status is `None` after a signal.
     pub(crate) fn begin(&self, command: &str) -> Result<(Option<i32>, String), String> {
         let (status, said) = self.ended(command, BEGUN_S)?;
         Ok((status.code(), said))
@@ -238,8 +247,9 @@ impl Shell {
     }
 }
 
-/// Returns a shell function `cargo` that runs the built binaries in `bin` for aliases of `config`. It runs everything else in
-/// `root`, so that nothing is built again for other paths.
+/// Returns a shell function `cargo` that runs the built programs in `bin` for the aliases of `config`.
+///
+/// It runs all other cargo commands in `root`, so that nothing is built again for other paths.
 fn functions(config: &str, bin: &Path, root: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {
@@ -259,7 +269,9 @@ fn functions(config: &str, bin: &Path, root: &Path) -> String {
     )
 }
 
-/// Checks that the page's lines occur in the output in order. In a noisy block each number matches any number.
+/// Checks that the lines of the page occur in the output, in order. Other lines may be in between.
+///
+/// If `noisy`, each number matches any number.
 ///
 /// # Errors
 /// The first missing line, and the most similar line of the output.
@@ -289,7 +301,7 @@ pub(crate) fn compare(page: &[&str], output: &str, noisy: bool) -> Result<(), St
     Ok(())
 }
 
-/// Replaces each number by `#`, and each run of spaces by one.
+/// Replaces each number in a line by `#`, and each run of spaces by one space.
 fn unnumbered(line: &str) -> String {
     let (mut out, mut in_number) = (String::new(), false);
     for sign in line.trim_end().chars() {
@@ -306,7 +318,7 @@ fn unnumbered(line: &str) -> String {
     out
 }
 
-/// Returns the number of words of one line that are in the other.
+/// Returns the number of words in the line `one` that also occur in the line `other`.
 fn alike(one: &str, other: &str) -> usize {
     let words: Vec<&str> = other.split_whitespace().collect();
     let common = one.split_whitespace().filter(|word| words.contains(word));

@@ -46,7 +46,9 @@ fn write(name: &str, folder: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Writes, lints and builds a template outside this checkout. This checkout's cargo settings would hide missing linker arguments.
+/// Writes a firmware template to a folder outside this checkout, checks its format, lints, builds it.
+///
+/// Inside, this checkout's cargo settings would hide missing linker arguments.
 fn check(name: &str) -> Result<(), Box<dyn Error>> {
     let above = std::env::temp_dir().join(format!("uav-relay-template-{}", std::process::id()));
     let folder = above.join(name);
@@ -77,7 +79,7 @@ fn check(name: &str) -> Result<(), Box<dyn Error>> {
     is_placed(&std::fs::read(image)?).map_err(|why| format!("{name}: {why}").into())
 }
 
-/// Returns an error unless the vector table is at the start of the flash.
+/// Checks that the firmware image has its vector table at the start of the flash.
 ///
 /// Without the linker script the link succeeds, but the image is empty.
 fn is_placed(image: &[u8]) -> Result<(), String> {
