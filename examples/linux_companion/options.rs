@@ -174,9 +174,9 @@ impl ListenOptions {
 /// Direction of a directional antenna.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Antenna {
-    /// Toward the transmitter.
+    /// The neighbour toward the transmitter.
     Upstream,
-    /// Toward the receiver.
+    /// The neighbour toward the receiver.
     Downstream,
 }
 

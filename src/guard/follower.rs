@@ -160,7 +160,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the agreed x of the neighbour, at its position across the line; `None` before its first fence.
+    /// Returns the neighbour's agreed position; `None` before its first fence message.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         (self.number != 0).then(|| self.across.at(self.target_m))
     }

@@ -190,7 +190,7 @@ impl FenceOwner {
         self.asked_m.min(self.granted_m) < own.config.separation_m
     }
 
-    /// Returns the agreed x of the neighbour, at its position across the line; `None` before its first message.
+    /// Returns the neighbour's agreed position; `None` before its first fence message.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
         self.counted_m
             .is_finite()

@@ -453,7 +453,7 @@ impl Relay {
         self.node.hold_reason(side)
     }
 
-    /// Returns the bearing of the next node at `side` from the setpoint: a relay, the transmitter or the receiver.
+    /// Returns the bearing from the setpoint to the next relay at `side`, or to Tx or Rx at the end.
     ///
     /// `None` without a setpoint, and while the position of that relay is unknown: its guard has to send it.
     pub fn bearing(&self, side: Side) -> Option<Bearing> {

@@ -246,7 +246,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
     assert!(format!("{first:?}") == format!("{expected:?}"));
 }
 
-/// Checks that a relay's bearings lead to the agreed position of its neighbour relay, and to the transmitter.
+/// Checks that a relay's bearings lead to its neighbour's agreed position, and to the transmitter.
 #[test]
 fn bearings_lead_to_the_neighbours_agreed_position() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));

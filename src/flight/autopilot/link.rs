@@ -300,7 +300,9 @@ impl Autopilot {
         self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
-    /// Sets the side whose neighbour a directional antenna points to, forward on the drone; `None` leaves the heading as it is.
+    /// Sets the side of the neighbour that a directional antenna, forward on the drone, points to.
+    ///
+    /// With `None` the targets have no heading.
     ///
     /// [`exchange`](Self::exchange) then calls [`handle_bearing`](Self::handle_bearing) with [`Relay::bearing`].
     pub const fn point_antenna(&mut self, side: Option<Side>) {

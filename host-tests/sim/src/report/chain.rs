@@ -100,7 +100,7 @@ pub struct ChainReport {
     /// `shared` if all relays share one radio channel; absent for separate links between neighbours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
-    /// Number of relays on each side that receive a relay's frames; absent for separate links between neighbours.
+    /// Number of relays on each side of a relay that receive its frames; absent for separate links.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reach: Option<usize>,
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
