@@ -31,9 +31,9 @@ const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Number of relays in range up to which a relay is assumed not to wait for the channel.
+/// Maximum number of relays in range for which the wait for a free channel is neglected.
 ///
-/// Radios that reach four relays far on either side have nine relays in range.
+/// It is this relay and four on either side.
 const NEAR: u16 = 9;
 
 /// Maximum time for one transmission including its wait for the channel, in frame times.
@@ -150,8 +150,9 @@ impl ChannelLoad {
 
     /// Returns the minimum [`Settings::hop_time`](crate::Settings::hop_time) on a channel of `baud` bit/s.
     ///
-    /// It is the transmission time of a sweep, times the wait for a channel that many relays share, plus `latency`, the time from
-    /// the end of a transmission to the end of the receiver's computation.
+    /// It is the transmission time of the longest message from relay to relay (a sweep, 100 bytes), times the wait
+    /// for a channel that many relays share, plus `latency`, the time from the end of a transmission to the end of
+    /// the receiver's computation.
     pub const fn hop_time(self, baud: u32, latency: Duration) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         let sweep = (MAX_SWEEP as u64 * BITS * 1_000_000).div_ceil(baud);
@@ -181,7 +182,7 @@ pub struct ChannelFull {
     ///
     /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times that.
     pub least_probe_after: Duration,
-    /// Maximum number of relays in range that the channel carries as it is.
+    /// Maximum number of relays in range that this channel carries with the present `probe_after`.
     pub most_in_range: u16,
 }
 

@@ -27,8 +27,8 @@ pub enum Event {
         /// Index of the neighbour.
         node: u16,
     },
-    /// A lost neighbour is received again, or another node has replaced it. `node` is then another one than in the
-    /// report of the loss.
+    /// A lost neighbour is received again, or another node has replaced it. In the second case `node` differs from
+    /// the node that was reported lost.
     NeighbourBack {
         /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,

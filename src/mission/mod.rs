@@ -15,8 +15,8 @@ pub(crate) mod tests;
 /// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x between two relays, as a fraction of the distance D: two f32 steps just below D. Positions this
-/// far apart remain distinct, also near Rx.
+/// Smallest step in x between two relays, as a fraction of the distance D. It is at least two steps of an f32, so the
+/// positions remain distinct after rounding, even near Rx.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step in x between two positions, as a fraction of the distance D.
@@ -217,11 +217,11 @@ pub enum Interference {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// Relay 1 is placed first (Algorithm 1), with an interferer. The SIR of a hop determines the position of its
-    /// *receiver*.
+    /// From Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position follows from that
+    /// of the sender before it.
     TowardRx,
-    /// Relay N is placed first (Algorithm 4), in a field. The interference at the receiver determines the position of
-    /// the *sender*.
+    /// From Rx to Tx, relay N first: used in a field (Algorithm 4). Each relay's position follows from that of its
+    /// receiver, where the interference is known.
     TowardTx,
 }
 
@@ -247,7 +247,7 @@ impl Band {
     /// Lateral range of zero width, as in the paper: relays stay in the vertical plane through Tx and Rx.
     pub const NONE: Self = Self::at(0.0);
 
-    /// Returns the band of a single value.
+    /// Returns the range that contains only the value `at_m`, m.
     pub const fn at(at_m: f32) -> Self {
         Self {
             least_m: at_m,
@@ -255,7 +255,7 @@ impl Band {
         }
     }
 
-    /// Returns the value in the band that is nearest to `at_m`.
+    /// Returns the value in this range that is nearest to `at_m`, m.
     pub const fn nearest(self, at_m: f32) -> f32 {
         if at_m >= self.most_m {
             self.most_m
@@ -266,12 +266,12 @@ impl Band {
         }
     }
 
-    /// Width of the band, m.
+    /// Width of this range of altitudes or lateral offsets, m: upper limit minus lower limit.
     pub const fn span_m(self) -> f32 {
         self.most_m - self.least_m
     }
 
-    /// Returns true if the band has a single value.
+    /// Returns true if this range contains a single value, so that the relay has no choice.
     pub const fn is_single(self) -> bool {
         !(self.least_m < self.most_m)
     }
@@ -303,7 +303,7 @@ impl Profile {
         within(self.altitude_m, 0.1, 1e5) && within(self.power_w, 1e-6, 1e6)
     }
 
-    /// Returns the profile of a relay right above the line Tx to Rx (y = 0), with this altitude and power.
+    /// Returns this altitude and power as those of a relay right above the line Tx to Rx (y = 0).
     pub const fn on_line(self) -> Station {
         Station {
             cross_section: CrossSection::on_line(self.altitude_m),
@@ -322,16 +322,18 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a drone-to-drone hop per watt of the sender, 1/W. It is eta / (`mu_los` `p_MSI`), with path-loss
-    /// factors and the interferer's power; in a field `Upsilon_max` / `mu_los`, m^2/W.
+    /// Gain of a drone-to-drone hop per watt of its sender, 1/W, from which the hop's SIR is computed. It is eta /
+    /// (`mu_los` `p_MSI`), with path-loss factors and the interferer's power; in a field `Upsilon_max` / `mu_los`,
+    /// m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of the last hop per watt of its sender, m^2/W: (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`.
+    /// Gain of the last hop per watt of its sender, m^2/W. The SIR at Rx is this times the power over the squared
+    /// distance.
     ///
-    /// The SIR at Rx is this times the power over the squared distance. In a field it is Upsilon(D) / eta. With noise
-    /// it refers to the interference plus noise at Rx.
+    /// It is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, with the interferer of power `p_MSI` at (X, Y). In a
+    /// field it is Upsilon(D) / eta. With noise it refers to the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
-    /// Noise nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m. 0 without
-    /// noise and in a field.
+    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. 0 without noise and
+    /// in a field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -583,7 +585,7 @@ impl Mission {
         }
     }
 
-    /// Noise nu = N eta / `p_MSI`, 1/m^2: the noise relative to the interferer's power received at 1 m.
+    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2.
     ///
     /// 0 without noise and in a field, whose Upsilon includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
@@ -655,8 +657,9 @@ impl Mission {
 }
 
 impl Mission {
-    /// Gain A of the first hop: its SIR is A [`crate::sir::quiet`] / squared length. A is `p_t` / `p_MSI`, the powers
-    /// of Tx and interferer; in a field `p_t` `Upsilon_max` / eta.
+    /// Gain A of the first hop: its SIR is A times [`crate::sir::quiet`] over the squared length. `quiet` is the
+    /// inverse interference. A is the power of Tx over that of the interferer, `p_t` / `p_MSI`; in a field `p_t`
+    /// `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
@@ -680,8 +683,8 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Ratio G = K / A of the last hop's K and the first hop's gain A, m^2. It is (`p_u` / `p_t`)(`mu_nlos` / eta)((X
-    /// - D)^2 + Y^2).
+    /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. It is (`p_u` / `p_t`)(`mu_nlos` /
+    /// eta)((X - D)^2 + Y^2), with the powers of relay and Tx, and the interferer at (X, Y).
     pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
@@ -713,19 +716,21 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index` in the direction of a pass that leaves later relays room, m. They need
-    /// their minimum separation. `across_squared` is the maximum squared distance across the line between two
-    /// neighbours among them, m^2; it reduces the steps in x.
+    /// Returns the farthest x of relay `index`, m, that leaves the relays computed after it their separation.
+    ///
+    /// Farthest means toward Rx, or toward Tx in a field. `across_squared` is the maximum squared distance across the
+    /// line (in y and altitude) between two neighbours among those relays, m^2; it reduces the steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index` in the direction of a pass, m, without a minimum separation.
+    /// Returns the farthest x of relay `index`, m, if the relays computed after it need no separation. Farthest means
+    /// toward Rx, or toward Tx in a field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Number of relays that are computed after relay `index` in a pass along the chain.
+    /// Number of relays whose positions are computed after that of relay `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -733,7 +738,7 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their separation.
+    /// Returns the largest x of relay `index`, m, that leaves the relays between it and Rx their separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -767,7 +772,7 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of a hop that halves its length, since SIR is gain over squared length.
+/// Factor on a hop's gain that makes its optimal length half as long. The SIR is gain over squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -781,8 +786,8 @@ impl Mission {
 
     /// Returns the mission with another `interference`.
     ///
-    /// A `receiver_w` above 0 is the interference power at the ground receiver, W. `halved` is true for the first
-    /// hop, and for the last one, if that hop is to be half as long as the others.
+    /// A `receiver_w` above 0 is the interference power at the ground receiver, W. `halved` is for the first and the
+    /// last hop: true if that hop is to be half as long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -822,8 +827,8 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns the gains for an unknown interferer: first hop, drone-to-drone hop per W, last hop per W. With relays of
-/// `power_w` they give SIR = (D / d)^2 on every hop of length d, so equal hops are best.
+/// Returns the gains of a mission whose interferer is unknown: first hop, other hops per W, last hop per W. With
+/// relays of `power_w`, W, they give SIR = (D / d)^2 on every hop of length d, so hops of equal length are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

@@ -11,27 +11,31 @@ use crate::root::sqrt;
 /// Number of target SIRs in a full ladder, the set of targets that one sweep along the chain tries.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps between targets from the middle gap to either end of a full ladder, both included.
+/// Number of gaps between neighbouring targets from the middle gap to either end of a full ladder. The middle gap is
+/// included.
 const HALF: usize = TARGETS / 2;
 
-/// Target SIRs (linear, rising) that one sweep along the chain tries. They are encoded as one target and two one-byte
-/// codes.
+/// Ladder: target SIRs (linear, rising) that the relays try in one pass along the chain (a sweep). They are encoded
+/// as one target and two one-byte codes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Target just below the middle gap of the ladder, or its only target.
+    /// Target SIR just below the middle gap of the ladder (list of targets), or its only target.
     anchor: f32,
-    /// Relative middle gap, as a float of 5 exponent and 3 mantissa bits, 3e-8 to 120. With 0 `anchor` is the only
-    /// target.
+    /// Width of the middle gap between two targets, relative, as a float of 5 exponent and 3 mantissa bits. It is
+    /// 3e-8 to 120; with the code 0 `anchor` is the only target.
     gap: u8,
-    /// Growth of the gaps outward: each is 1 + `growth` / 16 times its inner neighbour.
+    /// Growth of the gaps between targets from the middle to the ends. Each gap is 1 + `growth` / 16 times the next
+    /// one toward the middle.
     growth: u8,
-    /// True for a plain pass, in which every relay is at its reach and none stops before it.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
+    /// of it for the sake of the next one.
     plain: bool,
 }
 
 impl Ladder {
-    /// Returns a ladder of one target, above 0; the last relay commits it if it is feasible.
+    /// Returns a list (ladder) of one target SIR, above 0. The last relay commits the chain to it if the chain meets
+    /// it.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -41,17 +45,19 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay is at its reach.
+    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay takes the farthest
+    /// x that meets the target.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true for a plain pass, in which every relay is at its reach and none before it.
+    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In other
+    /// passes a relay may stay short of that x for the sake of the next relay.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
 
-    /// Returns a ladder of targets in equal ratios, from just below `low` to just above `high`. 0 < `low` < `high`.
+    /// Returns 16 targets (a ladder) in equal ratios, from just below `low` to just above `high`. 0 < `low` < `high`.
     pub fn spanning(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -60,7 +66,7 @@ impl Ladder {
         )
     }
 
-    /// Returns a ladder of targets in equal ratios, strictly between `low` and `high`; 0 < `low` < `high`.
+    /// Returns 16 targets (a ladder) in equal ratios, strictly between `low` and `high`; 0 < `low` < `high`.
     pub fn between(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -69,8 +75,8 @@ impl Ladder {
         )
     }
 
-    /// Returns a ladder that is dense around `centre`, in the middle of a gap of `gap` (relative). The gaps grow
-    /// outward until the targets span [`low`, `high`].
+    /// Returns 16 targets (a ladder) that are dense around `centre` and span [`low`, `high`]. `centre` is in the
+    /// middle of a gap of the relative width `gap`; the gaps grow outward from there.
     pub fn around(centre: f32, gap: f32, low: f32, high: f32) -> Self {
         let code = gap_code(gap);
         let wanted = (centre / low).max(high / centre);
@@ -100,8 +106,8 @@ impl Ladder {
         }
     }
 
-    /// Decodes a ladder; `None` unless its targets are normal f32s above zero and its encoding is unique. A single
-    /// target (`gap` 0) must have `growth` 0.
+    /// Decodes a list of targets; `None` if a target is not a normal f32 above zero, or the encoding is not unique. A
+    /// single target (`gap` 0) must have `growth` 0.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -122,12 +128,12 @@ impl Ladder {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true for a ladder of one target, which the last relay commits if it is feasible.
+    /// Returns true if there is a single target, which the last relay commits the chain to if it is feasible.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }
 
-    /// Number of targets in the ladder, 1 or [`TARGETS`].
+    /// Number of target SIRs in the list, 1 or [`TARGETS`].
     #[allow(clippy::len_without_is_empty, reason = "there is always a target")]
     pub const fn len(&self) -> usize {
         if self.is_single() { 1 } else { TARGETS }
@@ -166,8 +172,8 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the ratio of the highest target to the lower of the two middle ones. The ratio of the higher middle one to
-/// the lowest target is the same.
+/// Returns the ratio of the highest target to the lower of the two middle targets. The ratio of the higher of those
+/// two to the lowest target is the same.
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -182,7 +188,8 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the gap of `code`, (1 + m / 8) 2^(e - 25). Its bits become low exponent and high mantissa bits of an f32.
+/// Returns the width of a gap from its one-byte `code`: (1 + m / 8) 2^(e - 25). m are its low three bits, e the other
+/// five; they become mantissa and exponent bits of an f32.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }

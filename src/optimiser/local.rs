@@ -141,13 +141,13 @@ pub struct LocalSearch {
     hops: Hops,
     bottom_m: f32,
     top_m: f32,
-    /// Lowest altitude of the current round, m. The next field is the highest one.
+    /// Lowest altitude that the current round of the search tries, m.
     low_m: f32,
     high_m: f32,
     round: u8,
     row: u8,
     column: u8,
-    /// Best row of the current round: its altitude, m, and the SIR of its worse hop.
+    /// Best altitude of the current round, m, and the SIR of the worse hop there.
     best_row: (f32, f32),
     /// Best position found if it is better than the current position; `None` otherwise.
     found: Option<Placement>,
@@ -156,8 +156,8 @@ pub struct LocalSearch {
 }
 
 impl LocalSearch {
-    /// Starts a search by a relay at `at`, up to `explore_m` above and below it. `band` is the lowest and the highest
-    /// allowed altitude, m.
+    /// Starts a search by a relay at `at`, up to `explore_m` metres above and below it. `band` is the lowest and the
+    /// highest allowed altitude, m.
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);
@@ -212,8 +212,8 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns the altitude at the fraction `part`, 0 to 1, of the current range, m. The clamp corrects rounding at
-    /// the band's end.
+    /// Returns the altitude at the fraction `part`, 0 to 1, of the range that the current round tries, m. It is
+    /// clamped to the allowed altitudes, because of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -302,7 +302,8 @@ mod tests {
     use crate::place::Placement;
     use crate::power_ratio::PowerRatio;
 
-    /// Returns a search by a relay at `altitude_m` between two at altitude `beside_m`, 100 m apart.
+    /// Returns a search by a relay at `altitude_m`, between two relays at `beside_m`, 100 m apart. `apart_m` is the
+    /// minimum separation, and `band` the allowed altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

@@ -22,7 +22,7 @@ use crate::place::Station;
 use crate::root::sqrt_in_place;
 use crate::sir::{Sender, square};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx.
+/// Maximum number of positions that the last relay tries in order to receive Rx, for traffic in both directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of field points evaluated per call. It limits the number of targets in a call, which is at least
@@ -50,7 +50,8 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all parameters on which its reach for a target depends.
+/// Relay in a pass along the chain, with all that determines its *reach* for a target SIR. The reach is the farthest
+/// x, in the direction of the pass, that meets the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission of the chain.
@@ -63,9 +64,11 @@ pub struct Link<'a> {
     pub own: Station,
     /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the agreed field.
     pub measured_per_w: Option<f32>,
-    /// True for a plain pass, in which every relay is at its reach and none stops before it.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
+    /// of it for the sake of the next one.
     pub plain: bool,
-    /// Maximum x of the relay by the joint method, m; `None` with other methods.
+    /// Maximum x of the relay, m, that leaves later relays their separation, by the joint method. `None` with other
+    /// methods.
     pub end_m: Option<f32>,
 }
 
@@ -85,9 +88,9 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 impl Link<'_> {
     /// Appends this relay's reaches for the rising `targets` to `reaches`, after those already there.
     ///
-    /// A reach is the farthest x in the direction of the pass that meets a target. It stops at the first target that
-    /// cannot be met. `from` are the reaches of the relay before, m. Bounded by a reach per target; in a field by
-    /// three for each of its points.
+    /// A reach is the farthest x in the direction of the pass that meets a target. `from` has the reaches of the
+    /// previous relay, m. The list ends before the first target that cannot be met. Bounded by a reach per target; in
+    /// a field by three for each of its points.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -121,8 +124,8 @@ impl Link<'_> {
         }
     }
 
-    /// Appends as many more reaches as one call may compute; returns true once all are computed. Bounded by 16
-    /// reaches; in a field by 128 of its points, or by one target.
+    /// Continues [`extend`](Self::extend) by as many reaches as one call may compute; returns true once all are
+    /// computed. Bounded by 16 reaches (farthest x for a target); in a field by 128 of its points, or by one target.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -170,15 +173,16 @@ impl Link<'_> {
         }))
     }
 
-    /// Returns the maximum x of the previous relay of a pass toward Tx, m.
+    /// Returns the maximum x of the previous relay in a pass toward Tx, m. Later relays toward Rx need no separation
+    /// in x.
     ///
     /// Relays may be above each other if their altitudes allow that.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay that starts closest to Tx of all that end from `low` to `high`, m. On a plain
-    /// pass it ends at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop from this relay with the smallest x of this relay, for a receiver at x from `low` to `high`,
+    /// m. In a plain pass the receiver is at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -201,10 +205,10 @@ impl Link<'_> {
 
     /// Returns the slack (spare length) of the chain for `target`, m, and the x of this last relay, m.
     ///
-    /// A slack of 0 or more means that the chain meets the target. `reach` is the end of this relay's range, and
-    /// `from_m` that of the relay before. `None` if Rx is out of reach from everywhere. Toward Rx the slack is reach
-    /// + `d_max` - D. Toward Tx it is the maximum length of the first hop minus the position, at the position of the
-    ///   range that maximises it.
+    /// A slack of 0 or more means that the chain meets the target. `reach` is the farthest x of this relay that meets
+    /// it, and `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere. Toward Rx the slack
+    /// is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less this relay's x, at
+    /// the x that maximises it.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -241,8 +245,8 @@ impl Link<'_> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m`, m, at which this relay receives the relay before it. The reach of that
-    /// relay is `from_m`. `None` if there is none.
+    /// Returns the largest x up to `most_m`, m, at which this relay receives the previous one. `from_m` is the
+    /// farthest x of the previous relay. `None` if there is none.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -250,8 +254,8 @@ impl Link<'_> {
         }
     }
 
-    /// Returns [`Link::ending`] for traffic in both directions; `hop` leads from Rx to this last relay. `slack`
-    /// returns the slack toward Rx for this relay's x.
+    /// Returns [`Link::ending`], the chain's slack and this last relay's x, for traffic in both directions. `hop`
+    /// leads from Rx to this relay, and `slack` returns the slack toward Rx for an x of this relay.
     fn held(
         &self,
         hop: &FromRx,
@@ -282,11 +286,11 @@ impl Link<'_> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the relay before must take if this one is at `place`, to meet `target`. The reach of the
-    /// relay before is `from_m`.
+    /// Returns the x that the previous relay must take to meet `target` if this relay is at x = `place`.
     ///
-    /// `None` if there is none, because a range that was assumed to have no holes has one. Bounded by two reaches, in a field by
-    /// three for each of its points.
+    /// `from_m` is the farthest x of the previous relay. `None` if it has no such position: the search takes its
+    /// possible positions for an interval, which may have holes. Bounded by two reaches, in a field by three for each
+    /// of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -338,8 +342,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a sweep at its last relay, `link`, which has these `reaches`. `from` are the reaches of the
-/// relay before, m.
+/// Returns the result of a pass of target SIRs (a sweep) at its last relay, `link`. `reaches` are that relay's
+/// farthest x for each target, and `from` those of the previous relay, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -351,11 +355,12 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of one sweep along the chain: slack (spare length) of each target, and target to commit.
+/// Result of one pass of target SIRs along the chain (a sweep): each target's slack, and a target to commit. The
+/// slack is the chain's spare length, below 0 if the target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the committed target in the ladder; `None` if the search goes on. After a commit every relay takes
-    /// its position for that target.
+    /// Index of the target that the relays are to use, in the ladder (list of targets); `None` if the search goes on.
+    /// After a commit every relay takes its position for that target.
     pub commit: Option<u8>,
     /// Slack (spare length) of the chain for each target that every hop can meet, m. It is 0 or more if the chain
     /// meets the target.
@@ -363,9 +368,9 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result of a sweep of `ladder`, whose `targets` have these `slacks` (spare lengths). A target is
-    /// committed if the next higher one is known to be infeasible and within the mission's tolerance, or if the
-    /// ladder has no other target: the step of the paper's Algorithm 1.
+    /// Returns the result of a sweep of `ladder` (list of target SIRs), whose `targets` have these `slacks`. A slack
+    /// is the chain's spare length. A target is committed if the next higher one is known to be infeasible and within
+    /// the mission's tolerance, or if the ladder has no other target: the step of the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -402,7 +407,9 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
         .map_or(0, |last| last + 1)
 }
 
-/// Whole chain for one target, without messages. It computes reaches from the leader to the last relay, and then the
+/// Whole chain for one target, computed without messages.
+///
+/// It computes each relay's reach (farthest x that meets the target) from the leader to the last relay, and then the
 /// required positions in the opposite order.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
@@ -425,8 +432,9 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes the reaches of all relays; returns the chain's slack (spare length), m, and the last x, m. That x is
-    /// the last relay's. `visit` gets the index and the reach of each relay. `None` if a hop cannot meet the target.
+    /// Computes all relays' reaches; returns the chain's slack (spare length), m, and the last relay's x, m. A reach
+    /// is the farthest x that meets the target; `visit` gets it with the relay's index. `None` if a hop cannot meet
+    /// the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();
@@ -442,8 +450,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns true if the chain meets its target. Either every relay can be at its reach, or all relays can take
-    /// their required positions.
+    /// Returns true if the chain meets its target. Either every relay can take the farthest x that meets the target,
+    /// or all relays can take the x that the next one requires.
     pub(crate) fn is_met(&self) -> bool {
         let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
         closes(self)
@@ -453,8 +461,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             }) || self.place(0).is_some())
     }
 
-    /// Returns the x of relay `index`, m, if every relay can be at its reach; else `None`. For the index 0 it returns
-    /// the x of some relay.
+    /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. For the
+    /// index 0 it returns the x of some relay.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = Self {
             plain: true,
@@ -481,8 +489,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the reach of relay `index`, m, or for `None` the x at which the pass starts. `None` if a hop cannot
-    /// meet the target.
+    /// Returns the farthest x of relay `index` that meets the target, m; for `None` the x at which the pass starts.
+    /// The result is `None` if a hop cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let mut from_m = origin(self.mission);
         let Some(index) = index else {

@@ -10,13 +10,13 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target that the whole chain meets, as the last sweep's ladder and an index in it.
+/// Target SIR that the whole chain meets: the list of targets (ladder) of the last pass, and an index in it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
-    /// Ladder of targets of the last sweep, in which the target is committed.
+    /// Ladder, the list of target SIRs, of the last sweep (pass along the chain). The target was committed in it.
     pub ladder: Ladder,
-    /// Index of the committed target in the ladder.
+    /// Index of the committed target SIR in the ladder, the list of targets.
     pub commit: u8,
     /// Committed target, linear SIR.
     pub target: f32,
@@ -32,7 +32,7 @@ pub struct Agreed {
 pub struct Planner {
     search: Search,
     reaches: PerTarget,
-    /// Reaches of the current relay for the ladder's targets, as far as they are computed, m.
+    /// Farthest x of the current relay for each target, m, as far as they are computed.
     next: PerTarget,
     index: u16,
     behind: Option<Behind>,
@@ -65,10 +65,10 @@ impl Planner {
         self.sweeps = self.sweeps.saturating_add(1);
     }
 
-    /// Computes at most `hops` hops of a sweep; `Ok(Some(..))` once the chain is solved.
+    /// Computes at most `hops` hops of a pass along the chain; `Ok(Some(..))` once the chain is solved.
     ///
-    /// A hop takes at most 16 reaches, in a field 128 of its points. `profile_of` returns the profile of relay 1..=N,
-    /// and must always return the same.
+    /// A hop takes at most 16 farthest positions, one for each target, in a field 128 of its points. `profile_of`
+    /// returns the profile of relay 1..=N, and must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left to try.
@@ -120,9 +120,9 @@ impl Planner {
     }
 }
 
-/// Solves the chain in one call: at most about fifty sweeps over N hops with the bracketed schedule.
+/// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// If relays have to stop before their reach, their positions are checked as in [`place`].
+/// If relays have to stay short of their farthest position, their positions are checked as in [`place`].
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -158,8 +158,8 @@ pub fn solve(
     }
 }
 
-/// Returns the position of relay `index` for `target`. `plain` is true if every relay must be at its reach. `None` if
-/// a relay has no position.
+/// Returns the position of relay `index` for `target`; `None` if some relay has none. `plain` is true if every relay
+/// must take the farthest x that meets the target.
 fn placed(
     mission: &Mission,
     target: f32,
@@ -180,10 +180,10 @@ fn placed(
         .map(|x_m| profile_of(index).on_line().cross_section.at(x_m))
 }
 
-/// Returns the position of relay `index` for `target`. It is before the relay's reach if that lets other relays meet
-/// the target.
+/// Returns the position of relay `index` for `target`; `None` if the chain cannot meet it.
 ///
-/// `None` if the target cannot be met. At most N^2 reaches.
+/// A relay stays short of the farthest x that meets the target if that lets other relays meet it. At most N^2
+/// computations of such an x.
 pub fn place(
     mission: &Mission,
     target: f32,

@@ -6,28 +6,29 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed steps that an ascent of the joint method tries, in this order.
+/// Fractions of the relays' computed moves that an iteration of the joint method tries, in this order.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// Initial trust region: limit of a relay's step, as a fraction of its distance from the interferer. It also limits
-/// the change of ln gamma, the logarithm of the target SIR.
+/// Initial trust region: limit of a relay's move in one iteration of the joint method. It is a fraction of the
+/// relay's distance from the interferer. It also limits the change of the target, in ln(SIR).
 const TRUST: f32 = 0.5;
 
-/// Trust region (limit of the steps) below which the result of an ascent is not predicted.
+/// Trust region (limit of a relay's move) below which an ascent's final target is not predicted.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust region (limit of the steps) below which the ascent ends; a fraction like [`TRUST`].
+/// Trust region (limit of a relay's move) below which the ascent ends; a fraction like [`TRUST`].
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum fall of the slack (spare length at Rx) per unit of ln gamma, in units of the distance D. gamma is the
-/// target SIR. Hops of a total length D lose half of it when the target rises by a factor of e.
+/// Minimum rate at which the slack (spare length at Rx) falls with the target, in units of D per ln(SIR). The usual
+/// rate is 0.5, since hop lengths vary as 1 / sqrt(SIR). Steps are divided by the rate, so a smaller one is raised to
+/// this.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the maximum target SIR, in ln gamma, after the chain failed at its upper bound.
+/// First increase of an ascent's target limit, in ln(SIR), after the chain failed the check at its upper bound.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the slack (spare length of the chain at Rx), in units of D. More slack has no value, or it would
-/// outweigh a penalty.
+/// First cap on the slack (spare length of the chain at Rx), in units of D. Slack above the cap does not count, so
+/// that it cannot outweigh a penalty.
 const SPARE: f32 = 3e-3;
 /// Smallest cap on the slack (spare length of the chain at Rx), in units of D. It is not lowered further.
 const LEAST_SPARE: f32 = 4e-5;
@@ -35,33 +36,33 @@ const LEAST_SPARE: f32 = 4e-5;
 /// Weight of a length that is missing at Rx, relative to spare length, when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Gain of the target SIR, in ln gamma, below which a step counts as idle. Two idle steps in a row end the ascent.
+/// Gain of the target SIR, in ln(SIR), below which a step counts as idle. Two idle steps in a row end the ascent.
 const CLOSE: f32 = 3e-6;
 
-/// Expected gain of the target SIR below which an ascent ends, in ln gamma.
+/// Expected gain of the target SIR below which an ascent ends, in ln(SIR).
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected gain of the target SIR below which the end of an ascent can be predicted, in ln gamma.
+/// Expected gain of the target, in ln(SIR), below which an ascent's final target can be predicted.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which an ascent has diverged if its chain is too short by `ASTRAY` D. D is the distance
-/// from Tx to Rx.
+/// Number of iterations after which an ascent is checked for divergence. It has diverged if its chain is more than
+/// `ASTRAY` D too short; D is the distance from Tx to Rx.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Length by which a chain may fall short of Rx at the end of an ascent, in units of D. The search for the highest
-/// target after the ascent makes up for it.
+/// Maximum length, in units of D, by which the chain of an ascent may fall short of Rx to be worth more work. The
+/// search after the ascent finds a lower target that it meets.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
-    /// Try `share`, a fraction of the relays' steps, with the target `sigma`, in ln gamma.
+    /// Try the fraction `share` of the relays' computed moves with the target `sigma`, in ln(SIR).
     Try { share: f32, sigma: f32 },
     /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
-    /// Compute the relays' steps again, by a backward pass.
+    /// Compute the relays' moves again, by a backward pass from the last relay to the first.
     Again,
     /// End the ascent.
     Over,
@@ -69,22 +70,20 @@ pub(crate) enum AscentStep {
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
-    /// Target SIR of the current chain, as ln gamma. The next field is the slack, the chain's spare length at Rx for
-    /// it, m.
+    /// Target SIR of the current chain, in ln(SIR).
     pub(crate) sigma: f32,
     pub(crate) slack: f32,
     floor: f32,
-    /// Maximum target SIR until the chain is checked at its upper bound, in ln gamma. The next field is its next
-    /// increase.
+    /// Maximum target of the ascent, in ln(SIR), until the chain is checked at its upper bound.
     limit: f32,
     excess: f32,
     /// Cap on the slack (spare length of the chain at Rx), in units of D. It is lowered where slack would outweigh a
     /// penalty.
     spare: f32,
-    /// Penalty of the current chain for relays too near the interferer, in metres of length at Rx.
+    /// Penalty of the current chain for relays too near the interferer: a length subtracted from the slack, m.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// Derivative of the slack (spare length at Rx) by ln gamma, the logarithm of the target SIR, m.
+    /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
@@ -96,7 +95,7 @@ pub(crate) struct Ascent {
 
 impl Ascent {
     /// Creates an ascent of a chain with `slack`, its spare length at Rx, m, for the target `sigma`. Targets are in
-    /// ln gamma, and never fall below `floor`.
+    /// ln(SIR), and never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -117,7 +116,7 @@ impl Ascent {
         }
     }
 
-    /// Returns the ascent with a maximum target of `limit`, in ln gamma, until the chain is checked there.
+    /// Returns the ascent with its target limited to `limit`, in ln(SIR), until the chain is checked there.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -157,12 +156,12 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the current chain meets the maximum target.
+    /// Returns true if the target has risen to its limit, and the current chain meets it.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the maximum target after the chain failed at it; it needs more spare length. Returns the next action.
+    /// Raises the target's limit after the chain failed the check at its upper bound. Returns the next action.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -174,14 +173,15 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds a segment's derivative by the target, and its expected gains, to the backward pass's totals.
+    /// Adds the results for one segment (ten relays) to the totals of the backward pass. They are the slack's
+    /// derivative by the target, and the gains expected from the relays' moves.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
         self.square += outlook.square;
     }
 
-    /// Returns the action that follows a complete backward pass.
+    /// Returns the next action after a complete backward pass, which computes the relays' moves.
     pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -202,24 +202,24 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if spare length and expected gain are each worth less than `by`, in ln gamma.
+    /// Returns true if the slack and the expected gain are each worth less than `by` of the target, in ln(SIR).
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Returns true if the ascent diverges: the target rises, and the chain falls far short of Rx.
+    /// Returns true if the ascent diverges: after some iterations the chain still falls far short of Rx.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true while the chain falls short of Rx so little that it may still meet its target.
+    /// Returns true if the chain falls short of Rx by so little that it is worth more work.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the ascent, with the action `turn` next, will end no higher than the target `sigma`. False if
-    /// there is a penalty.
+    /// Returns true if the ascent is predicted to end no higher than the target `sigma`, in ln(SIR). `turn` is its
+    /// next action. The result is false if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -230,8 +230,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target, in ln gamma, that the chain should just meet with `share` of the steps. `share` is a
-    /// fraction.
+    /// Returns the target, in ln(SIR), that the chain should just meet after part of the relays' moves. `share` is
+    /// that part, 0 to 1.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -250,14 +250,14 @@ impl Ascent {
         }
     }
 
-    /// Returns the value of a chain with `slack` (spare length at Rx, m) for the target `sigma`. Both are combined in
-    /// ln gamma. A missing length has a higher weight than a spare one.
+    /// Returns the merit of a chain: the target that would use up its slack, in ln(SIR). The chain has `slack`, its
+    /// spare length at Rx, m, for the target `sigma`. A missing length counts twice.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial is better than the current chain: `slack`, m, for the target `sigma`. `slack` is its
-    /// spare length at Rx, and `sigma` is in ln gamma.
+    /// Returns true if a trial chain is better than the current one. The trial has `slack`, its spare length at Rx,
+    /// m, for the target `sigma`, in ln(SIR).
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -266,7 +266,7 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the action after a failed trial: a smaller fraction of the step, or a smaller trust region.
+    /// Returns the action after a failed trial: a smaller fraction of the moves, or a smaller trust region.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -279,8 +279,8 @@ impl Ascent {
         turn
     }
 
-    /// Makes a trial the current chain: fraction `share` of the steps, spare length `slack` for `sigma`. Returns the
-    /// next action.
+    /// Makes a successful trial the current chain; returns the next action. The trial had the fraction `share` of the
+    /// moves, and has `slack`, its spare length at Rx, m, for the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);

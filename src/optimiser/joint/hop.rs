@@ -42,7 +42,8 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of a hop's reach by its start p, its end's free coordinates w, and ln gamma.
+/// Derivatives of a hop's *reach*, the dependent coordinate of its end at maximum length. Its variables are the hop's
+/// start p, the two free coordinates w of its end, and the target in ln(SIR).
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -52,16 +53,18 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Mixed second derivatives of the reach: row i by the end's free coordinate w_i and by the start p.
+    /// Mixed second derivatives of the reach (the end's dependent coordinate): a row for each free coordinate w_i of
+    /// the end, with the derivatives by the start p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the reach by the free coordinates: w_1 twice, w_1 and w_2, w_2 twice.
+    /// Second derivatives of the reach (the end's dependent coordinate) by the end's free coordinates w: w_1 twice,
+    /// w_1 and w_2, w_2 twice.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the reach by ln gamma, the logarithm of the target SIR, m.
+    /// Derivative of the reach (the end's dependent coordinate) by the target in ln(SIR), m.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// Derivatives for a hop whose end is fixed: all are 0.
+    /// Derivatives of a hop whose end does not move with its start or its target: all are 0.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -71,9 +74,11 @@ impl Reach {
         by_target: 0.0,
     };
 
-    /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`. The dependent
-    /// coordinate comes first in each triple. `c` is target over gain, and `noise` is nu, 1/m^2. Returns
-    /// [`Reach::FIXED`] at the very rim of the reach, where no coordinate is dependent.
+    /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`.
+    ///
+    /// In each triple the dependent coordinate of the hop's end is first. `c` is target SIR over gain, and `noise`
+    /// the noise over the interferer's power received at 1 m, 1/m^2. [`Reach::FIXED`] if the end is at the rim of the
+    /// positions that meet the target, where no coordinate depends on the others.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -122,8 +127,8 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of the inverse interference plus noise, q(s) = s / (1 + nu s). s is the squared
-/// distance from the interferer, m^2.
+/// Derivatives q'(s) and 2 q''(s) of q(s) = s / (1 + nu s), the inverse interference plus noise. s is the squared
+/// distance from the interferer, m^2, and nu the noise over the interferer's power received at 1 m, 1/m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -209,13 +214,13 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
 }
 
 /// Condition for a hop to meet its target: s + `spare` >= `c` l. s and l are the squared distances of the hop's end
-/// from the interferer and from the sender, m^2.
+/// from the interferer and from the sender, m^2. `c` is target SIR over gain, raised for noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
-    /// Difference c - 1, without cancellation.
+    /// Difference c - 1 of the condition's factor `c` and 1, computed without cancellation.
     pub(super) e: f32,
-    /// Constant term of the condition, m^2; 0 without noise.
+    /// Squared length that is added to s in the condition s + `spare` >= `c` l, m^2; 0 without noise.
     pub(super) spare: f32,
 }
 
@@ -224,8 +229,10 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the noise-free condition that equals the one with noise at the squared distance `s`. `s` is the
-    /// distance from the interferer, m^2; `noise` is nu, 1/m^2, `c` target over gain, and `e` is c - 1.
+    /// Returns the noise-free condition that equals the condition with noise at one distance.
+    ///
+    /// `s` is the squared distance of the hop's end from the interferer, m^2, `noise` the noise over the interferer's
+    /// power received at 1 m, 1/m^2, `c` target SIR over gain, and `e` is c - 1.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

@@ -11,27 +11,29 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function: derivatives of the slack, the chain's spare length at Rx, by a relay's position. Later relays
-/// react optimally.
+/// Value function of the joint method: dependence of the chain's slack on one relay's position. The slack is the
+/// chain's spare length at Rx. Later relays are assumed to react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack (spare length at Rx) by the relay's x, y and h, m per m.
     pub(crate) slope: Triple,
     /// Second derivatives of the slack (spare length at Rx) by the relay's x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// Derivative of the slack (spare length at Rx) by the logarithm of the target SIR, m.
+    /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Gain of spare length at Rx expected from later relays' steps, m: the part linear in the fraction. It is
-    /// multiplied by the fraction of the steps that is tried.
+    /// Expected gain of slack (spare length at Rx) by later relays' moves, m: the linear part. It is multiplied by
+    /// the fraction of the moves that is tried.
     pub(crate) linear: f32,
-    /// Gain of spare length at Rx expected from later relays' steps, m: the part quadratic in the fraction. It is
-    /// multiplied by the square of the fraction of the steps that is tried.
+    /// Expected gain of slack (spare length at Rx) by later relays' moves, m: the quadratic part. It is multiplied by
+    /// the square of the fraction of the moves that is tried.
     pub(crate) square: f32,
 }
 
 impl Outlook {
-    /// Returns the slack of a chain whose last relay is at `at`, m, and its derivatives. The slack is `reach_m`, the
-    /// maximum length of the last hop, less its length. Rx is at `distance_m`; an x beyond Rx counts as the x of Rx.
+    /// Returns the slack of a chain whose last relay is at `at`, m, and its derivatives.
+    ///
+    /// The slack is `reach_m`, the maximum length of the last hop, less that hop's length. Rx is at x = `distance_m`;
+    /// an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -54,8 +56,8 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty for a relay too close to the interferer, half `weight` `near`^2. `slope` and `by_target`
-    /// are the derivatives of `near` by the position and by ln gamma.
+    /// Subtracts the penalty for a relay too close to the interferer, `weight` `near`^2 / 2. `slope` and `by_target`
+    /// are the derivatives of `near` by the relay's position and by the target in ln(SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -69,8 +71,9 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function through `hop` to the relay before it, and returns the optimal policy. The step
-    /// of the two free coordinates is limited to `low` to `high`, m, relative to the current position.
+    /// Propagates the value function from the end of `hop` to its start; returns the policy of the relay at its end.
+    /// The relay's move in its two free coordinates is limited to [`low`, `high`], m, relative to its current
+    /// position.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -149,28 +152,30 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     sum
 }
 
-/// Policy of a relay in the joint method: its step in the two free coordinates of its hop.
+/// Policy of a relay in the joint method: its move in one iteration, in the two free coordinates.
 ///
-/// The step depends linearly on the move of the previous relay.
+/// The third coordinate follows from the maximum length of the hop. The move depends linearly on that of the previous
+/// relay.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True if the dependent coordinate is the larger of the two values that the hop allows.
+    /// True to take the larger of two solutions for the relay's dependent coordinate. Given its other two
+    /// coordinates, a hop of maximum length can end at two positions, which differ in this one.
     pub(super) rising: bool,
-    /// Step of the two free coordinates if the previous relay has not moved, m.
+    /// Move of the two free coordinates if the previous relay has not moved, m.
     pub(super) step: [f32; 2],
-    /// Additional step of each free coordinate per metre that the previous relay has moved in x, y and h.
+    /// Additional move of each free coordinate per metre that the previous relay has moved in x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature by which a step is divided, relative to the largest curvature. Smaller curvature is rounding
-/// noise.
+/// Minimum curvature that a relay's move is divided by, relative to the largest curvature. Smaller curvature is
+/// rounding noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// Returns the policy whose step, between `low` and `high`, maximises a quadratic function. The function has the
-    /// gradient `slope` and the second derivatives `bend` (yy, yh, hh), made concave; `across` are the mixed ones by
-    /// the previous relay's position.
+    /// Returns the policy that maximises a quadratic function of the relay's two free coordinates. Its move is within
+    /// [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh, hh),
+    /// which are made concave. `across` has its mixed derivatives by the previous relay's position.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],
@@ -241,9 +246,9 @@ impl Policy {
         }
     }
 
-    /// Returns the change of the two free coordinates, m, for the fraction `share` of the step.
+    /// Returns the relay's move in its two free coordinates, m, for the fraction `share` of its own step.
     ///
-    /// `change` is the move of the previous relay.
+    /// `change` is the move of the previous relay in x, y and h, m, to which the relay reacts.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;
@@ -252,7 +257,8 @@ impl Policy {
     }
 }
 
-/// Returns the symmetric matrix (yy, yh, hh) with each eigenvalue made negative. So the quadratic has a maximum.
+/// Returns the symmetric matrix (yy, yh, hh) with positive eigenvalues negated. A quadratic function with these
+/// second derivatives has a maximum.
 fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     let (mean, half) = (0.5 * (yy + hh), 0.5 * (yy - hh));
     let root = sqrt(square(half) + square(yh));

@@ -19,7 +19,7 @@ const RIM: f32 = 0.999_99;
 /// Factor on the minimum separation in the joint method, so that a small violation of it is harmless.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Newton iterations of the point at which a hop with noise is linearised (see [`Tangent`]).
+/// Number of Newton steps that find the point at which a hop with noise is linearised (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
 /// Number of bisection steps of [`Site::halved`], for a path whose end is out of reach.
@@ -29,7 +29,7 @@ const HALVINGS: u8 = 12;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
-    /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
+    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / P, 1/m^2; 0 without noise.
     pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,
@@ -39,8 +39,8 @@ pub(crate) struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    /// Returns the relay that receives from `sender`; `first` is true if the sender is Tx. `room` has the lateral
-    /// offsets and altitudes that the relay may choose from.
+    /// Creates the relay to be placed, which receives from `sender`; `first` is true if the sender is Tx. `room` has
+    /// the lateral offsets and altitudes that the relay may choose from.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -68,7 +68,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns this relay without the minimum separation from its sender.
+    /// Returns this relay without a minimum separation from its sender.
     pub(crate) fn unparted(self) -> Self {
         Self {
             apart_m: 0.0,
@@ -76,9 +76,10 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position at the cross-section `wanted`, or the closest one that the hop reaches. The hop has to
-    /// meet `target` from a sender at x = `from_m`. `None` if no hop meets the target. The position's x is at most
-    /// Rx's.
+    /// Returns the position with the lateral offset and altitude `wanted`, at the largest x that meets `target`.
+    ///
+    /// The sender is at x = `from_m`. If its hop cannot reach `wanted`, the closest lateral offset and altitude that
+    /// it reaches are taken. `None` if no hop meets the target. The position's x is at most Rx's.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -89,8 +90,8 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the position of largest x, with the lateral offset and altitude `at`, that the hop reaches. `None` if
-    /// there is none.
+    /// Returns the position of largest x, with the lateral offset and altitude `at`, at which the hop meets `target`.
+    /// The sender is at x = `from_m`. `None` if there is none.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -102,10 +103,11 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns the reachable cross-section closest to `wanted` on the line to it from the best allowed one. Both ends
-    /// of the line are moved into the allowed range. Reachable means without a step back along x; `None` if nothing
-    /// is. For c > 1 a hop from p reaches a ball, with the interferer at m: its centre is p + (p - m) / (c - 1), its
-    /// radius sqrt(c) |p - m| / (c - 1).
+    /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches without a step back in x.
+    ///
+    /// It is searched on the straight line to `wanted` from the allowed ones nearest to the middle of those in reach.
+    /// `None` if none is reached. For c = target / gain > 1 a hop from p reaches a ball, with the interferer at m:
+    /// its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -118,8 +120,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of cross-sections (y, h) in reach at x >= `x_m`, for c = target / gain > 1. It is the
-    /// centre and the squared radius, m^2; `None` for c <= 1.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. It is the centre and
+    /// the squared radius, m^2. `None` if c = target / gain is at most 1, where the reach has no such limit.
     fn disk(
         &self,
         target: f32,
@@ -170,8 +172,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest reachable position on a path to the cross-section `wanted`, by bisection. The path begins
-    /// at the sender's cross-section.
+    /// Returns the farthest reachable position on a path across the line, by bisection. The path leads from the
+    /// lateral offset and altitude of the sender to those `wanted`.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -192,8 +194,10 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Returns the cross-section for the fraction `share` of the step of `policy`. The sender is at `from`, which is
-    /// `change` from its current position; `nominal` is the relay's current position.
+    /// Returns the relay's new lateral offset and altitude after the fraction `share` of its step.
+    ///
+    /// `policy` gives the step. The sender has moved by `change` and is at `from`; the relay itself is still at
+    /// `nominal`. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -252,9 +256,9 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the dependent coordinate at which the hop from the sender at `from` just meets `target`.
+    /// Returns the dependent coordinate of the relay, m, at which the hop from `from` just meets `target`.
     ///
-    /// `at` are the two free coordinates.
+    /// `at` are its two free coordinates, m. `None` if no position with these just meets the target.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {
@@ -283,8 +287,8 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Returns the first coordinate of the hop's end, whose other two coordinates are `a` and `b`. `None` if no such end
-/// just meets the target. `rising` selects the larger of the two solutions.
+/// Returns the first coordinate of the end of a hop that just meets its target; `a` and `b` are the other two. There
+/// may be two solutions: `rising` selects the larger one. `None` if there is none.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -335,12 +339,12 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored cross-section (y, h) of one relay: each in three bytes, as a fraction of its allowed range.
+/// Stored lateral offset and altitude of one relay: three bytes each, as a fraction of its allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
 impl Cell {
-    /// Returns the stored form of `at`, rounded to the nearest value in `room`.
+    /// Encodes the lateral offset and altitude `at` for storage, limited to `room`, the allowed ranges.
     pub(super) fn of(at: CrossSection, room: Room) -> Self {
         let [a, b, c, _] = code(at.y_m, room.lateral).to_le_bytes();
         let [d, e, f, _] = code(at.altitude_m, room.band).to_le_bytes();
@@ -405,7 +409,7 @@ impl Room {
         }
     }
 
-    /// Returns the allowed cross-section (lateral offset and altitude) that is nearest to `at`.
+    /// Returns the allowed lateral offset and altitude that are nearest to `at`.
     #[inline(never)] // called from many places
     pub const fn nearest(self, at: CrossSection) -> CrossSection {
         CrossSection {
@@ -421,11 +425,12 @@ const LITTLE: f32 = 0.999_97;
 /// Number of bisection steps for the optimum of a first hop with noise.
 const END_HALVINGS: u8 = 24;
 
-/// Returns the maximum SIR of a first hop into `room`, less a margin that leaves the relay a choice. `room` has the
-/// allowed lateral offsets and altitudes. The optimum is straight away from the interferer, at t times its distance
-/// from Tx. With U and B the squared distances along that line and across it, let s = B + (1 + t)^2 U + h^2; the
-/// slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with noise there is
-/// one optimum, closer to Tx.
+/// Returns the maximum SIR of the first hop, less a margin that leaves the relay a choice of position. `room` has the
+/// allowed lateral offsets and altitudes.
+///
+/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. With U and B
+/// the squared distances along that line and across it, let s = B + (1 + t)^2 U + h^2; the slope of the SIR has the
+/// sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -460,7 +465,8 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts in `room`, less a margin.
+/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, less a margin. `room` has the lateral
+/// offsets and altitudes that the relay may choose from.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
         .nearest(CrossSection::default())
@@ -468,8 +474,9 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Returns the slack of the last hop for `target`, m, and its derivatives by the last relay's position. The relay is
-/// at `at`, with `power_w` watts. The slack is the hop's maximum length less its length.
+/// Returns the slack of the last hop for `target`, its maximum length less its length, m, and the derivatives. These
+/// are by the position of the last relay, which is at `at`, with `power_w` watts. `room` has its allowed lateral
+/// offsets and altitudes.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,
@@ -492,7 +499,8 @@ pub(super) fn tail(
     (slack, outlook)
 }
 
-/// Weight of the penalty for a violated minimum separation, in units of D. It outweighs any gain of slack.
+/// Weight of the penalty for a violated minimum separation, in units of D. It outweighs any gain of spare length at
+/// Rx.
 const STIFFNESS: f32 = 100.0;
 
 /// Distance from the end of its allowed range at which a relay counts as at the end, in units of D.
@@ -502,9 +510,12 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the violation of the minimum separation d_min at `to`, its weight, and its slope. The violation is in
-    /// squares, m^2; the slope is by ln gamma. A full hop shorter than d_min ends too close to the interferer: |p' -
-    /// p|^2 = q(|p' - m|^2) / c < d_min^2. With noise this is |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// Returns how much a relay at `to` is too near the interferer, the weight of its penalty, and a derivative.
+    ///
+    /// A hop of maximum length that ends near the interferer is short. It violates the minimum separation d_min if
+    /// |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with noise if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2. The
+    /// first result is the missing squared distance, m^2. The derivative is that of this distance by the target in
+    /// ln(SIR).
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
@@ -519,15 +530,17 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty of a relay at `to` that is too near the interferer, in metres of slack.
+    /// Returns the penalty of a relay at `to` that is too near the interferer. It is a length that is subtracted from
+    /// the chain's spare length at Rx, m.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
     }
 
-    /// Returns the policy of the relay at `to`, and propagates the value function to the relay at `from`. `outlook`
-    /// is the value function. The step is limited to `trust` times the distance from the interferer. Work: some 400
-    /// multiplications and two square roots.
+    /// Returns the policy of the relay at `to`, and propagates the value function back to the relay at `from`.
+    ///
+    /// `outlook` is the value function. The relay's move is limited to `trust` times its distance from the
+    /// interferer. Work: some 400 multiplications and two square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -581,10 +594,10 @@ impl Site<'_> {
         }
     }
 
-    /// Returns the dependent coordinate of the hop's end, and the derivative of F by it.
+    /// Selects the coordinate of the hop's end that is computed from the other two, its dependent coordinate.
     ///
-    /// F is 0 for a hop of maximum length (see `hop`). The coordinate is the one with the steepest slope of those
-    /// that are not at an end of their allowed range, `low` to `high`.
+    /// Returns it and the derivative of F by it; F is 0 for a hop of maximum length (see `hop`). The coordinate is
+    /// the one with the steepest slope of those that are not at an end of their allowed range, `low` to `high`.
     fn axis(
         &self,
         c: f32,

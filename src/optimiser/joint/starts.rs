@@ -14,25 +14,29 @@ use crate::sir::square;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
-    /// Parabola over the line. In the middle, `aside` and `up` are its lateral offset and height, in units of D / 2.
+    /// Parabola over the line Tx to Rx. In the middle, `aside` and `up` are its lateral offset and height, in units
+    /// of D / 2.
     Arch { aside: f32, up: f32 },
-    /// Spiral about the interferer: toward a position right above or beside it, and from there to Rx. `aside` and
-    /// `up` are the direction of that position, `far` its distance relative to the geometric mean of those of Tx and
-    /// Rx.
+    /// Spiral about the interferer: first to a position right above or beside it, then to Rx.
+    ///
+    /// `aside` and `up` are the direction of that position from the interferer; `far` is its distance, relative to
+    /// the geometric mean of the distances of Tx and Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Parabola as `Arch`, without a minimum separation. Its target is found by the hops of a message sweep, in which
-    /// relays may stop before their reach.
+    /// Parabola as `Arch`, without a minimum separation. Its highest target is found with hops as in the relays'
+    /// messages; a relay may stay short of its farthest position.
     Through { aside: f32, up: f32 },
     /// Parabola to the side, with altitudes interpolated between the relays with a fixed altitude.
     ///
-    /// Before the first and after the last of those relays the chain is `level`, or goes down to Tx and Rx.
+    /// `level` is true if the altitude is constant before the first and after the last of those relays, false if it
+    /// goes down to Tx and Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Chain for relays that have no room in a row. They are in turn at an upper corner and one separation beside it.
-    /// The corner is that of the allowed lateral offsets and altitudes, on the side away from the interferer.
+    /// Zigzag for relays that do not fit one behind the other with their separation. They alternate between a corner
+    /// of the allowed lateral offsets and altitudes, and a position one separation beside it. The corner is at the
+    /// highest altitude, on the side away from the interferer.
     Turns,
     /// Chain at the lowest altitude, for a target SIR so high that no hop leaps over the interferer.
     Near,
-    /// Chain with relay 1 right above Rx, at the best altitude or lateral offset. The others are on the way down from
+    /// Chain with relay 1 at the x of Rx, high above it or far to its side. The others are on the way down from
     /// there.
     Far,
 }
@@ -48,7 +52,7 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of arches, the first ones, that are also tried without a minimum separation.
+/// Number of entries of [`ARCHES`], the first ones, that are also tried without a minimum separation.
 const THROUGH: usize = 3;
 
 /// Initial chains for fixed altitudes: lateral offset in units of D / 2, and true if level at the ends.
@@ -128,8 +132,8 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the cross-section of the next relay on a spiral, after a relay at `from`. `c` is target over gain,
-    /// which determines the length of the hop.
+    /// Returns the lateral offset and altitude of the next relay on a spiral, after a relay at `from`. `c` is target
+    /// SIR over gain, which determines the length of the hop; `room` has the allowed ranges.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -162,7 +166,8 @@ impl Start {
         })
     }
 
-    /// Returns the cross-section of relay `index` in a chain whose relays alternate by `apart_m`.
+    /// Returns the lateral offset and altitude of relay `index` in a zigzag chain. Relays alternate between two
+    /// lateral offsets, `apart_m` apart; `room` has the allowed ranges.
     pub(super) fn in_turn(
         index: u16,
         interferer: &Interferer,
@@ -187,8 +192,8 @@ impl Start {
         })
     }
 
-    /// Returns the initial chain `number` for relays limited to `room`. `None` after the last one; `Some(None)` if
-    /// that chain does not fit into `room`.
+    /// Returns the initial chain `number` for relays limited to the lateral offsets and altitudes `room`. `None`
+    /// after the last chain; `Some(None)` if that chain does not fit into `room`.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -230,8 +235,8 @@ impl Start {
         }
     }
 
-    /// Returns the cross-section in this initial chain of the relay whose previous relay is at `x_m`. `distance_m` is
-    /// the distance from Tx to Rx.
+    /// Returns a relay's lateral offset and altitude in this initial chain; its previous relay is at x = `x_m`.
+    /// `distance_m` is the distance from Tx to Rx, and `room` has the allowed ranges.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
             Self::Arch { aside, up } | Self::Through { aside, up } => (aside, up),
@@ -247,10 +252,11 @@ impl Start {
     }
 }
 
-/// Bisection for the highest feasible target SIR of a chain, in ln gamma.
+/// Bisection for the highest feasible target SIR of a chain, in ln(SIR).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest target found feasible, and true if relays have to stop before their reach to meet it.
+    /// Highest target found feasible, in ln(SIR). The `bool` is true if some relays have to stay short of their
+    /// farthest position to meet it. `None` before any.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -260,7 +266,7 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward from the target `sigma`, in ln gamma, to a precision of `width`. The first step is
+    /// Creates a search downward from the target `sigma`, to a precision of `width`, in ln(SIR). The first step is
     /// `step`, each next one `growth` times as long.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
@@ -273,9 +279,9 @@ impl Seek {
         }
     }
 
-    /// Creates a search upward from the feasible target `sigma`, in ln gamma, to a precision of `width`. The first
-    /// step is `step`, each next one three times as long. `holds_back` is true if relays have to stop before their
-    /// reach for `sigma`.
+    /// Creates a search upward from the feasible target `sigma`, to a precision of `width`, in ln(SIR). The first
+    /// step is `step`, each next one three times as long. `holds_back` is true if some relays have to stay short of
+    /// their farthest position to meet `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -287,8 +293,10 @@ impl Seek {
         }
     }
 
-    /// Records the result of the current target; returns true if there is another one to try. `met` is `None` if the
-    /// target is infeasible, and true if relays have to stop before their reach for it.
+    /// Records the result of the current target; returns true if there is another one to try.
+    ///
+    /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
+    /// position. `Some(true)`: it is met only if some relays stay short of it.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -314,11 +322,12 @@ impl Seek {
         true
     }
 
-    /// Returns the highest feasible target found, and true if relays have to stop before their reach.
+    /// Returns the highest feasible target found, in ln(SIR); `None` if there is none. The `bool` is true if some
+    /// relays have to stay short of their farthest position to meet it.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }
 }
 
-/// Step at which the search gives up, in units of ln gamma.
+/// Maximum step between two targets, in ln(SIR); with a longer one the search gives up.
 const MOST_STEP: f32 = 40.0;

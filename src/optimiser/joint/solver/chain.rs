@@ -42,7 +42,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
-    /// Returns target / gain of the hop to relay `index`, times 1 + noise / interference at `from`.
+    /// Returns c of the hop to relay `index`, target SIR over gain, which determines the length of the hop. It
+    /// includes the factor 1 + noise / interference at the sender's position `from`.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -62,7 +63,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     }
 
     /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. Before the
-    /// first and after the last of these it is constant if `level`, and otherwise goes down to Tx and Rx.
+    /// first and after the last of those relays it is constant if `level` is true, and otherwise goes down to the
+    /// lowest altitude at Tx and Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.mission.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -78,21 +80,22 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns relay `index`, limited to `room`, with its hop from a sender at `from`.
+    /// Returns relay `index`, limited to the lateral offsets and altitudes `room`, with its hop from a sender at
+    /// `from`.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the last hop for `target`, m, and its derivatives; the last relay is at `at`. The slack
-    /// is the hop's maximum length less its length.
+    /// Returns the slack of the last hop for `target`, its maximum length less its length, m, and the derivatives.
+    /// The last relay is at `at`; the derivatives are by its position.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         site::tail(self.mission, power_w, room, target, at)
     }
 
-    /// Returns the upper bound of the chain's SIR, in ln gamma. It is the smaller maximum of the first and the last
-    /// hop.
+    /// Returns the upper bound of the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and
+    /// the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         let first = (self.seat_of)(1).room;
@@ -101,8 +104,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target SIR, in ln gamma, above which no hop leaps over the interferer. It is the largest gain of
-    /// any hop.
+    /// Returns the target, in ln(SIR), from which on no hop can pass the interferer in a single leap. It is just
+    /// above the largest gain of any hop.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -111,7 +114,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     }
 }
 
-/// Returns the allowed cross-section right above Rx at which a relay has the best SIR from Tx.
+/// Returns the lateral offset and altitude, at the x of Rx, at which a relay receives Tx best. Both are limits of the
+/// ranges in `room`, or the lateral offset is 0.
 pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -128,7 +132,7 @@ pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Roo
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays in a segment of the chain whose policies are in memory; 0 without `altitude`.
+/// Number of relays in one segment of the chain; the policies of one segment are in memory. 0 without `altitude`.
 pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
     SEGMENT
 } else {
@@ -141,8 +145,7 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 pub(super) struct Mark {
     /// x of the relay before the segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the slack (spare length at Rx) by the segment's last relay's position, m/m. The next
-    /// field has the second ones, 1/m.
+    /// First derivatives of the slack (spare length at Rx) by the position of the segment's last relay, m/m.
     pub(super) slope: Triple,
     pub(super) bend: [f32; 6],
 }

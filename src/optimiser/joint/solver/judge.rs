@@ -13,13 +13,14 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision of the highest target that is found for an ascent's result, in ln gamma.
+/// Precision, in ln(SIR), of the search for the highest target that a chain meets after an ascent.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Distance from the upper bound by the first and the last hop at which the search ends, in ln gamma.
+/// Tolerance of the upper bound on a chain's SIR that its first and last hop set, in ln(SIR). A chain that meets the
+/// bound less this tolerance ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Excess of an ascent's first maximum target over the chain's upper bound, in ln gamma.
+/// Distance by which an ascent's first target limit is above the chain's upper bound, in ln(SIR).
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -41,9 +42,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.tried(chain, seek, purpose, met.then_some(false))
     }
 
-    /// Checks in one more segment, from the last to the first, that relays can hold back. Holding back is to take a
-    /// position before one's reach, for the sake of later relays. `place_m` is the required x of the segment's last
-    /// relay. Bounded by twenty relays.
+    /// Checks in one more segment of ten relays that all of them have a position that meets the target.
+    ///
+    /// A relay may have to stay short of its farthest position for the sake of the next relay. The segments are
+    /// checked from the last to the first; `place_m` is the x that the last relay of the segment has to take, m.
+    /// Bounded by twenty relays.
     pub(super) fn try_hold_back(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -64,8 +67,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records the result of one target, and selects the next work. `met` is `Some` if the target is feasible, and
-    /// true if relays have to stop before their reach for it.
+    /// Records the result of one target, and selects the next work.
+    ///
+    /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
+    /// position. `Some(true)`: it is met only if some relays stay short of it.
     pub(super) fn tried(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -172,8 +177,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the search for the highest target by the hops of a message sweep. Relays may stop before their reach
-    /// in it. It follows an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in ln gamma.
+    /// Returns the work that searches for the highest target of a chain, with hops computed as in the relays'
+    /// messages.
+    ///
+    /// The chain results from an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in
+    /// ln(SIR). Relays may stay short of their farthest position.
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -197,7 +205,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    /// Returns true if the best chain so far meets the upper bound `ceiling`. No other chain can be better then.
+    /// Returns true if the best chain so far exceeds the upper bound `ceiling` by its tolerance. No other chain can
+    /// be better then. `ceiling` is in ln(SIR).
     pub(super) fn is_complete(&self, ceiling: f32) -> bool {
         self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
     }
@@ -235,23 +244,24 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays of a chain that is polished, by moves of single relays. Chains with fixed altitudes are
-/// always polished, since their path has kinks.
+/// Maximum number of relays of a chain that is polished at the end, by trial moves of single relays. Chains with
+/// fixed altitudes are always polished, since their path has kinks.
 const POLISHED: u16 = 5;
 
 /// Number of times that the final polish of a chain halves the moves of its relays.
 const HALVINGS: u16 = 12;
-/// First move of a relay in the polish, as a fraction of its allowed range.
+/// First trial move of a relay in the final polish of a chain, as a fraction of its allowed range.
 const FIRST_MOVE: f32 = 0.25;
 
-/// Minimum gain of the target SIR by an accepted move of the polish, in ln gamma.
+/// Minimum gain of the target, in ln(SIR), for which the final polish accepts a trial move of a relay.
 pub(super) const GAIN: f32 = 2e-5;
-/// Maximum number of accepted moves of the polish.
+/// Maximum number of accepted trial moves in the final polish of a chain; it then ends.
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Returns the current move of the polish: the relay, the kind of move, and the number of halvings. Kinds 0 to 3
-    /// are down, up, left and right; 4 and 5 take the cross-section of the relay two ahead or two back.
+    /// Returns the current trial move of the polish: the relay, the kind of move, and the number of halvings. Kinds 0
+    /// to 3 are down, up, left and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two
+    /// back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -259,10 +269,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (tried % relays + 1, self.moving % 6, tried / relays)
     }
 
-    /// Tries the next move of one relay in a chain that meets the target `sigma`, in ln gamma.
+    /// Tries the next move of one relay in a chain that meets the target `sigma`, in ln(SIR).
     ///
-    /// The relay moves by a fraction of its allowed range, which is halved from round to round, or to another relay's
-    /// cross-section. The moves find gains that the derivatives do not show, because another constraint is active.
+    /// The relay moves by a fraction of its allowed range, which is halved from round to round, or takes another
+    /// relay's lateral offset and altitude. The moves find gains that the derivatives do not show, because another
+    /// constraint is active.
     pub(super) fn polish(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -380,7 +391,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the cross-section of relay `index`: the stored one, or that of a new initial chain.
+    /// Returns the lateral offset and altitude of relay `index`: stored ones, or those of a new initial chain.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

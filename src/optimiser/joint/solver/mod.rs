@@ -47,48 +47,50 @@ struct ForwardPass {
 enum Work {
     /// Begin the next initial chain.
     Begin,
-    /// Search for the highest feasible target SIR of the unchanged chain.
+    /// Search for the highest target SIR that the chain meets, with all lateral offsets and altitudes unchanged.
     Seek(Seek, Purpose),
-    /// Compute the chain for one target SIR, in ln gamma, and store it.
+    /// Compute the chain for one target SIR, in ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Check that relays can stop before their reach: segment, required x at its end, search, purpose.
+    /// Check that all relays have a position if some have to stay short of their farthest one. The fields are the
+    /// segment, the required x of its last relay, m, and the search with its purpose.
     HoldBack(u8, f32, Seek, Purpose),
-    /// Try the next move of one relay; the chain meets this target SIR, in ln gamma.
+    /// Try the next move of one relay; the chain meets this target SIR, in ln(SIR).
     Polish(f32),
-    /// Run the backward pass at this segment of the chain.
+    /// Run the backward pass, which computes the relays' moves, for this segment of the chain.
     Back(u8),
-    /// Run the forward pass with this fraction of the steps and this target, in ln gamma. It stores the chain if
-    /// `true`.
+    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). If `true`, it stores
+    /// the chain; otherwise it is a trial.
     Forward(f32, f32, bool),
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// The search finds the target of an initial chain.
+    /// The search finds the highest target that an initial chain meets.
     Start,
     /// The search raises the target during an ascent, with the chain unchanged.
     Raise,
-    /// The search computes the chain's spare length at Rx again after its cap was lowered.
+    /// The search computes the chain's slack (spare length at Rx) again after the cap on it was lowered.
     Tighten,
-    /// The search finds the highest target of an ascent's chain, by the hops of the joint method.
+    /// The search finds the highest target of the chain after an ascent, with hops as in the ascent.
     Judge,
-    /// The search finds the highest target of an ascent's chain, by the hops of a message sweep. Relays may stop
-    /// before their reach in it.
+    /// The search finds the highest target of the chain after an ascent, with hops as in the relays' messages. Relays
+    /// may then stay short of their farthest position.
     Last,
-    /// The search checks, by the hops of a message sweep, that the chain meets its upper bound.
+    /// The search checks, with hops as in the relays' messages, that the chain meets its upper bound.
     Probe,
-    /// The search checks a move of one relay, by the hops of a message sweep.
+    /// The search checks a trial move of one relay, with hops as in the relays' messages.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the search computes the chain by the hops of a message sweep.
+    /// Returns true if the search computes the hops as relays compute them from their messages (sweeps).
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
 }
 
-/// Joint solver of a chain of at most `RELAYS` relays; `SEGMENTS` is at least a tenth of that.
+/// Joint solver of a chain of at most `RELAYS` relays. `SEGMENTS` is at least a tenth of that, since a segment has
+/// ten relays.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is told on its own, by another part of the work"
@@ -97,34 +99,32 @@ impl Purpose {
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     number: u8,
     start: Start,
-    /// Best target SIR found, in ln gamma, and the number of the initial chain that led to it.
+    /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the best ascent had reached at its end, in ln gamma. An ascent that will stay below is dropped.
+    /// Target that the best ascent had reached at its end, in ln(SIR). An ascent that will stay below is dropped.
     highest: f32,
-    /// Stored cross-sections of the best chain. The next field is the target from which its highest one was searched,
-    /// in ln gamma; `None` if a repetition of that ascent would give another chain: its search began before it ended,
-    /// or without an ascent.
+    /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: [Cell; RELAYS],
     best_judged: Option<f32>,
-    /// Target from which the current chain's highest target is searched, in ln gamma.
+    /// Target from which the current chain's highest target is searched, in ln(SIR).
     judged_at: Option<f32>,
-    /// True while the comparison with the best chain has not affected the current ascent.
+    /// True while the current ascent runs as it would without a best chain to compare with. A repetition of it then
+    /// gives the same chain.
     is_whole: bool,
-    /// True once the best chain's target is searched more finely, and the chain is polished.
+    /// True in the last phase: the target of the best chain is searched more finely, and the chain is polished.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
-    /// True if relays have to take a position before their reach for the target found.
+    /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
     /// True if the minimum separation limited the ascent from any initial chain.
     walled: bool,
-    /// Number of the polish's current move. The next fields are the number of accepted moves, and the moved relay's
-    /// previous cross-section.
+    /// Number of the current trial move in the final polish of the chain.
     moving: u16,
     moved: u8,
     kept: Cell,
-    /// Segment of the chain whose policies are in memory.
+    /// Segment of the chain whose policies (relays' moves) are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
@@ -160,7 +160,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         })
     }
 
-    /// Returns the cross-section of relay `index`, once the chain is solved.
+    /// Returns the lateral offset and altitude of relay `index`, once the chain is solved. `seat` is that relay's
+    /// profile.
     pub fn at(&self, index: u16, seat: Seat) -> CrossSection {
         self.cell(index).place(seat.room)
     }
@@ -171,7 +172,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Processes one portion of the work: ten relays backward and forward, or twenty without a change.
+    /// Processes one portion of the work: ten relays of a pass that moves them, or twenty of any other pass.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
@@ -215,8 +216,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::default();
     }
 
-    /// Stores the cross-section `cell` of relay `index`. `x_m` is the x of the relay before it, stored at the start
-    /// of a segment.
+    /// Stores the lateral offset and altitude `cell` of relay `index`. If a segment begins with this relay, it also
+    /// stores `x_m`, the x of the relay before it, m.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -236,13 +237,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             .filter(|_| at.is_multiple_of(SEGMENT))
     }
 
-    /// Returns true if relays have to take a position before their reach for the target found.
+    /// Returns true if some relays have to stay short of their farthest position to meet the target found.
     pub const fn holds_back(&self) -> bool {
         self.holds_back
     }
 }
 
-/// Tests that the stored best chain equals the one that a repetition of its ascent gives.
+/// Checks that the stored best chain equals the one that a repetition of its ascent gives.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -320,7 +321,8 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns target and cross-sections of the solved chain, as f32 bits, and the number of `step` calls.
+    /// Returns the solved chain, as f32 bits, and the number of `step` calls. The chain is its target, and the
+    /// relays' lateral offsets and altitudes.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -354,7 +356,8 @@ mod tests {
         (bits, portions)
     }
 
-    /// Uses random missions; the environment variable `UAV_RELAY_KEPT` is their number, 150 by default.
+    /// Checks for random missions that the stored best chain equals a repetition of its ascent. The environment
+    /// variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;

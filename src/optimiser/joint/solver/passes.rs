@@ -22,8 +22,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Computes the policies of `segment`, after a relay at `before`; returns the value function there. `None` if a
-    /// hop cannot meet the target. Bounded by ten relays.
+    /// Computes the policies (moves) of the relays in `segment`; returns the value function at its start.
+    ///
+    /// The relay before the segment is at `before`. `None` if a hop cannot meet the target. Bounded by ten relays.
     pub(super) fn recall(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -107,8 +108,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.at(index, (chain.seat_of)(index)).at(x_m)
     }
 
-    /// Runs the forward pass through one more segment, or computes the policies for it. The pass tries the fraction
-    /// `share` of the steps with the target `sigma`, and stores the chain if `kept`.
+    /// Runs the forward pass through one more segment, or first computes the relays' moves there. The pass tries the
+    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept`.
     pub(super) fn forward(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -149,7 +150,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share` of their steps. `None` if a hop cannot meet `target`.
+    /// Moves the relays of `segment` by the fraction `share` of their computed moves; stores them if `kept`. `None`
+    /// if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -184,15 +186,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays in one portion of a pass that does not change the chain.
+/// Number of relays per call in a pass that changes no relay's lateral offset or altitude.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty, in units of D, at which the result of an ascent still counts as feasible.
+/// Maximum penalty for relays too near the interferer, in units of D, at which a chain counts as feasible.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Continues a pass without steps for the target `sigma`, in ln gamma. Stores the chain if `kept`. Ready with the
-    /// slack, the spare length at Rx, m; `None` if a hop cannot meet the target.
+    /// Continues a pass that computes the chain for the target `sigma`, in ln(SIR), without moves. Stores the chain
+    /// if `kept`. Ready with the slack, the spare length at Rx, m; `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -255,7 +257,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index`, which receives from `from`. Some initial chains need no minimum separation.
+    /// Returns relay `index`, which receives from a relay at `from`. It has no minimum separation in initial chains
+    /// of the kind [`Start::Through`].
     pub(super) fn link<'a>(
         &self,
         chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
@@ -272,7 +275,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Returns the hop to relay `index` of the current chain, as in a message sweep. It ends at `end_m`, m, at most.
+    /// Returns the hop to relay `index` of the current chain, computed as the relay does from its messages. The hop
+    /// ends at x = `end_m`, m, at most.
     pub(super) fn hop(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -314,8 +318,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
     ///
-    /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used in its
-    /// passes by the hops of a message sweep.
+    /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
         let first = mission.config().distance_m - steps.clone().sum::<f32>();
@@ -328,9 +331,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (end_m + step).min(mission.config().distance_m)
     }
 
-    /// Returns the required x, m, of the relay before `segment` if its last relay is at `place_m`.
+    /// Returns the x, m, that the relay before `segment` must take if the segment's last relay is at x = `place_m`.
     ///
-    /// `None` if a relay of the segment cannot take its required position.
+    /// `None` if a relay of the segment cannot take the position that the next one requires.
     pub(super) fn held_back_x_m(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
