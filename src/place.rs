@@ -28,7 +28,7 @@ impl Placement {
         CrossSection::on_line(altitude_m).at(x_m)
     }
 
-    /// Returns y and altitude of the position, without its x.
+    /// Returns the lateral offset and altitude of the position, without its x.
     #[doc(hidden)]
     pub const fn cross_section(self) -> CrossSection {
         CrossSection {
@@ -38,7 +38,7 @@ impl Placement {
     }
 }
 
-/// Lateral offset and altitude of a relay: its position without x, which runs along the line Tx to Rx.
+/// Position of a relay across the line Tx to Rx: its lateral offset and altitude, without its x.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
@@ -49,7 +49,7 @@ pub struct CrossSection {
 }
 
 impl CrossSection {
-    /// Returns the cross-section right above the line Tx to Rx (y = 0) at `altitude_m`.
+    /// Returns the lateral offset 0 with `altitude_m`: right above the line Tx to Rx.
     pub const fn on_line(altitude_m: f32) -> Self {
         Self {
             y_m: 0.0,
@@ -72,7 +72,7 @@ impl CrossSection {
     }
 }
 
-/// Lateral offset, altitude and power of a relay; its x is free.
+/// Lateral offset and altitude of a relay, and its power; its x is free.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {

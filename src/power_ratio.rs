@@ -24,7 +24,7 @@ impl PowerRatio {
         }
     }
 
-    /// Returns the gain, rounded to f32.
+    /// Returns this ratio, rounded to f32.
     pub const fn value(&self) -> f32 {
         self.hi
     }
@@ -33,13 +33,13 @@ impl PowerRatio {
         f64::from(self.hi) + f64::from(self.lo)
     }
 
-    /// Returns `target` / gain, rounded to f32; the gain is this ratio.
+    /// Returns `target` over this ratio, rounded to f32. This ratio is the gain of a hop.
     pub const fn ratio(&self, target: f32) -> f32 {
         target / self.hi
     }
 
-    /// Returns `target` / gain - 1, with a relative error below 2e-7 even if the two are nearly equal. The gain is
-    /// this ratio.
+    /// Returns `target` over this ratio, less 1, with a relative error below 2e-7. This holds even if the two are
+    /// nearly equal. This ratio is the gain of a hop.
     pub const fn excess(&self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
     }

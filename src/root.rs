@@ -12,7 +12,7 @@ pub(crate) fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)
 }
 
-/// Returns the square root of `x`, as [`sqrt`] does, inlined for the inner loops of a sweep.
+/// Returns the square root of `x`, as [`sqrt`] does, inlined for inner loops.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"

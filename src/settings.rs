@@ -64,14 +64,14 @@ pub struct Adjust {
     /// Maximum number of rounds, the paper's `Iter_max`. Algorithm 2 ends earlier after a round in which no relay
     /// moves.
     pub rounds: u16,
-    /// Maximum change of altitude of a relay in one turn, m: 0 to 1e5; the paper's `epsilon_h`.
+    /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
     /// Local search for a better position.
     pub local: Local,
 }
 
 impl Default for Adjust {
-    /// Returns the defaults: 500 rounds, 10 m of altitude change in a turn, [`Local::Fine`].
+    /// Returns the defaults: 500 rounds, 10 m of altitude change per move, [`Local::Fine`].
     fn default() -> Self {
         Self {
             rounds: 500,
@@ -121,16 +121,16 @@ pub struct Settings {
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first solves the chain from the mission (bracketed schedule). If that solution is right,
-    /// one round trip of messages is enough.
+    /// True if the leader first solves the chain from the mission alone (bracketed schedule). If that solution is
+    /// right, one round trip of messages is enough.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
     /// Key and epoch for signing frames. With it the relay accepts signed frames only; without it, it accepts frames from any
     /// sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
-    /// Maximum time of a sweep (100 bytes) from one relay's `poll_transmit` to the next one's. It includes the computation; above
-    /// 0. It is scaled for longer messages.
+    /// Maximum time for one hop of a message, from one relay's `poll_transmit` to the next one's. It is for a sweep,
+    /// a message of 100 bytes, and includes the computation; above 0. It is scaled for longer messages.
     pub hop_time: Duration,
     /// Silence of a neighbour after which heartbeats are requested, 16 times until `dead_after`; above 0.
     pub probe_after: Duration,
@@ -144,8 +144,9 @@ pub struct Settings {
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
     /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// True if the firmware converts positions to latitude and longitude, by two configured sites. An upload without
-    /// sites is then rejected if its distance differs from theirs. Set it on all relays of a chain, or on none.
+    /// True if the firmware converts positions to latitude and longitude by configured sites. An uploaded mission
+    /// without sites is then rejected if its distance differs from that of the configured ones. Set it on all relays
+    /// of a chain, or on none.
     pub sited: bool,
 }
 

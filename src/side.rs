@@ -13,7 +13,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Returns the side to which a relay forwards passes along the chain.
+    /// Returns the side to which a relay forwards the messages of a pass along the chain.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -21,7 +21,7 @@ impl Side {
         }
     }
 
-    /// Returns the side from which a relay receives passes, and to which it sends their replies.
+    /// Returns the side from which a relay receives passes along the chain, and to which it replies.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

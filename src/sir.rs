@@ -141,10 +141,10 @@ pub(crate) const fn square(x: f32) -> f32 {
     x * x
 }
 
-/// Number of bisection steps for an x at which the slope of SIR_1 changes its sign.
+/// Number of bisection steps for an x at which the slope of the first hop's SIR changes its sign.
 const HALVINGS: u8 = 32;
 
-/// Maximum number of doublings of x in the search for the sign change of a falling function.
+/// Maximum number of doublings of x in the search for a point at which a condition fails.
 const DOUBLINGS: u8 = 64;
 
 /// Shape of SIR_1, the SIR of the first hop, along x >= 0 at one altitude.
@@ -189,7 +189,8 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// Terms of the function phi(x), whose sign is that of the slope of SIR_1 along x.
+/// Function phi(x), whose sign is that of the slope of the first hop's SIR along x. `x` is the interferer's X, and
+/// `q` is X^2 + Y^2.
 struct Slope {
     x: f32,
     q: f32,
@@ -197,24 +198,26 @@ struct Slope {
     squared: f32,
     /// Squared distance of the relay from the interferer across x, Y^2 + h^2, m^2.
     aside: f32,
-    /// Noise nu, 1/m^2.
+    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
 }
 
 impl Slope {
-    /// Returns phi at x = `at`, m; it has the sign of the slope of SIR_1.
+    /// Returns phi at x = `at`, m: above 0 where the first hop's SIR rises, below 0 where it falls.
     fn sign(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         self.x * at - self.q - self.x * (self.squared / at) - self.noise * s * s
     }
 
-    /// Returns half the derivative of phi at x = `at`, m, for X > 0. The derivative falls beyond X.
+    /// Returns half the derivative of phi at x = `at`, m, for an interferer at X > 0. phi has the sign of the slope
+    /// of the first hop's SIR. The derivative falls beyond X.
     fn bend(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)
     }
 
-    /// Returns the maximum of SIR_1 for X < 0; `peak` is the x of the maximum without noise, m.
+    /// Returns the maximum of the first hop's SIR along x, for X < 0; `peak` is its x without noise, m. X is that of
+    /// the interferer.
     fn hill(&self, peak: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Hill(peak);
@@ -222,7 +225,8 @@ impl Slope {
         Extremum::Hill(last(0.0, peak, |at| self.sign(at) > 0.0))
     }
 
-    /// Returns the extrema of SIR_1 for X > 0; `bottom` is the x of the minimum without noise, m.
+    /// Returns the extrema of the first hop's SIR along x, for X > 0. `bottom` is the x of the minimum without noise,
+    /// m. X is that of the interferer.
     fn turns(&self, bottom: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Valley(bottom);

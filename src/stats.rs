@@ -6,7 +6,7 @@
 pub struct Stats {
     /// Frames passed to the link, including retransmissions.
     pub sent: u32,
-    /// Retransmissions of pass messages (sweeps, gatherings, tokens) and proposals after a missing reply.
+    /// Retransmissions of messages of a pass along the chain and of proposals, after a missing reply.
     pub repeats: u32,
     /// Passes along the chain, of any kind, and proposals that this relay has started as the leader.
     pub passes_begun: u32,

@@ -115,8 +115,9 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 /// Timers continue after a backward step, which extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
-    /// Latest time of the caller. `internal` is the internal time at that moment.
+    /// Latest time that the caller has passed, by the caller's clock.
     latest: Instant,
+    /// Internal time at the moment `latest`.
     internal: Instant,
 }
 
@@ -188,7 +189,8 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` plus a random part of up to an eighth. Relays on a shared channel then do not stay in step.
+    /// Returns `span` plus a random part of up to an eighth. Relays on a shared channel then do not transmit at the
+    /// same time again and again.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.

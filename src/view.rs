@@ -50,8 +50,7 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, or a lower one if its number is more than `most` ahead of this view's. The lower one is `most`
-    /// ahead.
+    /// Returns `view`, or one `most` numbers ahead of this view if `view` is farther ahead.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -61,8 +60,8 @@ impl ViewId {
         }
     }
 
-    /// Value that a view adds to the mission's digest in its pass messages, to tell views apart. Views of one number,
-    /// and of thousands of consecutive ones, have different values.
+    /// Value that is added to the mission's digest in messages of this view, to tell views apart. Views of one
+    /// number, and of thousands of consecutive ones, have different values.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -180,12 +180,13 @@ impl Estimator {
 
 /// Beta distribution with the mean and the variance of the samples.
 struct Fit {
-    /// Mean m of I / `I_max`. The next field, `rest`, is 1 - m, computed without cancellation.
+    /// Mean m of the samples I / `I_max`.
     m: f32,
+    /// Difference 1 - m, computed without cancellation.
     rest: f32,
-    /// Standard deviation of I / `I_max`.
+    /// Standard deviation of the samples I / `I_max`.
     s: f32,
-    /// Sum of the shape parameters, alpha + beta.
+    /// Sum of the shape parameters of the fitted Beta distribution, alpha + beta.
     w: f32,
 }
 

@@ -217,11 +217,11 @@ pub enum Interference {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// From Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position follows from that
-    /// of the sender before it.
+    /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position follows from
+    /// that of the sender before it.
     TowardRx,
-    /// From Rx to Tx, relay N first: used in a field (Algorithm 4). Each relay's position follows from that of its
-    /// receiver, where the interference is known.
+    /// Order from Rx to Tx, relay N first: used in a field (Algorithm 4). Each relay's position follows from that of
+    /// its receiver, where the interference is known.
     TowardTx,
 }
 
@@ -716,7 +716,8 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index`, m, that leaves the relays computed after it their separation.
+    /// Returns the farthest x of relay `index`, m, that leaves the relays after it their separation. After it means
+    /// later in the order of computation.
     ///
     /// Farthest means toward Rx, or toward Tx in a field. `across_squared` is the maximum squared distance across the
     /// line (in y and altitude) between two neighbours among those relays, m^2; it reduces the steps in x.
@@ -738,7 +739,7 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays between it and Rx their separation.
+    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -827,8 +828,9 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns the gains of a mission whose interferer is unknown: first hop, other hops per W, last hop per W. With
-/// relays of `power_w`, W, they give SIR = (D / d)^2 on every hop of length d, so hops of equal length are best.
+/// Returns the gains of a mission with an unknown interferer. They are those of the first hop, of other hops per W,
+/// and of the last hop per W. With relays of `power_w`, W, they give SIR = (D / d)^2 on every hop of length d, so
+/// hops of equal length are best.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

@@ -66,7 +66,7 @@ impl Ladder {
         )
     }
 
-    /// Returns 16 targets (a ladder) in equal ratios, strictly between `low` and `high`; 0 < `low` < `high`.
+    /// Returns 16 targets (a ladder) in equal ratios, strictly between `low` and `high`. 0 < `low` < `high`.
     pub fn between(low: f32, high: f32) -> Self {
         Self::centred(
             geometric_mean(low, high),
@@ -106,8 +106,8 @@ impl Ladder {
         }
     }
 
-    /// Decodes a list of targets; `None` if a target is not a normal f32 above zero, or the encoding is not unique. A
-    /// single target (`gap` 0) must have `growth` 0.
+    /// Decodes a list of targets; `None` if it is invalid. It is valid if all targets are normal f32s above zero, and
+    /// the encoding is unique. A single target (`gap` 0) must have `growth` 0.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -128,7 +128,7 @@ impl Ladder {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true if there is a single target, which the last relay commits the chain to if it is feasible.
+    /// Returns true if there is a single target. The last relay commits the chain to it if it is feasible.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }

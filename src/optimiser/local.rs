@@ -143,6 +143,7 @@ pub struct LocalSearch {
     top_m: f32,
     /// Lowest altitude that the current round of the search tries, m.
     low_m: f32,
+    /// Highest altitude that the current round of the search tries, m.
     high_m: f32,
     round: u8,
     row: u8,
@@ -213,7 +214,7 @@ impl LocalSearch {
     }
 
     /// Returns the altitude at the fraction `part`, 0 to 1, of the range that the current round tries, m. It is
-    /// clamped to the allowed altitudes, because of rounding.
+    /// at most the highest altitude of that range, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }

@@ -20,6 +20,6 @@ pub mod reverse;
 pub mod search;
 pub mod spacing;
 
-/// List with one number for each target SIR that a pass along the chain tries: an x, a slack, or the target. The x is
-/// the farthest one that meets the target; the slack is the chain's spare length.
+/// List with one number for each target SIR of a pass along the chain: x, slack, or target. The x is the farthest one
+/// that meets the target; the slack is the chain's spare length.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

@@ -22,7 +22,7 @@ use crate::place::Station;
 use crate::root::sqrt_in_place;
 use crate::sir::{Sender, square};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx, for traffic in both directions.
+/// Maximum number of positions that the last relay tries in order to receive Rx. Only for traffic in both directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of field points evaluated per call. It limits the number of targets in a call, which is at least
@@ -124,7 +124,7 @@ impl Link<'_> {
         }
     }
 
-    /// Continues [`extend`](Self::extend) by as many reaches as one call may compute; returns true once all are
+    /// Continues [`extend`](Self::extend) by as many reaches as one call may compute. It returns true once all are
     /// computed. Bounded by 16 reaches (farthest x for a target); in a field by 128 of its points, or by one target.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
@@ -181,8 +181,8 @@ impl Link<'_> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay with the smallest x of this relay, for a receiver at x from `low` to `high`,
-    /// m. In a plain pass the receiver is at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop from this relay that starts closest to Tx, for a receiver from `low` to `high`, m. In a plain
+    /// pass the receiver is at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -355,12 +355,12 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of one pass of target SIRs along the chain (a sweep): each target's slack, and a target to commit. The
-/// slack is the chain's spare length, below 0 if the target is missed.
+/// Result of one pass of target SIRs along the chain (a sweep): slacks, and a target to commit. The slack is the
+/// chain's spare length, below 0 if the target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the target that the relays are to use, in the ladder (list of targets); `None` if the search goes on.
-    /// After a commit every relay takes its position for that target.
+    /// Index of the target that the relays are to use; `None` if the search goes on. It is an index in the ladder
+    /// (list of targets). After a commit every relay takes its position for that target.
     pub commit: Option<u8>,
     /// Slack (spare length) of the chain for each target that every hop can meet, m. It is 0 or more if the chain
     /// meets the target.
@@ -368,9 +368,10 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result of a sweep of `ladder` (list of target SIRs), whose `targets` have these `slacks`. A slack
-    /// is the chain's spare length. A target is committed if the next higher one is known to be infeasible and within
-    /// the mission's tolerance, or if the ladder has no other target: the step of the paper's Algorithm 1.
+    /// Returns the result of a sweep of `ladder`, whose `targets` have these `slacks`. The ladder is a list of target
+    /// SIRs. A slack is the chain's spare length. A target is committed if the next higher one is known to be
+    /// infeasible and within the mission's tolerance, or if the ladder has no other target: the step of the paper's
+    /// Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -432,9 +433,9 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes all relays' reaches; returns the chain's slack (spare length), m, and the last relay's x, m. A reach
-    /// is the farthest x that meets the target; `visit` gets it with the relay's index. `None` if a hop cannot meet
-    /// the target.
+    /// Computes all relays' reaches; returns the chain's slack (spare length) and the last x, m. That is the x of the
+    /// last relay. A reach is the farthest x that meets the target; `visit` gets it with the relay's index. `None` if
+    /// a hop cannot meet the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();
@@ -489,8 +490,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the farthest x of relay `index` that meets the target, m; for `None` the x at which the pass starts.
-    /// The result is `None` if a hop cannot meet the target.
+    /// Returns the farthest x of relay `index` that meets the target, m. For `None` it is the x at which the pass
+    /// starts. The result is `None` if a hop cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let mut from_m = origin(self.mission);
         let Some(index) = index else {

@@ -10,7 +10,8 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target SIR that the whole chain meets: the list of targets (ladder) of the last pass, and an index in it.
+/// Target SIR that the whole chain meets: a list of targets (ladder), and an index in it. The list is that of the
+/// last pass along the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {

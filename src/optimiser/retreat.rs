@@ -33,7 +33,8 @@ use crate::sir::square;
 /// Hop toward Rx in a field whose receiver's position is known, prepared for many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat {
-    /// Gain A of the hop, m^2: with the field's largest Upsilon = E[1/I], or at Rx for the hop to Rx.
+    /// Gain A of the hop, m^2, for the field's largest Upsilon = E[1/I]. For the hop to Rx it is that with the
+    /// Upsilon at Rx.
     gain: f32,
     /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
     climb_squared: f32,
@@ -83,8 +84,8 @@ impl Retreat {
 
     /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], and `quiet` the ratio of Upsilon
-    /// there to the field's largest, above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
+    /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], m. `quiet` is Upsilon = E[1/I] there
+    /// over the field's largest, above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {
@@ -112,8 +113,8 @@ impl Retreat {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop for `target` that starts closest to Tx of all that end from `low` to `high`, m. `None` if
-    /// there is none.
+    /// Returns the hop for `target` that starts closest to Tx, for a receiver from `low` to `high`, m. `None`
+    /// if there is none.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -143,15 +144,15 @@ pub struct Step {
 /// Interference at the receiver of a hop, as a function of the receiver's position.
 #[derive(Clone, Copy, Debug)]
 pub enum HopInterference<'a> {
-    /// Ratio of the Upsilon that the receiver measured to the field's largest; the same at every position.
+    /// Same at every position: the receiver's measured Upsilon = E[1/I] over the field's largest.
     Evenly(f32),
-    /// Agreed field, with receiver noise.
+    /// Interference field that the relays agreed on, with receiver noise.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the receiver's measured Upsilon, 1/W, if it is given, and otherwise the mission's field. Both include
-    /// the receiver noise.
+    /// Returns the interference as the receiver measured it: Upsilon = E[1/I], 1/W. For `None` it is that of the
+    /// mission's field. Both include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -169,10 +170,13 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Returns the receiver's y in [`low`, `high`] at which `value`, the sender's x, is smallest. The smallest y is taken
-/// for equal values. `value` gets y and `quiet`, the ratio of Upsilon at y to the field's largest. It is y - sqrt(`c`
-/// quiet - q) with q the first of `squares`, or `None` if the square under the root is below the second minus the
-/// first. Work: at most three values for each field point in between that a hop could reach.
+/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equal ones it has the
+/// smallest receiver's x.
+///
+/// `value` returns the sender's x for the receiver's x, y, and `quiet`, the ratio of Upsilon = E[1/I] at y to the
+/// field's largest. It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the
+/// root is below the second minus the first. Work: at most three values for each field point in between that a hop
+/// could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

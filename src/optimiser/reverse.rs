@@ -76,10 +76,11 @@ use crate::sir::{Sender, in_noise, square, transmitter_gain};
 /// Maximum squared length of a hop, m^2, so that no term is infinite.
 const MOST_SQUARED: f32 = 1e18;
 
-/// Hop in the direction from Rx to Tx, without its length.
+/// Hop in the direction from Rx to Tx, for the traffic that goes back; its length is not fixed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Gain A' of the hop over r, the required ratio of backward to forward SIR; for Tx `K_tx` / r, m^2.
+    /// Gain A' of the backward hop over r; for Tx `K_tx` / r, m^2. r is the required ratio of backward to forward
+    /// SIR.
     gain: f32,
     /// True if Tx receives this hop, false if a relay does.
     to_tx: bool,
@@ -87,7 +88,7 @@ pub struct Back {
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer across x, (Y - y0)^2 + h0^2, m^2.
     aside_squared: f32,
-    /// Noise nu, 1/m^2: noise over the interferer's power received at 1 m.
+    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
 }
 
@@ -120,7 +121,8 @@ impl Back {
         })
     }
 
-    /// Returns the squared length, m^2, of a hop received at `x_m` whose backward SIR over r is 1.
+    /// Returns the squared length, m^2, of a backward hop received at `x_m` that has the SIR r. r is the required
+    /// ratio of backward to forward SIR.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -136,8 +138,8 @@ impl Back {
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns the backward hop for `target` whose sender is at `x_m`, in the form that [`closest`] needs.
-    /// `across_squared`, m^2, is its squared length across the line.
+    /// Returns the backward hop for `target` from a sender at `x_m`, without a fixed length. `across_squared`, m^2,
+    /// is its squared length across the line.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -151,8 +153,8 @@ impl Back {
         }
     }
 
-    /// Returns the distance in x from the interferer, m, within which a receiver misses `target`. `squared` is the
-    /// hop's squared length, m^2. `None` if every receiver misses it.
+    /// Returns the distance in x from the interferer, m, within which a receiver misses `target`. The backward hop
+    /// has the squared length `squared`, m^2. `None` if every receiver misses it.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         let needed = target * squared / self.gain;
         let left = 1.0 - self.noise * needed;
@@ -160,9 +162,9 @@ impl Back {
     }
 }
 
-/// Hop from Rx to the last relay.
+/// Hop from Rx to the last relay, for traffic in both directions.
 pub(super) struct FromRx {
-    /// Hop as seen from Rx: x is the distance from Rx.
+    /// Hop from Rx in a mirrored frame: x is the distance from Rx.
     hop: Hop,
     reverse: f32,
     distance_m: f32,
@@ -198,8 +200,8 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin of Rx's signal at the last relay, at `x_m`: (SIR / required SIR - 1) D, m. It is continuous
-    /// in the target.
+    /// Returns the margin by which the last relay receives Rx, as a length: (SIR / required SIR - 1) D, m. The relay
+    /// is at `x_m`. The margin is below 0 if `target` is missed, and continuous in the target.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -208,8 +210,8 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x from `least_m` to `x_m`, m, at which Rx's signal meets the target. `None` if there is
-    /// none. At `x_m` itself the last relay misses the target.
+    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx for `target`. `None` if
+    /// there is none. At `x_m` itself the last relay misses the target.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -247,8 +249,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the hop length, m, beyond which a noise-free hop meets its target; `None` if there is none. It is the root
-/// of f at which f rises, and may be negative.
+/// Returns the hop length, m, beyond which a noise-free hop meets its target; `None` if there is none. It may be
+/// negative. It is the root at which f, which is 0 or above where the target is met, rises.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -322,7 +324,8 @@ mod tests {
         assert!(found > 12, "{found}");
     }
 
-    /// Tests a relay 100 m behind a strong interferer, as seen from Rx. It receives Rx only from farther away.
+    /// Checks that the last relay moves away from a strong interferer until it receives Rx. It begins 100 m behind
+    /// the interferer, as seen from Rx.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -21,15 +21,16 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::{self, Sender};
 
-/// Schedule by which the leader selects the target SIRs of the next sweep.
+/// Schedule by which the leader selects the target SIRs of the next sweep, a pass along the chain.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets per sweep around the interpolated optimum. The search ends once the optimum is known to the
-    /// mission's tolerance.
+    /// Sixteen targets per pass along the chain, around the interpolated optimum. The search ends once the optimum is
+    /// known to the mission's tolerance.
     #[default]
     Bracketed,
-    /// A single target per sweep, from the upper bound downward in equal steps, as in the paper.
+    /// A single target per pass along the chain, falling in equal steps, as in the paper. The first target is the
+    /// upper bound.
     FixedStep {
         /// Step epsilon between two targets, linear SIR, above 0. In f64, because it is subtracted up to ten thousand
         /// times from one start.
@@ -55,33 +56,37 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference between the cubic's and the line's root at which the interpolation is used. It is a fraction of
+/// Maximum difference of cubic and linear interpolation of the best target to use the cubic one. It is a fraction of
 /// the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Ratio of the bracket's widths after and before a sweep above which interpolation is not used next.
+/// Ratio of the bracket's widths after and before a pass, above which the pass has stalled. The bracket is the range
+/// of targets that may be the highest. The next targets are then spread evenly, and not around an interpolated
+/// optimum.
 const PROGRESS: f32 = 0.25;
 
-/// Number of sweeps after which the search commits the best feasible target found.
+/// Number of passes along the chain after which the search ends with the best feasible target found.
 const MOST_SWEEPS: u32 = 48;
 
-/// State of the leader's search for the highest target: the bracket and the next ladder of targets.
+/// State of the leader's search for the highest target SIR: the bracket and the next targets to try. The bracket is
+/// from the highest feasible to the lowest infeasible target.
 #[derive(Clone, Debug)]
 pub struct Search {
     schedule: Schedule,
     tolerance: f32,
-    /// Upper bound of the SIR, linear: that of the hop between the leader and the nearer ground station.
+    /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
     ceiling: f32,
-    /// First target of the fixed-step schedule: the paper's gamma_0.
+    /// First target of the fixed-step schedule, and upper bound of the bracketed one: the paper's gamma_0.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the bracket before the last sweep: `infeasible` / `feasible` - 1.
+    /// Relative width of the range of possible highest targets before the last pass. It is `infeasible` / `feasible`
+    /// - 1.
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True for plain passes, in which every relay is at its reach. They are used in the paper's schedule, and after
-    /// a relay refused a position before its reach.
+    /// True for plain passes, in which every relay takes the farthest x that meets the target. They are used in the
+    /// paper's schedule, and after a relay refused to stay short of its farthest x.
     plain: bool,
     /// Lowest known target that no chain can meet.
     most: Option<f32>,
@@ -147,20 +152,20 @@ impl Search {
         })
     }
 
-    /// Returns the ladder of targets for the next sweep.
+    /// Returns the target SIRs (ladder) for the next pass along the chain.
     pub const fn ladder(&self) -> &Ladder {
         &self.ladder
     }
 
-    /// Replaces the next ladder of targets by the leader's prediction of the one that ends with a commit. If it is
-    /// for a plain pass, all later ones are, too.
+    /// Replaces the next targets by `ladder`, which the leader expects to end the search. If it is for a plain pass,
+    /// in which every relay takes its farthest x, all later passes are plain.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target that no chain can meet, after a pass with these `slacks` (spare lengths). `None`
-    /// after plain passes only.
+    /// Returns the lowest target known to be infeasible for every chain, after a pass with these `slacks`. A slack is
+    /// the chain's spare length for a target, m. `None` if all passes were plain, which proves nothing.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if cfg!(feature = "reverse") && self.both_ways {
             // Reaches and held positions of both directions are not proven to exclude no chain.
@@ -174,8 +179,8 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues the search with the slacks (spare lengths, m) of those targets that every hop meets. The targets are
-    /// the first ones of [`Search::ladder`].
+    /// Continues the search with the result of a pass: the slack of each target that every hop meets. A slack is the
+    /// chain's spare length, m. These targets are the first ones of [`Search::ladder`].
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
@@ -272,8 +277,10 @@ impl Search {
     }
 }
 
-/// Returns the bounds `start` and `met` of the target SIR, lowered for traffic from Rx to Tx. The bounds are those of
-/// the hop received at Tx, and of the hop from Rx.
+/// Lowers two bounds of the target SIR for traffic from Rx to Tx, and returns them.
+///
+/// `start` is the upper bound of the search, lowered to that of the hop received at Tx. `met` is a feasible target,
+/// lowered to one that this hop and the hop from Rx also meet.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -294,9 +301,9 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target at which the slack (spare length) is 0, by cubic interpolation of log target. The cubic passes
-/// through the four points about the sign change. `None` if the cubic and the straight line disagree: the slack jumps
-/// there, and neither root is meaningful.
+/// Returns the target at which the slack (spare length) is 0, by cubic interpolation. The target is interpolated as a
+/// logarithm. The cubic passes through the four points about the sign change. `None` if the cubic and the straight
+/// line disagree: the slack jumps there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -331,21 +338,22 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     points.first().map(|point| point.1)
 }
 
-/// Bisection of targets that are proposed to the relays. A relay refuses a target if it cannot take its required
-/// position.
+/// Bisection for the highest target that all relays accept. A relay refuses a target if it cannot take the position
+/// that the next relay requires.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest target that all relays accepted, and its ladder.
+    /// Highest target that all relays accepted, with the ladder (list of targets) to propose it again.
     best: Option<(f32, Ladder)>,
-    /// True once the best target is final.
+    /// True once the bisection has ended, and its best target is the one to keep.
     over: bool,
 }
 
 impl Search {
-    /// Returns the target whose commit a relay prevented by refusing its required position, or `None`.
+    /// Returns the target that was to be committed but that a relay refused, or `None`.
     ///
-    /// `verdict` then commits nothing, although its slacks call for a commit.
+    /// A relay refuses if it cannot take its required position. `verdict`, the result of the pass, then commits
+    /// nothing, although its slacks call for a commit.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
@@ -370,8 +378,9 @@ impl Search {
 
     /// Continues after a relay refused its required position for `target`.
     ///
-    /// First a plain pass, in which every relay is at its reach, finds a target that no relay can refuse. The
-    /// interval up to the refused target is then bisected.
+    /// First a plain pass, in which every relay takes the farthest x that meets the target, finds a target that no
+    /// relay can refuse. The interval up to the refused target is then bisected. `most` is a target that no chain can
+    /// meet, if known.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.
@@ -401,7 +410,8 @@ impl Search {
         Ok(())
     }
 
-    /// Selects the next target of the bisection. At the end it is the best one again, if that is not the current one.
+    /// Selects the next target of the bisection. Once its interval is small enough, that is the best accepted target,
+    /// to be used for good.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

@@ -83,19 +83,20 @@ use crate::sir::{Sender, in_noise, square};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// Previous relay at its reach; or Tx or Rx, which do not move.
+    /// Previous relay at its farthest x that meets the target; or Tx or Rx, which do not move.
     AtReach,
     /// Previous relay at this x, m.
     At(f32),
 }
 
-/// Maximum ratio of target SIR and gain of a hop. Above it no hop is short enough, and below it every term of f is
-/// finite.
+/// Maximum ratio of a hop's target SIR and gain. With a larger one no hop is short enough to meet the target; up to
+/// it, all terms of the computation are finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
-/// Hop toward Rx, prepared for evaluation with many targets.
+/// Hop toward Rx, prepared for the computation of its maximum length for many targets.
 ///
-/// The terms that do not depend on the target are precomputed, so a reach takes three divisions and a square root.
+/// The terms that do not depend on the target are precomputed, so that each target takes three divisions and a square
+/// root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -103,25 +104,26 @@ pub struct Hop {
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer across x, (Y - y)^2 + h^2, m^2.
     aside_squared: f32,
-    /// Term (Y - y0) (Y + y0 - 2y) + h0 (2h - h0) of the module's H, m^2. It does not depend on the target.
+    /// Term of the hop's equation that does not depend on the target, m^2. It is (Y - y0) (Y + y0 - 2y) + h0 (2h -
+    /// h0). The interferer is at (X, Y), the sender at (y0, h0), the receiver at (y, h).
     base: f32,
     /// Squared distance of receiver and sender across x, (y - y0)^2 + (h - h0)^2, m^2.
     across_squared: f32,
-    /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
+    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / P, 1/m^2; 0 without noise.
     noise: f32,
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
     /// Maximum x of the receiver, m.
     end_m: f32,
-    /// Maximum x of the receiver, and of its sender, that leaves later relays their separation, m.
+    /// Maximum x of the receiver and of its sender, m, that leaves the relays after each their separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,
 }
 
 impl Hop {
-    /// Returns the hop from `sender` to relay `index` at the lateral offset and altitude `at`.
+    /// Creates the hop from `sender` to relay `index`, which has the lateral offset and altitude `at`.
     ///
     /// `spread_squared` is the maximum squared distance across the line between two neighbours among the relays after
     /// `index`, m^2.
@@ -150,8 +152,8 @@ impl Hop {
         }
     }
 
-    /// Returns the hop from `sender` to a receiver at `at`, with no minimum step and an x up to `end_m`. `noise` is
-    /// nu, 1/m^2.
+    /// Creates the hop from `sender` to a receiver at an x up to `end_m`. `at` is the receiver's lateral offset and
+    /// altitude. It has no minimum length. `noise` is the noise over the interferer's power received at 1 m, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -195,7 +197,7 @@ impl Hop {
         self
     }
 
-    /// Returns this hop without reserving a separation for the relays after `index`.
+    /// Returns this hop without a separation between the relays after `index`; its end is closer to Rx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -229,8 +231,8 @@ impl Hop {
         self.ending(place).onward(target, from_m)
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, for traffic toward Rx only. `None` if there is
-    /// none.
+    /// Returns the largest x at which the receiver meets `target`, m, for traffic toward Rx only. The sender is at x
+    /// = `from_m`. `None` if there is none.
     fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -281,11 +283,11 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target` with a sender in [0, `from_m`]. `None` if there
+    /// Returns the largest x, m, at which the receiver meets `target`, for a sender in [0, `from_m`]. `None` if there
     /// is none.
     ///
-    /// Beyond `from_m` by the minimum step or more it is [`Hop::reach`]; below that the sender is one minimum step
-    /// before. Constant work.
+    /// If the receiver has a position at least the minimum step beyond `from_m`, it is [`Hop::reach`] for a sender at
+    /// `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self
             .reach(target, from_m)
@@ -296,8 +298,8 @@ impl Hop {
         })
     }
 
-    /// Returns the receiver's largest x, m, for traffic in both directions and a sender up to `from_m`. `place` is
-    /// the largest x for a sender at `from_m`.
+    /// Returns the receiver's largest x, m, for traffic in both directions and a sender in [0, `from_m`]. `back` is
+    /// the backward hop, and `place` the largest x for a sender at `from_m`.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -391,10 +393,10 @@ impl Hop {
         }
     }
 
-    /// Returns the required position of the sender if the receiver is at `place`. The sender's reach for `target` is
-    /// `from_m`.
+    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if there is none.
     ///
-    /// It is the closest allowed position, which has the best SIR; `None` if there is none.
+    /// `from_m` is the sender's farthest x that meets `target`. The required position is the allowed one closest to
+    /// the receiver, which has the best SIR.
     pub fn required_position(
         &self,
         target: f32,
@@ -438,9 +440,10 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target`, smooth in all parameters. It has no minimum
-    /// step; `None` if there is none. It is before `from_m` if the distance across the line is longer than the hop
-    /// may be.
+    /// Returns the largest x, m, at which the receiver meets `target`, as a smooth function.
+    ///
+    /// There is no minimum step; `None` if there is no such x. It is less than `from_m`, the sender's x, if the
+    /// distance across the line is longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -520,20 +523,23 @@ pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
 
-/// Maximum number of Newton steps where g is concave. Four to eight are usual; near a double root each halves the
-/// error.
+/// Maximum number of Newton steps in the search for the maximum hop length with noise. It is for a length at which
+/// the margin g is concave. g is 0 or above where the target is met. Four to eight steps are usual; near a double
+/// root each halves the error.
 const STEPS: u8 = 32;
 
-/// Maximum number of steps where g is convex; each at least halves the interval.
+/// Maximum number of steps of a search by bisection, each of which at least halves the interval.
 const HALVINGS: u8 = 32;
 
-/// Number of Newton steps to the inflection point of g; the worst case is exact to an f32 after four.
+/// Number of Newton steps to the hop length at which the margin g changes its curvature. g is that of a hop with
+/// noise. The worst case is exact to an f32 after four.
 const TURNS: u8 = 5;
 
-/// Rounding error of g(d), relative to rho l(d): a target that is missed by at most this counts as met.
+/// Rounding error of g, the margin of a hop with noise, relative to what the target requires. A target that is missed
+/// by at most this counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// Step of the root search, relative to the distance d, at which it ends.
+/// Relative change of the hop length at which the search for the maximum length ends.
 const CLOSE: f32 = 5e-7;
 
 impl Hop {
@@ -546,7 +552,7 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns the noise nu, 1/m^2: the noise over the interferer's power received at 1 m. A constant 0 without the
+    /// Returns the receiver noise over the interferer's power received at 1 m: nu, 1/m^2. A constant 0 without the
     /// feature `noise` removes the search in noise from the image.
     fn nu(&self) -> f32 {
         if cfg!(feature = "noise") {
@@ -556,7 +562,7 @@ impl Hop {
         }
     }
 
-    /// Returns [`Hop::reach`] with noise, which is at most the reach without noise.
+    /// Returns the largest x at which the receiver meets `target`, m, as [`Hop::reach`], with noise.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;
@@ -584,19 +590,20 @@ impl Hop {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
-    /// Ratio rho = gamma / A of target and gain; the symbols are those of the module's documentation.
+    /// Ratio rho = gamma / A of the target SIR and the sender's gain.
     pub(super) ratio: f32,
-    /// Difference rho - 1, without cancellation.
+    /// Difference rho - 1, where rho is target SIR over gain. It is computed without cancellation.
     pub(super) excess: f32,
     /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
-    /// Squared distance a^2 of the receiver from the interferer at d = u, m^2.
+    /// Squared distance of the receiver from the interferer across x, a^2, m^2.
     pub(super) aside_squared: f32,
-    /// Squared distance b^2 of the receiver from the sender at d = 0, m^2.
+    /// Squared distance of the receiver from the sender across x, b^2, m^2.
     pub(super) across_squared: f32,
-    /// Difference a^2 - b^2 of the receiver's squared distances, without cancellation, m^2.
+    /// Difference of two squared distances across x, receiver to interferer less receiver to sender, m^2. It is
+    /// computed without cancellation.
     pub(super) base: f32,
-    /// Noise nu, 1/m^2, above 0.
+    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2, above 0.
     pub(super) noise: f32,
 }
 
@@ -614,7 +621,8 @@ impl NoisyHop {
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns g(d), g'(d) / 2, and the rounding error of g. `d` is at most the limit by the SNR, m.
+    /// Returns the hop's margin g(d) at the length `d` along x, g'(d) / 2, and the rounding error of g. g is 0 or
+    /// above where the target is met. `d` is at most the limit by the SNR, m.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -635,8 +643,8 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer, m, at which the curvature of g changes its sign. `None` if g is
-    /// concave.
+    /// Returns the distance from the interferer, m, at which the margin g changes its curvature's sign. `None` if g
+    /// is concave. g is 0 or above where the target is met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -650,8 +658,8 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// Returns the largest d in [`low`, `high`] at which the target is met, m; `None` if there is none. `high` is at
-    /// most the limit by the SNR. Work: at most 96 evaluations of g, usually five.
+    /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m. `None` if there is none.
+    /// `high` is at most the limit by the SNR. Work: at most 96 evaluations of the hop, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -681,8 +689,8 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the last root of g in [`low`, `high`], where g is concave; `None` if there is none. At `high` g is
-    /// below 0, but for rounding.
+    /// Returns the largest length in [`low`, `high`] at which the hop's margin g is 0. `None` if there is none. g is
+    /// concave there, and below 0 at `high`, but for rounding.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -705,8 +713,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the root of g in [`low`, `high`], where g is convex. g is not negative at `low`, and negative at
-    /// `high`.
+    /// Returns the length in [`low`, `high`] at which the hop's margin g is 0. g is convex there, not negative at
+    /// `low`, and negative at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {
@@ -762,9 +770,9 @@ mod tests {
         )
     }
 
-    /// Tests the reach with an interferer behind the transmitter, where SIR_1 rises at first.
+    /// Checks the maximum length of a first hop whose SIR rises with the length at first.
     ///
-    /// With the interferer 10 m behind Tx, SIR_1 rises from 1.04 above Tx to 1.22 at 45 m.
+    /// The interferer is 10 m behind Tx, so the SIR rises from 1.04 above Tx to 1.22 at 45 m.
     #[test]
     fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
         // SIR_1 is at least 1.22 from 40.9 m to 50 m.

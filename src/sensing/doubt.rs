@@ -45,39 +45,42 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of consistent measurements, relative to the variance that the operator expects.
+/// Maximum variance of consistent measurements, relative to the variance that the operator expects. Above it the
+/// search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum reduction of the residual by which excluding one relay identifies it as faulty. In squared standard
-/// deviations.
+/// Minimum reduction of the fit's residual by which the exclusion of one relay shows that it is faulty. It is a
+/// squared number of standard deviations.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual that starts a search for a faulty relay, and minimum reduction by its exclusion. An error of some
-/// 15 % at one position has this residual.
+/// Minimum residual for a search for a faulty relay, and its minimum reduction by the exclusion. An error of some 15
+/// % at one position has this residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of the fits' variances without the second suspect and without the first one. With a smaller ratio
-/// the faulty relay counts as unknown.
+/// Minimum ratio of two fits' variances that singles out one faulty relay: second best over best. Each fit excludes
+/// one relay. With a smaller ratio the faulty relay counts as unknown.
 const DECISIVE: f64 = 6.0;
 
 /// Maximum variance of the relative errors for measurements to count as consistent (some 1.5 dB).
 const OF_ONE_MIND: f64 = 0.1;
 
-/// Number of sensing passes after a failed search for the faulty relay before the next search.
+/// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
+/// measurements.
 const REST: u8 = 4;
 
-/// Limits of the difference at which an excluded relay fits the others again. The first is a multiple of the
-/// variance, the second a squared relative difference; the larger one counts.
+/// Limits of the difference below which an excluded relay's measurement fits the others again. The first is a
+/// multiple of the variance, the second a squared relative difference; the larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays to identify a faulty one. With four, an exclusion leaves three, and three unknowns fit
 /// any three measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions ([`Sums::count`]), after fading, to identify a faulty relay.
+/// Minimum number of measured positions ([`Sums::count`]) to identify a faulty relay. Older ones count less.
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight to the weight of one position. The rounding of the sums hides smaller weights.
+/// Maximum ratio of the mean weight of all positions to the weight of one. With a larger ratio that position is lost
+/// in the rounding of the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +88,8 @@ enum Stage {
     Usual,
     /// Sensing pass without this node, to find out if the others' measurements are consistent.
     Trying(u16),
-    /// Sensing pass that tells this node that it is excluded; `true` for the second such pass.
+    /// Sensing pass that tells this node that it is excluded. `false` is for the first such pass, `true` for the
+    /// second.
     Telling(u16, bool),
 }
 
@@ -93,21 +97,21 @@ enum Stage {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial {
     stage: Stage,
-    /// Number of sensing passes until the next search may start.
+    /// Number of sensing passes (collections of measurements) until the next search may start.
     rest: u8,
-    /// Node without which the other nodes' measurements fit best so far.
+    /// Node whose exclusion gave the best fit to the other nodes' measurements so far.
     best: u16,
-    /// Residual of the fit to the measurements of all relays.
+    /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
-    /// Residual of the fit to the measurements without the node `best`.
+    /// Residual of the fit that excludes the node `best`, the sum of squared relative errors.
     seen_best: f32,
-    /// Variance of the fit to the measurements without the node `best`.
+    /// Variance of the relative errors in the fit that excludes the node `best`, the smallest so far.
     least: f32,
-    /// Second smallest variance of the fits to the measurements without one node.
+    /// Second smallest variance of the relative errors among the fits that exclude one node.
     second: f32,
 }
 
-/// Use of a sensing pass's result during the search for a faulty relay.
+/// Use of the measurements that a sensing pass collected, during the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Use the result of the pass for the interference estimate.
@@ -129,7 +133,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// Node whose measurements the next sensing pass excludes, 0 for none.
+    /// Node whose measurements the next sensing pass (collection of measurements) excludes, 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Usual => 0,
@@ -137,8 +141,8 @@ impl Trial {
         }
     }
 
-    /// Evaluates the `sums` of a sensing pass in the search for a faulty relay. The view has `relays` relays, whose
-    /// node numbers are within 1 to `nodes`.
+    /// Evaluates the `sums` of a collection of measurements in the search for a faulty relay. The view has `relays`
+    /// relays, whose node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -226,8 +230,8 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor between measurement and estimate above which a relay checks its own measurement. Its weight is then so
-/// small that the leader's search would not find it, and it does not disturb the others.
+/// Ratio of a relay's measurement to the estimate above which the relay checks its own measurement. Such a
+/// measurement has so little weight that the leader's search would not find it, and it does not disturb the others.
 const ABSURD: f32 = 300.0;
 
 /// Returns true if the measurement at `place` is absurd: far off the estimate and off the other relays. `expected` is
@@ -253,9 +257,9 @@ pub(crate) fn is_absurd(
 
 /// Returns true if the measurement of an excluded relay still does not fit the other relays.
 ///
-/// The measured v = 1e-12 W / I at `place` is compared with e, the fit to the sums of all `others` there. Their
-/// difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the current estimate; it sets
-/// the measurement's weight.
+/// It is v = 1e-12 W / I at `place`, and is compared with the value e that the fit to the other relays' sums,
+/// `others`, gives there. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the
+/// current estimate; it sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -277,10 +281,11 @@ pub(crate) fn is_off(
     is_apart(ratio, unsure, AGAIN)
 }
 
-/// Returns true if a relay that measures nothing should receive several times its noise `noise_w`, W.
+/// Returns true if a relay that measures nothing should measure several times its noise `noise_w`, W. Its receiver is
+/// then faulty.
 ///
-/// The other relays' repeated measurements, whose sums are `others`, show that. `there` has the terms of the relay's
-/// position.
+/// The repeated measurements of the other relays, whose sums are `others`, give the expected power. `there` has the
+/// terms of the relay's position.
 pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error: f32) -> bool {
     let Ok(fit) = Fit::of(others, relative_error) else {
         return false;
@@ -295,9 +300,10 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than both limits.
+/// Returns true if a ratio of powers differs from 1 by more than two limits. The difference is (ratio - 1 / ratio) /
+/// 2, squared.
 ///
-/// The limits are a multiple of the variance `unsure`, and a squared difference.
+/// The limits are a multiple of the variance `unsure`, and a fixed number.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -306,8 +312,8 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits of the difference above which the level measured at Tx or Rx does not fit. The first is a multiple of the
-/// variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
+/// Limits of the difference above which the level measured at Tx or Rx does not fit the relays'. The first is a
+/// multiple of the variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
@@ -327,8 +333,8 @@ impl EndLevel {
     }
 }
 
-/// Returns v = [`UNIT_W`] / I, as a drone would measure it, from the `level` measured at Tx or Rx. It uses the
-/// mission's path loss over the ground.
+/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it. The conversion
+/// uses the mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)

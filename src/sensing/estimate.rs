@@ -89,7 +89,7 @@ impl Spread {
     }
 }
 
-/// Interference estimate with its sequence number, which the leader increments and which wraps.
+/// Interference estimate with its sequence number. The leader increments the number, which wraps.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NumberedEstimate {
@@ -99,52 +99,55 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Difference of two estimates up to which the newer one is never worth an agreement. It is a mean square relative
-/// difference.
+/// Maximum difference of a new estimate that is too small for the relays to agree on it. It is a mean square relative
+/// difference of the interference.
 const WORTH: f64 = 1e-5;
 
-/// Difference of two estimates above which the interference may have changed. It is a mean square relative
-/// difference.
+/// Minimum difference of a new estimate that may show a change of the interference. It is a mean square relative
+/// difference of the interference.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of a change of the interference to its variance, without a moving interferer. The next constant is
-/// the ratio for a moving one.
+/// Minimum ratio of a difference to its variance that shows a change of a stationary interferer.
 const BEYOND_CHANCE: f64 = 8.0;
+/// Minimum ratio of a difference to its variance that shows a change, for a moving interferer.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of a change to its variance once a chain has settled: there is another interferer. The estimation
+/// Minimum ratio of a difference to its variance that shows another interferer in a settled chain. The estimation
 /// then starts again.
 const ANOTHER: f64 = 64.0;
 
 /// Squared relative change of the level measured at Rx that counts as a change of the interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of a moving interferer's track from the fit, over the fit's variance.
+/// Maximum squared deviation of a moving interferer's track, over the measurements' variance. With a larger one the
+/// prediction is discarded.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth of the information for a refined estimate. The next constant is the maximum number of refinements:
-/// then a chain has settled and sends no new estimates of a stationary interferer.
+/// Minimum growth of the measurements' information that is worth a refined estimate, as a factor.
 const LEARNED: f64 = 1.1;
+/// Maximum number of refined estimates of a stationary interferer. The chain has then settled, and gets no new
+/// estimate without a change.
 const REFINED: u8 = 4;
 
-/// Time in which drones fly a few metres to new positions. The prediction of a moving interferer includes it.
+/// Time that drones need to fly a few metres to new positions. A moving interferer is predicted that far ahead.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Mean square relative error above which the measurements contradict an estimated source.
+/// Mean square relative error of measurements above which they contradict an estimated source.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error, over a measurement's variance, that contradicts the mission's interference.
+/// Mean square error of measurements that contradicts the mission's interference. It is relative to the variance of
+/// one measurement.
 const GUESSED: f64 = 16.0;
 
 /// Quality of the current estimate at the time of its adoption, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information of the measurements: number of measured positions over the variance of one.
+    /// Information (certainty) of the measurements: number of positions over the variance of one.
     information: f64,
-    /// Expected mean square relative error of the estimate.
+    /// Mean square relative error that the estimate is expected to have.
     chance: f64,
-    /// Number of times that the estimate was refined for the same interferer. For a moving interferer, only
-    /// refinements by more information count.
+    /// Number of times that the estimate was refined for the same stationary interferer. A settled chain has the
+    /// maximum; a moving interferer counts only refinements by more information.
     refined: u8,
     track: Track,
 }
@@ -167,9 +170,10 @@ pub(crate) struct Review {
     pub(crate) ends: EndsOff,
 }
 
-/// Decides if a new estimate replaces the current `estimate`. `mission` is based on the current one. `sums` has the
-/// relays' measurements, and `levels` those of transmitter and receiver. `before` is the information when `estimate`
-/// was adopted.
+/// Decides if the measurements give a new estimate that replaces the current `estimate`.
+///
+/// `mission` is based on the current one. `sums` has the relays' measurements, and `levels` those of transmitter and
+/// receiver. `before` is the quality of the current estimate when it was adopted.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -265,8 +269,8 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit to all measurements, and its source. The `levels` of transmitter or receiver are cleared if they
-/// do not fit.
+/// Returns the fit to all measurements, and the source of interference that it gives. Those `levels` of transmitter
+/// and receiver that do not fit are cleared.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -293,8 +297,8 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer at the position where it will be when the drones have moved. `None` if it does not
-/// move. `heard` is the mean time of the measurements.
+/// Returns a moving interferer at its predicted position once the drones have moved. `None` if it does not move.
+/// `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -317,8 +321,8 @@ fn followed(
     None
 }
 
-/// Returns `fit` with the measurement of Tx or Rx, at `x_m`, added if its level fits the others. Only then does the
-/// path loss over the ground agree with the mission's.
+/// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added if it agrees with the fit. If it does not, the
+/// real path loss over the ground differs from the mission's, and `fit` is returned.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -350,8 +354,9 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at the ground receiver Rx, W; 0 without a measurement. It is the mean of the level
-/// that Rx measures and of the source's power over the ground, if the two agree, weighted by their variances.
+/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it. It is the mean, weighted
+/// by the variances, of the measured level and of the source's power over the ground. If the two differ too much, it
+/// is the measured level.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -427,7 +432,8 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Minimum squared deviation, relative to its variance, of a fit that belongs to another interferer.
+/// Minimum squared deviation from the track, over its variance, that shows another interferer. The track then starts
+/// again.
 const ELSEWHERE: f32 = 49.0;
 
 /// Kalman filter along one axis: the interferer's position, m, and velocity, m/s, with covariance.
@@ -447,7 +453,8 @@ impl Axis {
         }
     }
 
-    /// Predicts the state `seconds` later. The variance of the velocity grows by `walk` per second, in m^2/s^3.
+    /// Predicts position and velocity `seconds` later. The variance of the velocity grows by `walk` per second, in
+    /// m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
         let [at, both, speed] = &mut self.variance;
@@ -456,7 +463,8 @@ impl Axis {
         *speed += walk * seconds;
     }
 
-    /// Updates the state with the position `found`, m, which has the variance `variance`, m^2.
+    /// Updates the state with the measured position `found`, m, of variance `variance`, m^2. The state is position
+    /// and velocity.
     fn take(&mut self, found: f32, variance: f32) {
         let [at, both, speed] = self.variance;
         let sum = at + variance;
@@ -491,7 +499,7 @@ impl Axis {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Track {
     axes: [Axis; 2],
-    /// Time to which position and velocity refer; `None` before the first fit.
+    /// Time to which the track's position and velocity refer; `None` before the first source is found.
     at: Option<Instant>,
 }
 
@@ -529,7 +537,7 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the last position and the predicted one at `then`, (x, y) in m. `None` while the interferer does not
+    /// Returns the last position of the interferer, and the predicted one at `then`: (x, y), m. `None` if it does not
     /// move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;

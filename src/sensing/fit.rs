@@ -28,10 +28,10 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error in the fit's variance, as a number of measured positions.
+/// Weight of the operator's expected error in the estimated variance, as a number of positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of the measured positions' t (2 y / D) to tell the two sides of the line apart.
+/// Minimum variance of the positions' 2 y / D to tell the two sides of the line Tx to Rx apart.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -51,17 +51,17 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the system is solved for all four unknowns; false if the last unknown is left out.
+    /// True if the fit has all four unknowns; false if the last one, the side of the line, is omitted.
     whole: bool,
 }
 
-/// Minimum pivot of the factorisation, relative to the first: seven digits of an f32. That suffices for sums of some
-/// hundred positions.
+/// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
+/// separate the unknowns. Its seven digits of an f32 suffice for sums of some hundred positions.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
-    /// Factorises the matrix of products in [`Sums`]. `None` if it cannot separate the first three unknowns. The last
-    /// unknown is omitted if its pivot is not above `least`.
+    /// Factorises the fit's symmetric matrix, given by ten `products` of [`Sums`]. `None` if it cannot separate the
+    /// first three unknowns. The last unknown is omitted if its pivot is not above `least`.
     fn new(products: [f64; 10], least: f64) -> Option<Self> {
         let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd] = products;
         if !(aa > 0.0) {
@@ -116,7 +116,8 @@ impl Factor {
         last
     }
 
-    /// Returns r^T G^-1 r: the variance of the fit at the `terms` r, in units of one position's variance.
+    /// Returns the variance of the fit at a position, in units of one measurement's variance. `terms` are those of
+    /// the position. It is r^T G^-1 r, with G the matrix of the fit.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -134,10 +135,11 @@ pub struct Fit {
     factor: Factor,
     /// Estimated variance of the relative error of one measured position.
     variance: f64,
-    /// Variance of one position's relative error that the operator expects.
+    /// Variance of one measured position's relative error, as the operator expects it.
     expected: f64,
-    /// Residual of the fit. The next field is the number of measured positions beyond the number of unknowns.
+    /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
+    /// Number of measured positions beyond the number of unknowns; 0 if there are none.
     beyond: f64,
     count: f64,
 }
@@ -203,8 +205,7 @@ impl Fit {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "checked")]
-    /// Returns the most likely power of a source at (`x_m`, `y_m`), W; `None` outside of 1e-6 to 1e9 W. With k = m g
-    /// / (g G g), as in `nearest`.
+    /// Returns the most likely power of a source at (`x_m`, `y_m`), W; `None` outside of 1e-6 to 1e9 W.
     pub(crate) fn power_w(&self, mission: &Mission, [x_m, y_m]: [f32; 2]) -> Option<f32> {
         let unit = Interferer {
             power_w: mission.config().common.power_w,
@@ -219,7 +220,7 @@ impl Fit {
         (1e-6..=1e9).contains(&power_w).then_some(power_w)
     }
 
-    /// Returns the variance of [`Fit::value`] at a position with these `terms`, relative to its square.
+    /// Returns the relative variance of the fitted inverse interference at a position with these `terms`.
     pub(crate) fn relative_variance(&self, terms: &Terms) -> f64 {
         let heard = self.value(terms);
         self.variance * self.factor.variance(terms.map(f64::from)) / (heard * heard)
@@ -243,21 +244,21 @@ impl Fit {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Information of the measurements: number of measured positions over the variance of one.
+    /// Information (certainty) of the measurements: number of positions over the variance of one.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }
 
-    /// Returns the mean square relative difference of two sources at the fitted positions. Each source is given by
-    /// its four coefficients.
+    /// Returns the mean square relative difference of two sources' interference at the measured positions. Each
+    /// source is given by its four coefficients ([`coefficients`]).
     pub(crate) fn off(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference between the fit and the source `others`. That source is given by
-    /// its four coefficients.
+    /// Returns the mean square relative difference in interference of the fit and another source. That source is
+    /// given by its four coefficients ([`coefficients`]).
     pub(crate) fn off_by(&self, others: &[f64; 4]) -> f64 {
         self.off(&self.coefficients, others)
     }
@@ -333,7 +334,8 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative residual of `sums` for a source with these `coefficients`.
+/// Returns the mean square relative error of measurements for a source with these `coefficients`. `sums` are those of
+/// the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [
         aa,
@@ -369,8 +371,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function from a position's terms to v = 1e-12 W / I of the mission's interferer. It gives `None` without
-/// a known source, or outside of the measurable range.
+/// Returns a function from the terms of a position to the inverse interference v = 1e-12 W / I there. I is that of
+/// the mission's interferer. The function gives `None` without a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -391,9 +393,11 @@ const FINE: i8 = 2;
 /// Number of finer grids in the search for a source. The steps of each are 0.4 times those of the previous grid.
 const FINER: u8 = 5;
 
-/// Returns X', Y' and k of the best-fitting source, by a search on grids; `None` if none fits. The search covers the
-/// side of the line of positions that `sign` selects, 1 or -1; `side` is the Y' of that line. 414 positions, some 16
-/// 000 instructions on a Cortex-M4F.
+/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. It is searched on grids.
+/// Positions are in units of D / 2.
+///
+/// The search covers the side of the line of measured positions that `sign` selects, 1 or -1; `side` is the Y' of
+/// that line. 414 positions, some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

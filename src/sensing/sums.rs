@@ -25,7 +25,7 @@ pub struct Level {
     pub count: f32,
 }
 
-/// Ends of the chain, Tx and Rx, whose measurements do not fit those of the relays.
+/// Flags of the chain's ends, Tx and Rx: true if an end's measurements do not fit those of the relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
@@ -42,8 +42,7 @@ impl EndsOff {
     };
 }
 
-/// Interference levels measured at Tx and Rx, and which of them did not fit before. They are compared with the
-/// relays' measurements.
+/// Interference levels measured at Tx and Rx, and which of them did not fit the relays' before.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
     pub(crate) transmitter: Level,
@@ -71,19 +70,19 @@ pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Terms 1, u, u^2 - 1/3 + t^2 + z^2 and t of a position; u = 2 x / D - 1, t = 2 y / D, z = 2 h / D. The inverse
-/// interference is a linear combination of them.
+/// Terms of a position, of which the inverse interference of a source is a linear combination. They are 1, u, u^2 -
+/// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D.
 pub(crate) type Terms = [f32; 4];
 
-/// Returns the four terms of the position `at`, for a distance `distance_m` from Tx to Rx.
+/// Returns the four terms of the position `at` for the fit of a source. `distance_m` is the distance from Tx to Rx.
 pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     let half = 0.5 * distance_m;
     let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Unit of interference power, W: v = 1e-12 W / I. It is the middle of the measurable range, so that no square of a v
-/// leaves an f32.
+/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. It is the middle of the measurable range,
+/// so that the square of v is in the range of an f32.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
 /// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
@@ -99,16 +98,16 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Returns k = eta D^2 [`UNIT_W`] / (4 P) of a source of P = `power_w` watts; for k it returns P. The function is its
-/// own inverse.
+/// Returns the strength k = eta D^2 [`UNIT_W`] / (4 P) of a source of P = `power_w` watts. For a strength it returns
+/// the power: the function is its own inverse.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
     0.25 * config.channel.eta() * d * d * f64::from(UNIT_W) / power_w
 }
 
-/// Returns the coefficients of `source`, by which the terms of a position give v = 1e-12 W / I there. They are k
-/// (X'^2 + Y'^2 + 1/3), -2 k X', k and -2 k Y'.
+/// Returns the four coefficients of `source`, which turn a position's terms into v = 1e-12 W / I. They are k (X'^2 +
+/// Y'^2 + 1/3), -2 k X', k and -2 k Y', with X' and Y' the position in units of D / 2.
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -137,10 +136,10 @@ pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.
 ///
-/// For each position: w a b for every two of the four terms, w a v, w v^2, its share, its number of measurements, and
-/// its share times its age in seconds. w is 2 (v / e)^(1/2) / (v^2 + e^2) with v measured and e expected. It is 1 /
-/// e^2 if both agree, and gives errors that are equal in decibels equal weights, and no position more than all the
-/// others.
+/// For each position: w a b for every two of the four terms, w a v for each term, w v^2, its share, its number of
+/// measurements, and its share times its age in seconds. The share is 1 for a new position and fades. w is 2 (v /
+/// e)^(1/2) / (v^2 + e^2) with v measured and e expected. It is 1 / e^2 if both agree, and gives errors that are
+/// equal in decibels equal weights, and no position more than all the others.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sums {
@@ -160,8 +159,9 @@ impl Sums {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a measured position with its `terms`, the measured `v` and the `expected` v, both above 0. Its weight is
-    /// multiplied by `share`, and it stands for `measured` measurements. At most 60 instructions.
+    /// Adds a measured position with its `terms`, the measured `v` and the `expected` v, both above 0. v is 1e-12 W /
+    /// I. The position's weight is multiplied by `share`, and it stands for `measured` measurements. At most 60
+    /// instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);
@@ -197,7 +197,7 @@ impl Sums {
         }
     }
 
-    /// Ages the sums by `seconds` and multiplies their weight by the factor `share`.
+    /// Reduces the weight of all measurements by the factor `share`, and raises their age by `seconds`.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
         *age += *count * seconds;
@@ -257,8 +257,9 @@ pub(crate) struct Listener {
     half_life: Duration,
     past: Sums,
     faded: Instant,
-    /// Current position of the relay. The next field is the mean interference measured there, in units of `UNIT_W`.
+    /// Current position of the relay, the mean of those at which it measured.
     at: Placement,
+    /// Mean interference measured at that position, in units of `UNIT_W`.
     heard: Average,
 }
 
@@ -284,8 +285,8 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measured power `heard`, in units of [`UNIT_W`], above 0, at the position `at`. `expected` returns v of
-    /// the current estimate for the terms of a position.
+    /// Adds a measured power `heard`, in units of [`UNIT_W`], above 0, at the position `at`. `expected` returns the
+    /// inverse power by the current estimate for the terms of a position.
     pub(crate) fn add(
         &mut self,
         now: Instant,
@@ -317,8 +318,8 @@ impl Listener {
         })
     }
 
-    /// Returns the sums of all measurements, faded and aged to `now`. `expected` returns v of the current estimate
-    /// for the terms of a position.
+    /// Returns the sums of all measurements, with weights and ages as of `now`. `expected` returns the inverse power
+    /// by the current estimate for the terms of a position.
     pub(crate) fn sums(
         &self,
         now: Instant,
@@ -349,7 +350,7 @@ impl Listener {
     }
 }
 
-/// Returns the fraction of a measurement's weight that remains after `age`.
+/// Returns the fraction of a measurement's weight that remains after `age`, 1 to 0.
 pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
     libm::exp2f(-(age.as_micros() as f32 / half_life.as_micros() as f32))
 }
@@ -357,11 +358,11 @@ pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
 /// Exponentially weighted mean of measurements, whose weight halves in each half-life.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Average {
-    /// Mean; 0 without a measurement.
+    /// Weighted mean of the measurements; 0 without any.
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,
-    /// Mean age of the measurements at the time `last`, s.
+    /// Weighted mean age of the measurements at the time `last`, s.
     pub(crate) behind_s: f32,
 }
 

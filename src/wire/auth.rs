@@ -91,8 +91,8 @@ impl Auth {
     }
 }
 
-/// Nonces of the sender and the receiver of a frame. The upper half is the node's epoch; the lower half is a number
-/// that counts up from its claim number.
+/// Nonces of the sender and the receiver of a frame. The upper half is the node's epoch (start counter); the lower
+/// half counts up from a random number that the node draws at its start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,

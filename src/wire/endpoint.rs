@@ -41,8 +41,8 @@ impl Endpoint {
         }
     }
 
-    /// Authenticates all frames from now on with `auth`, from the claim number `claim`. The session of a node that is
-    /// silent for `gone_after` ends.
+    /// Authenticates all frames from now on with `auth`. Nonces count up from the claim number `claim`, drawn at
+    /// start. The session of a node that is silent for `gone_after` ends.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
@@ -69,8 +69,8 @@ impl Endpoint {
         None
     }
 
-    /// Checks the authentication tag of `frame` and counts every result but a fresh message. `None` if this node does
-    /// not sign.
+    /// Checks the authentication tag of `frame`; counts every result but a new valid message. `None` if this node
+    /// does not sign.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -95,8 +95,8 @@ impl Endpoint {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Writes `message` to node `to` into `frame`. If that node could not check its tag yet, writes a handshake in
-    /// its place; the caller sends the message later.
+    /// Writes `message` to node `to` into `frame`. If that node cannot verify this node's tags yet, a handshake is
+    /// written instead, and the caller sends the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,

@@ -25,5 +25,5 @@ pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI
 /// Largest node number of an address; 4095 is reserved for a broadcast.
 pub const MAX_NODE: u16 = 4094;
 
-/// Maximum length of a sweep message's frame on the wire, with sixteen targets, bytes.
+/// Maximum length on the wire of a sweep message's frame, with sixteen target SIRs, bytes.
 pub const MAX_SWEEP: usize = 100 + auth::TAG_ROOM;

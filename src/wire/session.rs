@@ -35,10 +35,11 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the lower halves of two nonces that one node uses in an epoch.
+/// Maximum distance of two nonces of one node in an epoch, between their lower halves. A nonce of the same number
+/// farther away belongs to another node that uses this number.
 const NEAR: u32 = 1 << 12;
 
-/// Number of consecutive handshakes of an older epoch after which the node's epoch has gone back. Fewer can be
+/// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. Fewer can be
 /// delayed frames.
 const WENT_BACK: u8 = 5;
 
@@ -51,9 +52,9 @@ struct Peer {
     asks: bool,
     /// True if the node has repeated this relay's nonce: it is present, and both know each other's nonce.
     proven: bool,
-    /// Time of the entry's last use, on the session's own counter `clock`.
+    /// Time of the entry's last use, counted in uses of the table (`Session::clock`).
     used: u32,
-    /// Time of the node's last proof of presence, or of its first frame with a larger nonce.
+    /// Time of the last frame that proved the node's presence, or of its first frame with a larger nonce.
     heard: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own: u32,
@@ -63,19 +64,20 @@ struct Peer {
     older: Older,
 }
 
-/// Counter of a node's handshakes with an older epoch, or after a restart in the same epoch.
+/// Counter of handshakes that a node sent with an outdated nonce. It is of an older epoch, or the node restarted in
+/// the same one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Older {
     epoch: u32,
-    /// Frame counter of the last such handshake, plus one.
+    /// Frame counter of the last outdated handshake, plus one.
     next: u32,
-    /// Number of such handshakes in a row with rising frame counters.
+    /// Number of outdated handshakes in a row with rising frame counters.
     times: u8,
 }
 
 impl Older {
-    /// Counts a handshake of an older epoch; returns true at the `WENT_BACK`th. A replay of the same frame does not
-    /// count.
+    /// Counts a handshake of an older epoch; returns true if it is the fifth (`WENT_BACK`). A replay of the same
+    /// frame does not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -109,13 +111,13 @@ pub(crate) struct Session {
     epoch: u32,
     /// Silence of the known node after which another node with the same number is accepted.
     gone_after: Duration,
-    /// Claim number of this relay. The lower halves of this relay's nonces are above it.
+    /// Claim number of this relay, drawn at its start. The lower halves of this relay's nonces are above it.
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
     made: u32,
-    /// Claim of another node to this relay's number, from the last handshake that had one.
+    /// Claim of another node that uses this relay's number, from the last handshake with such a claim.
     rival: Option<Rival>,
-    /// Counter of all uses of the table's entries, wrapping; it orders them by age.
+    /// Counter of all uses of the table's entries, wrapping. It tells which entry was used least recently.
     clock: u32,
     /// Nodes whose entries are never replaced: the current neighbours.
     pinned: [Option<u16>; 2],
@@ -137,13 +139,13 @@ pub(crate) enum Checked {
     Forged,
     /// Frame of a member that was received before or is too old to check.
     Replayed,
-    /// Replayed handshake, the last in a row that shows that the node itself uses an older epoch.
+    /// Replayed handshake that completes the proof that the node itself uses an older epoch.
     WentBack,
 }
 
 impl Session {
-    /// Creates a session table without nodes for a node with claim number `claim`. A node that is silent for
-    /// `gone_after` is replaced by another one with its number.
+    /// Creates a table without sessions for a node with claim number `claim`, drawn at its start. A node that is
+    /// silent for `gone_after` is replaced by another one with its number.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -178,7 +180,8 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes. New nonces count up from `claim`, if it is above all nonces of this epoch so far.
+    /// Forgets all nodes, as after a restart. New nonces count up from `claim`, if that is above all nonces of this
+    /// epoch so far.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.made {
             self.claim = claim;
@@ -187,8 +190,8 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`. It shows this relay's nonces to other nodes of this relay's
-    /// number, too.
+    /// Schedules a handshake to the known node `to`. Another node with this relay's number that receives it learns of
+    /// this relay.
     pub(crate) fn show(&mut self, to: u16) {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             peer.handshake = true;
@@ -204,10 +207,10 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake with a request to the silent node `to`, unless it restarted with a used nonce.
+    /// Schedules a handshake that requests a reply from the silent node `to`.
     ///
-    /// A node that has restarted with a used nonce gets none: with a handshake that contains its nonce it could
-    /// continue as its earlier start, and use nonces and counters twice.
+    /// There is none if the node has restarted with an outdated nonce of the same epoch: a handshake contains its
+    /// known nonce, with which it could continue its earlier start, and use nonces and counters twice.
     pub(crate) fn ask_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.other >> 32;
@@ -216,7 +219,8 @@ impl Session {
         }
     }
 
-    /// Takes the claim of another node to this relay's number that a handshake contained, or `None`.
+    /// Returns the claim of another node to this relay's number, if a handshake contained one. It returns each claim
+    /// once; `None` otherwise.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()
     }
@@ -368,8 +372,8 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns the node with this relay's number that has `nonce`: this relay or another one. Unknown for 0 or an
-    /// older epoch.
+    /// Returns the node that uses `nonce` and this relay's number: this relay or another one. It is unknown for 0 or
+    /// an older epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {
@@ -445,8 +449,8 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch belong to two nodes. Their numbers then differ by more than [`NEAR`], apart from the
-/// bit [`RAISED`].
+/// Returns true if two nonces of one epoch belong to two nodes with one number. Their lower halves differ by more
+/// than [`NEAR`]. The bit [`RAISED`] of these is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > NEAR

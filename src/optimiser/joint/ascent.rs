@@ -19,12 +19,11 @@ const RESTRAINED: f32 = 0.05;
 /// Trust region (limit of a relay's move) below which the ascent ends; a fraction like [`TRUST`].
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which the slack (spare length at Rx) falls with the target, in units of D per ln(SIR). The usual
-/// rate is 0.5, since hop lengths vary as 1 / sqrt(SIR). Steps are divided by the rate, so a smaller one is raised to
-/// this.
+/// Minimum rate at which the slack (spare length at Rx) falls with the target, in D per ln(SIR). The usual rate is
+/// 0.5, since hop lengths vary as 1 / sqrt(SIR). Steps are divided by the rate, so a smaller one is raised to this.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of an ascent's target limit, in ln(SIR), after the chain failed the check at its upper bound.
+/// First increase of an ascent's target limit after the chain failed the check there, in ln(SIR).
 const EXCESS: f32 = 0.03;
 
 /// First cap on the slack (spare length of the chain at Rx), in units of D. Slack above the cap does not count, so
@@ -50,8 +49,8 @@ const FORESEEN: f32 = 1e-4;
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Maximum length, in units of D, by which the chain of an ascent may fall short of Rx to be worth more work. The
-/// search after the ascent finds a lower target that it meets.
+/// Maximum length by which an ascent's chain may fall short of Rx to be worth more work, in D. The search after the
+/// ascent finds a lower target that it meets.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -72,15 +71,18 @@ pub(crate) enum AscentStep {
 pub(crate) struct Ascent {
     /// Target SIR of the current chain, in ln(SIR).
     pub(crate) sigma: f32,
+    /// Slack of the current chain: its spare length at Rx for the target `sigma`, m. It is below 0 if the chain is
+    /// too short.
     pub(crate) slack: f32,
     floor: f32,
     /// Maximum target of the ascent, in ln(SIR), until the chain is checked at its upper bound.
     limit: f32,
+    /// Next increase of `limit`, in ln(SIR), if the chain fails that check.
     excess: f32,
     /// Cap on the slack (spare length of the chain at Rx), in units of D. It is lowered where slack would outweigh a
     /// penalty.
     spare: f32,
-    /// Penalty of the current chain for relays too near the interferer: a length subtracted from the slack, m.
+    /// Penalty for relays too near the interferer: a length subtracted from the chain's slack, m.
     pub(crate) penalty: f32,
     distance_m: f32,
     /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
@@ -202,7 +204,7 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if the slack and the expected gain are each worth less than `by` of the target, in ln(SIR).
+    /// Returns true if slack and expected gain are each worth less than `by` of the target, in ln(SIR).
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least

@@ -53,11 +53,11 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Mixed second derivatives of the reach (the end's dependent coordinate): a row for each free coordinate w_i of
-    /// the end, with the derivatives by the start p.
+    /// Mixed second derivatives of the reach (the end's dependent coordinate). There is a row for each free
+    /// coordinate w_i of the end, with the derivatives by the start p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the reach (the end's dependent coordinate) by the end's free coordinates w: w_1 twice,
-    /// w_1 and w_2, w_2 twice.
+    /// Second derivatives of the reach (the end's dependent coordinate) by the end's free coordinates w. The order is
+    /// w_1 twice, w_1 and w_2, w_2 twice.
     pub(super) by_ww: [f32; 3],
     /// Derivative of the reach (the end's dependent coordinate) by the target in ln(SIR), m.
     pub(super) by_target: f32,

@@ -71,8 +71,8 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function from the end of `hop` to its start; returns the policy of the relay at its end.
-    /// The relay's move in its two free coordinates is limited to [`low`, `high`], m, relative to its current
+    /// Propagates the value function from the end of `hop` to its start; returns its end's policy. The end is a
+    /// relay. The relay's move in its two free coordinates is limited to [`low`, `high`], m, relative to its current
     /// position.
     pub(super) fn pass(
         &mut self,

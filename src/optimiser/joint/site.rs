@@ -19,7 +19,7 @@ const RIM: f32 = 0.999_99;
 /// Factor on the minimum separation in the joint method, so that a small violation of it is harmless.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Number of Newton steps that find the point at which a hop with noise is linearised (see [`Tangent`]).
+/// Number of Newton steps to the point at which a hop with noise is linearised (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
 /// Number of bisection steps of [`Site::halved`], for a path whose end is out of reach.
@@ -76,7 +76,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position with the lateral offset and altitude `wanted`, at the largest x that meets `target`.
+    /// Returns the position at the lateral offset and altitude `wanted` with the largest x for `target`.
     ///
     /// The sender is at x = `from_m`. If its hop cannot reach `wanted`, the closest lateral offset and altitude that
     /// it reaches are taken. `None` if no hop meets the target. The position's x is at most Rx's.
@@ -90,8 +90,8 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the position of largest x, with the lateral offset and altitude `at`, at which the hop meets `target`.
-    /// The sender is at x = `from_m`. `None` if there is none.
+    /// Returns the position of largest x at the lateral offset and altitude `at` that meets `target`. The sender is
+    /// at x = `from_m`. `None` if there is none.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -103,7 +103,8 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches without a step back in x.
+    /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches. It does so without a step
+    /// back in x.
     ///
     /// It is searched on the straight line to `wanted` from the allowed ones nearest to the middle of those in reach.
     /// `None` if none is reached. For c = target / gain > 1 a hop from p reaches a ball, with the interferer at m:
@@ -287,8 +288,8 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Returns the first coordinate of the end of a hop that just meets its target; `a` and `b` are the other two. There
-/// may be two solutions: `rising` selects the larger one. `None` if there is none.
+/// Returns the first coordinate of the end of a hop that just meets its target. `a` and `b` are the other two
+/// coordinates. There may be two solutions: `rising` selects the larger one. `None` if there is none.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -339,7 +340,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay: three bytes each, as a fraction of its allowed range.
+/// Stored lateral offset and altitude of one relay. Each takes three bytes, as a fraction of its allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
@@ -474,9 +475,9 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Returns the slack of the last hop for `target`, its maximum length less its length, m, and the derivatives. These
-/// are by the position of the last relay, which is at `at`, with `power_w` watts. `room` has its allowed lateral
-/// offsets and altitudes.
+/// Returns the slack of the last hop for `target`, m, and the derivatives of the slack. The slack is the hop's
+/// maximum length less its length. These are by the position of the last relay, which is at `at`, with `power_w`
+/// watts. `room` has its allowed lateral offsets and altitudes.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,
@@ -510,7 +511,7 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns how much a relay at `to` is too near the interferer, the weight of its penalty, and a derivative.
+    /// Returns how much a relay at `to` is too near the interferer, a weight, and a derivative.
     ///
     /// A hop of maximum length that ends near the interferer is short. It violates the minimum separation d_min if
     /// |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with noise if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2. The
@@ -537,7 +538,7 @@ impl Site<'_> {
         0.5 * weight * square(near)
     }
 
-    /// Returns the policy of the relay at `to`, and propagates the value function back to the relay at `from`.
+    /// Returns the policy of the relay at `to`, and propagates the value function to the one at `from`.
     ///
     /// `outlook` is the value function. The relay's move is limited to `trust` times its distance from the
     /// interferer. Work: some 400 multiplications and two square roots.
@@ -594,7 +595,7 @@ impl Site<'_> {
         }
     }
 
-    /// Selects the coordinate of the hop's end that is computed from the other two, its dependent coordinate.
+    /// Selects the dependent coordinate of the hop's end, which is computed from the other two.
     ///
     /// Returns it and the derivative of F by it; F is 0 for a hop of maximum length (see `hop`). The coordinate is
     /// the one with the steepest slope of those that are not at an end of their allowed range, `low` to `high`.

@@ -235,7 +235,7 @@ impl Start {
         }
     }
 
-    /// Returns a relay's lateral offset and altitude in this initial chain; its previous relay is at x = `x_m`.
+    /// Returns a relay's lateral offset and altitude in this initial chain. The previous relay is at x = `x_m`.
     /// `distance_m` is the distance from Tx to Rx, and `room` has the allowed ranges.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {

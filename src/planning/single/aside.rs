@@ -91,14 +91,16 @@ pub enum AsideCase {
     Hilltop,
     /// Optimum above Rx, at the lowest altitude: the first hop is the better one even there.
     AboveRx,
-    /// Optimum on an edge of the corridor's box along this coordinate. The optimum without limits is outside the box.
+    /// Optimum on an edge of the box of allowed positions, along this coordinate. The optimum without limits is
+    /// outside the box.
     Edge(EdgeCoordinate),
     /// Optimum above Rx: the interferer is at Tx (X = Y = 0), so the SIR of the first hop is constant.
     Level,
-    /// Optimum on a vertical face of the corridor, with noise: both SIRs' level lines touch there.
+    /// Optimum on a vertical face of the box of allowed positions, with noise. The curves of constant SIR of the two
+    /// hops touch there.
     Wall,
-    /// Optimum inside the corridor at its lowest or highest altitude, with noise. Found by a search without a proof
-    /// of optimality.
+    /// Optimum inside the allowed lateral range, at the lowest or highest altitude, with noise. Found by a search
+    /// without a proof of optimality.
     Inside,
     /// Optimum above Rx: the interferer is at Rx (X = D, Y = 0), so the second hop's SIR is always 0.
     Drowned,
@@ -239,7 +241,8 @@ fn without_limits(
     (place, case)
 }
 
-/// Plane at one altitude, with the scene in m and m^2: D, interferer (X, Y), h^2, G = K / A, noise nu.
+/// Horizontal plane at one altitude with all that determines both SIRs. In m and m^2: D, interferer (X, Y), h^2, G =
+/// K / A of both gains, noise nu.
 struct Plane {
     d: f64,
     x: f64,
@@ -286,7 +289,8 @@ impl Plane {
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// Returns t: the maximum of SIR_1 is at -t (X, Y), opposite the interferer as seen from Tx. `q` is X^2 + Y^2.
+    /// Returns t, which gives the position of the largest SIR of the first hop: -t (X, Y). It is opposite the
+    /// interferer (X, Y) as seen from Tx. `q` is X^2 + Y^2.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {
@@ -309,7 +313,7 @@ impl Plane {
         low
     }
 
-    /// Returns the point with the largest SIR_1 on the circle of radius `s` about Rx, with noise.
+    /// Returns the point on the circle of radius `s` about Rx with the first hop's largest SIR, with noise.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
         let at = |w: f64| (self.d - s * libm::cos(w), s * libm::sin(w));
         // From the point closest to Tx, at 0, to that farthest from the interferer.
@@ -340,7 +344,7 @@ impl Plane {
         self.g / (squared(s) + self.h2)
     }
 
-    /// Returns the point with the largest SIR_1, the first hop's SIR, on the circle of radius `s` about Rx.
+    /// Returns the point on the circle of radius `s` about Rx at which the first hop has its largest SIR.
     fn loudest(&self, s: f64) -> (f64, f64) {
         if self.noise > 0.0 {
             return self.loudest_in_noise(s);

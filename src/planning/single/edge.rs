@@ -125,7 +125,8 @@ impl Edge {
         place
     }
 
-    /// Returns the extrema of SIR_1 and SIR_2 along the edge, m, computed in f64. Missing ones are NaN, or far away.
+    /// Returns the extrema of both hops' SIRs along the edge, as values of the coordinate that varies, m. They are
+    /// computed in f64; missing ones are NaN, or far away.
     fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
         let squared = |x: f64| x * x;
@@ -164,9 +165,10 @@ impl Edge {
         [narrow(sum / p), narrow(-p * b / sum), end, f32::NAN]
     }
 
-    /// Returns the best position on the edge. Work: at most 16 evaluations of both hops, and 42 more for each
-    /// interval on which one SIR rises, the other falls, and they cross: without noise one such interval for x and
-    /// for the altitude, two for y.
+    /// Returns the position on the edge with the best SIR of the worse hop.
+    ///
+    /// Work: at most 16 evaluations of both hops, and 42 more for each interval on which one SIR rises, the other
+    /// falls, and they cross: without noise one such interval for x and for the altitude, two for y.
     pub(super) fn best(&self, hops: &TwoHops<'_>, interferer: &Interferer) -> Found {
         let Band {
             least_m: from,
@@ -185,7 +187,8 @@ impl Edge {
         best
     }
 
-    /// Returns the best position on the edge from above `low` to `high`. Each SIR is monotone between them.
+    /// Returns the best position on the part of the edge from above `low` to `high`, m. Each SIR only rises or only
+    /// falls there.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -231,11 +234,13 @@ pub(super) fn narrow(value: f64) -> f32 {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Maximum number of doublings of t in the search for a negative value of a falling function.
+/// Maximum number of doublings of a coordinate in the search for a point at which a condition fails.
 const DOUBLINGS: u8 = 100;
 
-/// Returns the extrema of SIR_1 along an edge with noise, m; missing ones are NaN. `p`, `a` and `b` are those of the
-/// module's table, and `noise` is nu.
+/// Returns the extrema of the first hop's SIR along an edge, with noise, m; missing ones are NaN.
+///
+/// The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t - `p`)^2 + `a`, where t varies along the edge.
+/// `noise` is nu.
 fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     if !(libm::fabs(p) > 0.0) {
         let squared = libm::sqrt((b - a) / noise) - a;
@@ -255,7 +260,7 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     slope.turns().map(|t| libm::copysign(1.0, p) * t)
 }
 
-/// Function phi(t) for P > 0, which for t > 0 has the sign of the slope of SIR_1 along an edge.
+/// Function phi(t) whose sign for t > 0 is that of the slope of the first hop's SIR along an edge. `p` is above 0.
 struct Slope {
     p: f64,
     a: f64,
@@ -327,19 +332,19 @@ fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
     at
 }
 
-/// Number of lines along x that the search of the corridor evaluates on either side of y = 0.
+/// Number of lines along x on either side of y = 0 in the search for the best position at one altitude.
 const LINES: u8 = 24;
 
-/// Number of the best lines along x that the search of the corridor refines.
+/// Number of the best lines along x that the search for the best position at one altitude refines.
 const FOLLOWED: usize = 3;
 
-/// Number of golden-section steps in y about each refined line.
+/// Number of golden-section steps in y about each refined line of the search at one altitude.
 const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
 
-/// Returns the best position at `altitude_m` with x in `along` and y in `across`. Work: at most 243 lines of some 90
-/// evaluations of both hops.
+/// Returns the best position at `altitude_m` with x in `along` and y in `across`. It is searched on lines along x.
+/// Work: at most 243 lines of some 90 evaluations of both hops.
 pub(super) fn best_in_corridor(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -411,8 +416,9 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     }
 }
 
-/// Returns the position in the vertical plane y = `y_m` at which the level lines of both SIRs touch. `None` if it is
-/// outside of [0, D] or `band`, and without noise. Work: 40 bisection steps.
+/// Returns the position in the plane y = `y_m` at which the curves of constant SIR touch. There is one such curve
+/// through it for each hop. `None` if it is outside of [0, D] or of the altitudes `band`, and without noise. Work: 40
+/// bisection steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -452,7 +458,8 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane y = y0 with the scene: D, interferer's X, (y0 - Y)^2, y0^2, noise nu, and G = K / A. In m and m^2.
+/// Vertical plane y = y0 with all that determines both SIRs there. In m and m^2: D, interferer's X, (y0 - Y)^2, y0^2,
+/// noise nu, and G = K / A of both gains.
 struct Face {
     d: f64,
     x: f64,
@@ -463,7 +470,8 @@ struct Face {
 }
 
 impl Face {
-    /// Returns x - D of the maximum of SIR_1 on the circle of radius `r` about Rx in this plane, m.
+    /// Returns the best position for the first hop on a circle about Rx in this plane: x - D, m. `r` is the radius of
+    /// the circle, m.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);
@@ -472,8 +480,8 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// Returns the maximum of SIR_1 / A on the circle of radius `r` about Rx in this plane. A is the first hop's
-    /// gain.
+    /// Returns the first hop's largest SIR, over its gain, on a circle about Rx in this plane. `r` is the radius of
+    /// the circle, m.
     fn first(&self, r: f64) -> f64 {
         let (z, gap) = (self.best(r), self.d - self.x);
         let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;

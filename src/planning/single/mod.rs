@@ -71,8 +71,8 @@ impl Two<'_> {
         }
     }
 
-    /// Returns the best position at the crossing in [`low`, `high`], where SIR_1 falls below SIR_2. It is the better
-    /// of the two neighbouring f32 values of x.
+    /// Returns the position with x in [`low`, `high`] at which SIR_1 falls below SIR_2. These are the SIRs of the
+    /// first and the second hop. It is the better of the two neighbouring f32 values of x.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

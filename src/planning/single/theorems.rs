@@ -84,27 +84,31 @@ use crate::sir::{Extremum, first_hop_turn, square};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum PlaceCase {
-    /// Optimum at x = 0: the first hop is the worse one even right above Tx, p_t / p_u < C_1.
+    /// Optimum at x = 0: the first hop is the worse one even right above Tx. The power ratio p_t / p_u is below C_1.
     AboveTx = 1,
-    /// Optimum at the only x where SIR_1 = SIR_2: SIR_1 falls all the way to Rx, and crosses SIR_2 once.
+    /// Optimum at the only x where both hops have the same SIR. The first hop's SIR falls all the way to Rx, and
+    /// crosses the second's once.
     Crossing = 2,
-    /// Optimum at x = D: SIR_1 falls all the way to Rx, and the first hop is the better one even there.
+    /// Optimum at x = D: the first hop's SIR falls all the way to Rx, and is the higher one even there.
     AboveRx = 3,
-    /// Optimum where SIR_1 = SIR_2 before the minimum of SIR_1, or at x = D if SIR_1 has recovered by then.
+    /// Optimum where both hops have the same SIR, before the minimum of the first hop's. Or at x = D, if the first
+    /// hop's SIR has recovered by then.
     BeforeValley = 4,
-    /// Optimum at x = D: the first hop is the better one even at the minimum of SIR_1, before Rx.
+    /// Optimum at x = D: the first hop's SIR has a minimum before Rx, and is the higher one even there.
     OverValley = 5,
-    /// Optimum at the maximum of SIR_1, for X < 0: the first hop is the worse one even there.
+    /// Optimum at the maximum of the first hop's SIR, which is the lower one even there. The interferer is behind Tx.
     Hilltop = 6,
-    /// Optimum where SIR_1 = SIR_2 beyond the maximum of SIR_1, for X < 0 (interferer behind Tx).
+    /// Optimum where both hops have the same SIR, beyond the maximum of the first hop's. The interferer is behind Tx.
     BeyondHill = 7,
-    /// Optimum at x = D, for X < 0. SIR_1 rises all the way to Rx, or the first hop is the better one even there.
+    /// Optimum at x = D, with the interferer behind Tx. The first hop's SIR rises all the way to Rx, or is the higher
+    /// one even there.
     HillAboveRx = 8,
-    /// Optimum at x = D: the interferer is at Tx (X = Y = 0), so SIR_1 is constant.
+    /// Optimum at x = D: the interferer is at Tx, so the first hop's SIR is the same everywhere.
     Level = 9,
-    /// Optimum at x = D: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    /// Optimum at x = D: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 10,
-    /// Optimum at the maximum of SIR_1 after its minimum, with noise, or where the SIRs cross after it.
+    /// Optimum at the maximum of the first hop's SIR after its minimum, or at the SIRs' crossing after it. Only with
+    /// noise.
     SecondHill = 11,
 }
 
@@ -166,8 +170,10 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
     })
 }
 
-/// Returns the best position at or beyond the maximum that SIR_1 has after its minimum, with noise. `None` if there
-/// is no such maximum before `end_m`.
+/// Returns the best x at or beyond the second rise of the first hop's SIR. That rise exists only with noise.
+///
+/// There the SIR falls to a minimum, rises to a maximum, and falls again. `None` if there is no such maximum at x
+/// below `end_m`.
 fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;
@@ -190,13 +196,14 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum AltitudeCase {
-    /// Optimum at the lowest altitude: both SIRs fall with the altitude (x <= Psi^h, or X <= 0).
+    /// Optimum at the lowest altitude: both hops' SIRs fall with the altitude (x <= Psi^h, or X <= 0).
     BothFall = 1,
-    /// Optimum at the altitude in the band at which SIR_1, which rises with the altitude, equals SIR_2.
+    /// Optimum at the altitude where the first hop's SIR, rising with altitude, equals the second's.
     Crossing = 2,
-    /// Optimum at an end of the band: SIR_1 rises with the altitude, but equals SIR_2 nowhere in the band.
+    /// Optimum at the lowest altitude, or at the highest one up to which the first hop's SIR rises. The two hops'
+    /// SIRs are equal nowhere between.
     End = 3,
-    /// Optimum at the lowest altitude: the interferer is at Rx (X = D, Y = 0), so SIR_2 is 0 everywhere.
+    /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,
 }
 
@@ -250,7 +257,8 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if SIR_1 rises with the altitude at `x_m`, and the end of the rise in `band`, m.
+/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and the rise's end, m. That altitude is
+/// limited to the allowed range `band`.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
@@ -263,18 +271,19 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Edge of the box (x by altitude) with the optimum, and its case there; or the inside of the box. On a corner it is
-/// the first of the edges.
+/// Location of the optimum in the rectangle of allowed x and altitudes. It is an edge with its case, or the inside.
+/// On a corner it is the first of the edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {
-    /// Optimum at the lowest altitude, where Theorem 1 has this case.
+    /// Optimum at the lowest altitude, with this case of the optimal x (Theorem 1).
     Lowest(PlaceCase),
-    /// Optimum at the highest altitude, where Theorem 1 has this case.
+    /// Optimum at the highest altitude, with this case of the optimal x (Theorem 1).
     Highest(PlaceCase),
-    /// Optimum above Rx, where Theorem 2 has this case.
+    /// Optimum above Rx, with this case of the optimal altitude (Theorem 2).
     AboveRx(AltitudeCase),
-    /// Optimum inside the box, where the level lines of both hops' SIRs touch; only with noise.
+    /// Optimum inside the rectangle of x and altitude; only with noise. The curves of constant SIR of both hops touch
+    /// there.
     Touching,
 }
 
@@ -309,7 +318,8 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
     Some(best)
 }
 
-/// Ratios p_t / p_u of the powers of Tx and relay, linear, at which the case of Corollary 1 changes.
+/// Limits of the power ratio p_t / p_u, linear, at which the case of the optimal x changes. p_t and p_u are the
+/// powers of Tx and relay. The cases are those of the paper's Corollary 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
@@ -317,8 +327,9 @@ pub struct Guide {
     pub c1: f32,
     /// Ratio C_2: above it the first hop is the better one even right above Rx.
     pub c2: f32,
-    /// Ratio C_3: above it the first hop is the better one even at the minimum of SIR_1. The minimum is between Tx
-    /// and Rx or beyond. `None` for X <= 0; with noise, the minimum before the maximum.
+    /// Ratio C_3: above it the first hop is the better one even at the minimum of its SIR.
+    ///
+    /// The minimum is between Tx and Rx or beyond. `None` for X <= 0; with noise, the minimum before the maximum.
     pub c3: Option<f32>,
 }
 
@@ -347,11 +358,11 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
     })
 }
 
-/// Returns the altitudes at which SIR_1 = SIR_2, m, lower first: the paper's h^- and h^+. The relay has `power_w` watts and is at
-/// `x_m`.
+/// Returns the altitudes at which both hops have the same SIR, m, lower first: the paper's h^- and h^+. The relay has
+/// `power_w` watts and is at `x_m`.
 ///
-/// Any `x_m`, m, and `power_w`, W. Altitudes are above 0, and not limited to the mission's band. `None` for each that does not
-/// exist, and for both in a field. Constant work.
+/// Any `x_m`, m, and `power_w`, W. Altitudes are above 0, and not limited to the mission's range. `None` for each
+/// that does not exist, and for both in a field. Constant work.
 pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
     let Some(interferer) = mission.interferer() else {
         return [None; 2];

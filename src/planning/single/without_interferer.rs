@@ -69,8 +69,8 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
     }
 }
 
-/// Returns the position in [`low`, `high`] with the best worst-hop SIR. E(SIR_1), the mean SIR of the first hop, is
-/// monotone there.
+/// Returns the best position with x in [`low`, `high`], m. The first hop's mean SIR only rises or only falls there.
+/// Best is the largest SIR of the worse hop.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {
@@ -112,8 +112,9 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     Some(best)
 }
 
-/// Returns both extrema of E(SIR_1) along x, ascending, m. Upsilon is linear in [`low`, `high`]: for a + b x they are
-/// the roots of b x^2 + 2 a x - b h^2 = 0. `high` twice if Upsilon is constant.
+/// Returns both extrema of the first hop's mean SIR along x, ascending, m. Upsilon = E[1/I] is linear in [`low`,
+/// `high`]: for Upsilon = a + b x they are the roots of b x^2 + 2 a x - b h^2 = 0. `high` twice if Upsilon is
+/// constant.
 fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
     let b = (at_high - at_low) / (high - low);
@@ -132,8 +133,8 @@ fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] 
 /// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without
 /// a field.
 ///
-/// It only evaluates positions where E(SIR_2) is one of its targets, so it may miss the optimum of a field that changes much
-/// between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// It only evaluates positions where the second hop's mean SIR is one of its targets, so it may miss the optimum of a
+/// field that changes much between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two { mission, profile };

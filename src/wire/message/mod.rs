@@ -23,17 +23,20 @@ use self::parts::{Word, read, tag, write};
 use super::upload::{UPLOAD, Upload};
 use crate::guard::Fence;
 
-/// Maximum length of a sweep's body, bytes: sixteen targets with a measured field or a lateral offset.
+/// Maximum length of a sweep message's body, bytes. It has sixteen target SIRs with a measured field or a lateral
+/// offset.
 const SWEEP: usize = 88;
 
-/// Maximum length of a body except for an offer, bytes: measurements, or a sweep without `sensing`.
+/// Maximum length of a body except for a mission offer, bytes. It is that of measurements, or of a sweep without
+/// `sensing`.
 const LONG: usize = if cfg!(feature = "sensing") {
     round::HEARD
 } else {
     SWEEP
 };
 
-/// Maximum length of a body, bytes: an offer, measurements, or without those features a sweep.
+/// Maximum length of a body, bytes: that of a mission offer. Without that feature it is that of measurements or a
+/// sweep.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {
     offer::LENGTH
@@ -64,16 +67,15 @@ pub enum Message {
         /// Number of the answered request, 0 for none.
         reply: u16,
     },
-    /// Message to the next relay of a pass: profiles (altitude and power) of the relays up to the sender.
+    /// Message to the next relay of a pass: profiles (altitude and power) of all relays so far.
     Gather(Roster),
     /// Reply to a gathering: profiles (altitude and power) of the whole chain.
     Gathered(Roster),
-    /// Message to the next relay of a pass: interference estimate, and measurements up to the sender. The
-    /// measurements are those of the relays from the leader to the sender.
+    /// Message to the next relay of a pass: interference estimate, and all relays' measurements so far.
     Sense(Heard),
     /// Reply to a sensing pass: measurements of the sender and of all later relays of the pass.
     Sensed(Heard),
-    /// Message to the next relay of a pass: token of Algorithm 2, whose receiver may move.
+    /// Message to the next relay of a pass of Algorithm 2: token, whose receiver may move.
     Token(Token),
     /// Reply to a token: position of the sender and SIRs after the pass.
     Moved(Moved),

@@ -86,8 +86,7 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum slack (spare length) or reach in a message, m. A position is at most 1e6, and the last hop is limited to
-/// 1e9.
+/// Maximum length or x in a message, m. A position is at most 1e6, and the length of the last hop is limited to 1e9.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, Serialize, Deserialize)]

@@ -18,14 +18,14 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep message: the target SIRs of a pass along the chain, and how far each is met.
+/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, wrapping.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Target SIRs that this sweep tries.
+    /// Target SIRs that this pass along the chain tries.
     pub ladder: Ladder,
     /// Lateral offset, altitude and power of the sender.
     pub relay: Station,
@@ -38,11 +38,12 @@ pub struct Sweep {
     pub reaches: PerTarget,
 }
 
-/// Fields at the start of all kinds of sweep messages; the reaches come last.
+/// Fields at the start of all kinds of sweep messages. The sender's farthest x for each target follows at the end.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower middle target SIR of the ladder, or its only one; negative for a plain pass.
+    /// Lower middle target SIR, or the only one. It is negated for a plain pass, in which every relay takes the
+    /// farthest x that meets the target.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -69,8 +70,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length. Upsilon or the lateral offset comes between head and
-    /// reaches.
+    /// Encodes the sweep into `buffer`; returns its length. The measured Upsilon or the lateral offset is encoded
+    /// between the head and the list of farthest x.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -98,7 +99,7 @@ impl Sweep {
     }
 }
 
-/// Returns the decoded sweep if all values are in range. With a `y_m` it is one of the joint method.
+/// Returns the decoded sweep; `None` if a value is out of range. A sweep with a `y_m` belongs to the joint method.
 fn checked(
     head: SweepHead,
     y_m: Option<f32>,
@@ -128,16 +129,17 @@ fn checked(
     })
 }
 
-/// Reply to a sweep: the result for each target, and the destination's required position.
+/// Reply to a sweep message: result for each target, and the position that the destination must take.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Answer {
-    /// Number of the sweep that this message answers.
+    /// Number of the pass along the chain, as in the sweep message that is answered.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Slacks (spare lengths) of the sweep's targets, and the committed target.
+    /// Slack (spare length of the chain) of each target, and the committed target, if any.
     pub verdict: Verdict,
-    /// Required position of the destination if a target is committed, m along x; `None` for its own reach.
+    /// Position that the destination must take if a target is committed, m along x. `None` for the farthest x that it
+    /// has reported.
     pub required_x_m: Option<f32>,
     /// True if the sender, or a later relay of the pass, has a profile other than the mission's common one.
     pub own: bool,
@@ -353,7 +355,7 @@ impl StepBody {
         }
     }
 
-    /// Returns the decoded action; `None` if it is out of range or not the only encoding.
+    /// Returns the decoded action; `None` if a value is out of range or the encoding is not the only one.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,

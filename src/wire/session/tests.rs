@@ -119,7 +119,7 @@ fn three_handshakes_make_a_link_known_and_four_where_they_cross() {
     }
 }
 
-/// Loses handshakes: the node without a proof requests again, and receives a reply.
+/// Checks that a lost handshake does no lasting harm. The node without a proof requests again, and receives a reply.
 #[test]
 fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
     for lost in 0..4 {
@@ -174,7 +174,7 @@ fn a_body_of_a_handshake_says_who_is_known() {
     );
 }
 
-/// Fills the table: pinned entries and the last used one stay, and earlier recordings are rejected.
+/// Checks that a full table keeps pinned entries and the last used one. Recorded frames are rejected.
 #[test]
 fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     let mut own = session();
@@ -218,7 +218,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
     assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
 }
 
-/// Replays recorded handshakes of many nodes, which replace only entries of unproven nodes.
+/// Checks that replayed handshakes of many nodes replace only entries of unproven nodes.
 #[test]
 fn recorded_handshakes_do_not_drive_out_who_is_known() {
     let mut handshakes = Vec::new();
@@ -245,8 +245,8 @@ fn recorded_handshakes_do_not_drive_out_who_is_known() {
     }
 }
 
-/// Starts a session with `greet` after one node has forgotten the other. A node that restarted without a handshake,
-/// or forgot this one, has no session in either direction.
+/// Checks that `greet` starts a session again after one node has forgotten the other. Before that, the restarted node
+/// cannot verify any frame.
 #[test]
 fn a_greeting_mends_what_only_one_end_knows() {
     let mut own = session();
@@ -295,7 +295,7 @@ fn after_the_last_nonce_nobody_new_is_met() {
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
 
-/// Repeats handshakes of an older or reused epoch, which are reported once. A replayed recording is not reported.
+/// Checks that handshakes of an older or reused epoch are reported once. A replayed recording is not reported.
 #[test]
 fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not() {
     for epoch in [1, 7] {
@@ -333,7 +333,7 @@ fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
     }
 }
 
-/// Receives frames under the relay's own number. Claim number, epoch and key are its own or others.
+/// Checks the sender of frames under the relay's own number. Claim numbers, epochs and keys are its own or others.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -365,7 +365,7 @@ fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     }
 }
 
-/// Receives the echo of the relay's own frames, a handshake and a message.
+/// Checks that the relay recognises the echo of its own frames, a handshake and a message.
 #[test]
 fn frames_of_its_own_are_recognised() {
     let mut counters = [0; 2];
@@ -377,7 +377,8 @@ fn frames_of_its_own_are_recognised() {
     }
 }
 
-/// Connects two nodes 2 of one epoch to node 1. Node 1 accepts the larger claim and shows that to the smaller one.
+/// Checks that of two nodes with one number, the one with the smaller claim learns of the other. Node 1 accepts the
+/// larger claim and shows it to the node with the smaller one.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     const FAR: u32 = 1 << 20;
@@ -421,8 +422,8 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
     }
 }
 
-/// Silences the node 2 with the larger claim. After the timeout the smaller claim is accepted, and recordings of the
-/// larger one are rejected until that node itself is received.
+/// Checks that the smaller claim is accepted once the node with the larger one is silent. Recordings of the larger
+/// one are rejected until that node itself is received.
 #[test]
 fn of_two_nodes_of_one_epoch_the_smaller_claim_is_believed_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

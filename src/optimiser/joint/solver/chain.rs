@@ -80,15 +80,15 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns relay `index`, limited to the lateral offsets and altitudes `room`, with its hop from a sender at
-    /// `from`.
+    /// Returns relay `index` with its hop from a sender at `from`. `room` has the relay's allowed lateral offsets and
+    /// altitudes.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the last hop for `target`, its maximum length less its length, m, and the derivatives.
-    /// The last relay is at `at`; the derivatives are by its position.
+    /// Returns the slack of the last hop for `target`, m, and the derivatives of the slack. The slack is the hop's
+    /// maximum length less its length. The last relay is at `at`; the derivatives are by its position.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         site::tail(self.mission, power_w, room, target, at)
@@ -145,8 +145,9 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 pub(super) struct Mark {
     /// x of the relay before the segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the slack (spare length at Rx) by the position of the segment's last relay, m/m.
+    /// First derivatives of the slack (spare length at Rx) by the segment's last relay's position, m/m.
     pub(super) slope: Triple,
+    /// Second derivatives of the slack (spare length at Rx) by that position, 1/m: xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 

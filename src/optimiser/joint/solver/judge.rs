@@ -177,8 +177,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target of a chain, with hops computed as in the relays'
-    /// messages.
+    /// Returns the work that searches for the highest target of a chain by the rules of the messages. Hops are
+    /// computed as the relays do from their messages.
     ///
     /// The chain results from an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in
     /// ln(SIR). Relays may stay short of their farthest position.
@@ -259,9 +259,8 @@ pub(super) const GAIN: f32 = 2e-5;
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Returns the current trial move of the polish: the relay, the kind of move, and the number of halvings. Kinds 0
-    /// to 3 are down, up, left and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two
-    /// back.
+    /// Returns the current trial move of the polish: relay, kind of move, and number of halvings. Kinds 0 to 3 are
+    /// down, up, left and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -391,7 +390,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`: stored ones, or those of a new initial chain.
+    /// Returns the lateral offset and altitude of relay `index`, stored or of a new initial chain.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -47,7 +47,7 @@ struct ForwardPass {
 enum Work {
     /// Begin the next initial chain.
     Begin,
-    /// Search for the highest target SIR that the chain meets, with all lateral offsets and altitudes unchanged.
+    /// Search for the highest target SIR that the chain meets without moves of its relays.
     Seek(Seek, Purpose),
     /// Compute the chain for one target SIR, in ln(SIR), and store it.
     Settle(f32, Purpose),
@@ -73,8 +73,8 @@ enum Purpose {
     Tighten,
     /// The search finds the highest target of the chain after an ascent, with hops as in the ascent.
     Judge,
-    /// The search finds the highest target of the chain after an ascent, with hops as in the relays' messages. Relays
-    /// may then stay short of their farthest position.
+    /// The search finds the highest target after an ascent, with hops as in the relays' messages. Relays may then
+    /// stay short of their farthest position.
     Last,
     /// The search checks, with hops as in the relays' messages, that the chain meets its upper bound.
     Probe,
@@ -105,13 +105,15 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: [Cell; RELAYS],
+    /// Target, in ln(SIR), from which the highest target of the best chain was searched. `None` if a repetition of
+    /// its ascent would give another chain, so that the stored one cannot be used.
     best_judged: Option<f32>,
     /// Target from which the current chain's highest target is searched, in ln(SIR).
     judged_at: Option<f32>,
     /// True while the current ascent runs as it would without a best chain to compare with. A repetition of it then
     /// gives the same chain.
     is_whole: bool,
-    /// True in the last phase: the target of the best chain is searched more finely, and the chain is polished.
+    /// True in the last phase, which searches the best target more finely and polishes the chain.
     again: bool,
     ascent: Ascent,
     work: Work,
@@ -122,7 +124,9 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     walled: bool,
     /// Number of the current trial move in the final polish of the chain.
     moving: u16,
+    /// Number of trial moves that the final polish has accepted.
     moved: u8,
+    /// Lateral offset and altitude of the relay before the current trial move.
     kept: Cell,
     /// Segment of the chain whose policies (relays' moves) are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
@@ -172,7 +176,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Processes one portion of the work: ten relays of a pass that moves them, or twenty of any other pass.
+    /// Processes one portion of the work: ten relays of a pass that moves them, or else twenty.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.

@@ -150,8 +150,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share` of their computed moves; stores them if `kept`. `None`
-    /// if a hop cannot meet `target`.
+    /// Moves the relays of `segment` by the fraction `share` of their computed moves. The pass stores them if `kept`.
+    /// `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -189,7 +189,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 /// Number of relays per call in a pass that changes no relay's lateral offset or altitude.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty for relays too near the interferer, in units of D, at which a chain counts as feasible.
+/// Maximum penalty at which a chain counts as feasible, in units of D. Relays too near the interferer cause the
+/// penalty.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -331,7 +332,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         (end_m + step).min(mission.config().distance_m)
     }
 
-    /// Returns the x, m, that the relay before `segment` must take if the segment's last relay is at x = `place_m`.
+    /// Returns the x, m, that the relay before `segment` must take to meet the target. The segment's last relay is at
+    /// x = `place_m`.
     ///
     /// `None` if a relay of the segment cannot take the position that the next one requires.
     pub(super) fn held_back_x_m(
