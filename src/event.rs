@@ -14,8 +14,8 @@ pub enum Event {
     SetpointChanged,
     /// The chain has agreed on positions. Where the interference is known, it has agreed on a target SIR (`Relay::target`), too.
     Converged,
-    /// Every allowed target SIR is infeasible (raised at the leader: relay 1; in a field relay N). All relays keep their positions.
-    /// `Relay::restart`, a new view or a new mission makes the leader try again.
+    /// Every allowed target SIR is infeasible. Raised at the leader: relay 1, or relay N in an interference field.
+    /// All relays keep their positions. `Relay::restart`, a new view or a new mission makes the leader try again.
     Infeasible,
     /// The neighbour at `side` has been silent for `Settings::dead_after` (15 s by default). With two links the relay
     /// keeps sending heartbeat requests to it; on a shared channel it searches for another node at that side. An

@@ -50,7 +50,7 @@ pub enum Method {
     /// Best x at fixed lateral offsets and altitudes: Algorithm 1, in a field of interference Algorithm 4.
     #[default]
     Align,
-    /// Joint optimum of x, y and altitude within the mission's bands. Not in a field of interference; up to 100
+    /// Joint optimum of x, y and altitude within the mission's ranges. Not in a field of interference; up to 100
     /// relays.
     Joint,
     /// Algorithm 1, followed by Algorithm 2, which moves one relay after the other. Not in a field of interference.
@@ -81,7 +81,7 @@ impl Default for Adjust {
     }
 }
 
-/// Settings of a relay that measures the interference, in a field of interference.
+/// Settings of a relay that measures the interference, for a mission with an interference field.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measure {
@@ -111,10 +111,10 @@ pub struct Settings {
     pub profile: Option<Profile>,
     /// True to keep this relay's altitude while other altitudes are optimised.
     pub hold_altitude: bool,
-    /// Method that the leader (relay 1; in a field relay N) runs; the other relays follow.
+    /// Method that the leader (relay 1; in an interference field relay N) runs; the other relays follow.
     pub method: Method,
-    /// Measurement of a field of interference by this relay, used in place of the mission's field. `None` outside of
-    /// a field.
+    /// Measurement of the interference by this relay, used in place of the mission's interference field. `None` if
+    /// the mission has no such field.
     pub measure: Option<Measure>,
     /// Estimation of an unknown interferer from measurements; `None` in a field of interference. Set it on all relays
     /// of a chain, or on none.
@@ -261,8 +261,8 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` cannot be used. It chooses altitudes in a field, is the joint method for more than 100 relays, or needs a feature
-    /// that the crate was built without.
+    /// `method` cannot be used. It chooses altitudes in an interference field, is the joint method for more than 100
+    /// relays, or needs a feature that the crate was built without.
     Method,
     /// The mission's `reverse` is above 0, but `method` is not Align, or `listen` is set.
     Reverse,
@@ -271,8 +271,8 @@ pub enum SetupError {
     /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000. Or the crate was built
     /// without the feature `field`.
     Measure,
-    /// `listen.every` or `listen.half_life` is zero, or `listen.relative_error` not within 1e-3 to 1. Or the mission is in a field,
-    /// or the crate was built without the feature `sensing`.
+    /// `listen.every` or `listen.half_life` is zero, or `listen.relative_error` not within 1e-3 to 1. Or the mission
+    /// has an interference field, or the crate was built without the feature `sensing`.
     Listen,
     /// `hop_time` is zero.
     HopTime,

@@ -182,7 +182,7 @@ impl Estimator {
 struct Fit {
     /// Mean m of the samples I / `I_max`.
     m: f32,
-    /// Difference 1 - m, computed without cancellation.
+    /// Difference 1 - m, with m the mean of the samples, computed without cancellation.
     rest: f32,
     /// Standard deviation of the samples I / `I_max`.
     s: f32,

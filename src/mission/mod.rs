@@ -220,8 +220,8 @@ pub enum Heading {
     /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position follows from
     /// that of the sender before it.
     TowardRx,
-    /// Order from Rx to Tx, relay N first: used in a field (Algorithm 4). Each relay's position follows from that of
-    /// its receiver, where the interference is known.
+    /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each relay's position follows
+    /// from that of its receiver, where the interference is known.
     TowardTx,
 }
 
@@ -323,8 +323,8 @@ pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
     /// Gain of a drone-to-drone hop per watt of its sender, 1/W, from which the hop's SIR is computed. It is eta /
-    /// (`mu_los` `p_MSI`), with path-loss factors and the interferer's power; in a field `Upsilon_max` / `mu_los`,
-    /// m^2/W.
+    /// (`mu_los` `p_MSI`), with path-loss factors and the interferer's power; in an interference field `Upsilon_max`
+    /// / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
     /// Gain of the last hop per watt of its sender, m^2/W. The SIR at Rx is this times the power over the squared
     /// distance.
@@ -333,7 +333,7 @@ pub struct Mission {
     /// field it is Upsilon(D) / eta. With noise it refers to the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
     /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. 0 without noise and
-    /// in a field.
+    /// in an interference field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -559,8 +559,8 @@ impl Mission {
         &self.config.interference
     }
 
-    /// Returns the interferer; `None` in a field. For an unknown interferer it returns a substitute far away, with
-    /// equal interference everywhere.
+    /// Returns the interferer; `None` in an interference field. For an unknown interferer it returns a substitute far
+    /// away, with equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -587,7 +587,7 @@ impl Mission {
 
     /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2.
     ///
-    /// 0 without noise and in a field, whose Upsilon includes the noise.
+    /// 0 without noise and in an interference field, whose Upsilon includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
         if cfg!(feature = "noise") {
             self.noise_at_a_metre
@@ -607,7 +607,7 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which positions are computed: toward Rx, or toward Tx in a field.
+    /// Returns the order in which positions are computed: toward Rx, or toward Tx in an interference field.
     pub const fn heading(&self) -> Heading {
         match self.field() {
             None => Heading::TowardRx,
@@ -615,7 +615,7 @@ impl Mission {
         }
     }
 
-    /// Relay that computes its position first and starts the passes: 1, or N in a field.
+    /// Relay that computes its position first and starts the passes: 1, or N in an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -658,15 +658,15 @@ impl Mission {
 
 impl Mission {
     /// Gain A of the first hop: its SIR is A times [`crate::sir::quiet`] over the squared length. `quiet` is the
-    /// inverse interference. A is the power of Tx over that of the interferer, `p_t` / `p_MSI`; in a field `p_t`
-    /// `Upsilon_max` / eta.
+    /// inverse interference. A is the power of Tx over that of the interferer, `p_t` / `p_MSI`; in an interference
+    /// field `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
     /// Gain of a hop from a relay of `power_w` watts to another drone. It is (`p_u` / `p_MSI`)(eta / `mu_los`), with
-    /// the relay's power and the interferer's; in a field `p_u` `Upsilon_max` / `mu_los`.
+    /// the relay's power and the interferer's; in an interference field `p_u` `Upsilon_max` / `mu_los`.
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
@@ -719,14 +719,15 @@ impl Mission {
     /// Returns the farthest x of relay `index`, m, that leaves the relays after it their separation. After it means
     /// later in the order of computation.
     ///
-    /// Farthest means toward Rx, or toward Tx in a field. `across_squared` is the maximum squared distance across the
-    /// line (in y and altitude) between two neighbours among those relays, m^2; it reduces the steps in x.
+    /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the maximum squared
+    /// distance across the line (in y and altitude) between two neighbours among those relays, m^2; it reduces the
+    /// steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
     /// Returns the farthest x of relay `index`, m, if the relays computed after it need no separation. Farthest means
-    /// toward Rx, or toward Tx in a field.
+    /// toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }

@@ -35,13 +35,13 @@ const POINTS_AT_ONCE: usize = 128;
 pub struct Behind {
     /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
-    /// Upsilon = E[1/I] measured at the previous relay, 1/W; `None` to use the agreed field. Only passes toward Tx
-    /// use it.
+    /// Upsilon = E[1/I] measured at the previous relay, 1/W. `None` to use the mission's interference field. Only
+    /// passes toward Tx use it.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a previous relay above the line (y = 0) that uses the agreed field.
+    /// Returns a previous relay above the line (y = 0) that uses the mission's interference field.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -62,7 +62,7 @@ pub struct Link<'a> {
     pub index: u16,
     /// Lateral offset, altitude and power of the relay.
     pub own: Station,
-    /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the agreed field.
+    /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the mission's interference field.
     pub measured_per_w: Option<f32>,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
     /// of it for the sake of the next one.
@@ -72,12 +72,13 @@ pub struct Link<'a> {
     pub end_m: Option<f32>,
 }
 
-/// Returns the x at which a pass starts, for every target: that of Tx, or of Rx in a field, m.
+/// Returns the x at which a pass starts, once for every target, m. It is the x of Tx, or of Rx in an interference
+/// field.
 pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the x at which a pass starts: that of Tx, or of Rx in a field, m.
+/// Returns the x at which a pass starts: that of Tx, or of Rx in an interference field, m.
 pub(crate) fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -125,7 +126,8 @@ impl Link<'_> {
     }
 
     /// Continues [`extend`](Self::extend) by as many reaches as one call may compute. It returns true once all are
-    /// computed. Bounded by 16 reaches (farthest x for a target); in a field by 128 of its points, or by one target.
+    /// computed. Bounded by 16 reaches (farthest x for a target); in an interference field by 128 of its points, or
+    /// by one target.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -289,8 +291,8 @@ impl Link<'_> {
     /// Returns the x that the previous relay must take to meet `target` if this relay is at x = `place`.
     ///
     /// `from_m` is the farthest x of the previous relay. `None` if it has no such position: the search takes its
-    /// possible positions for an interval, which may have holes. Bounded by two reaches, in a field by three for each
-    /// of its points.
+    /// possible positions for an interval, which may have holes. Bounded by two reaches, in an interference field by
+    /// three for each of its points.
     pub fn required_position(
         &self,
         target: f32,

@@ -68,8 +68,8 @@ impl Planner {
 
     /// Computes at most `hops` hops of a pass along the chain; `Ok(Some(..))` once the chain is solved.
     ///
-    /// A hop takes at most 16 farthest positions, one for each target, in a field 128 of its points. `profile_of`
-    /// returns the profile of relay 1..=N, and must always return the same.
+    /// A hop takes at most 16 farthest positions, one for each target, in an interference field 128 of its points.
+    /// `profile_of` returns the profile of relay 1..=N, and must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left to try.

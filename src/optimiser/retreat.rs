@@ -30,7 +30,7 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Hop toward Rx in a field whose receiver's position is known, prepared for many targets.
+/// Hop toward Rx in an interference field, prepared for many targets. The position of its receiver is known.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat {
     /// Gain A of the hop, m^2, for the field's largest Upsilon = E[1/I]. For the hop to Rx it is that with the
@@ -146,7 +146,7 @@ pub struct Step {
 pub enum HopInterference<'a> {
     /// Same at every position: the receiver's measured Upsilon = E[1/I] over the field's largest.
     Evenly(f32),
-    /// Interference field that the relays agreed on, with receiver noise.
+    /// Interference field of the mission, with receiver noise.
     In(InNoise<'a>),
 }
 

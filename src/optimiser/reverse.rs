@@ -210,8 +210,9 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx for `target`. `None` if
-    /// there is none. At `x_m` itself the last relay misses the target.
+    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx well enough. The SIR has
+    /// to meet `target` for the backward direction. `None` if there is no such x. At `x_m` itself the last relay
+    /// misses the target.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;

@@ -116,7 +116,7 @@ pub struct Hop {
     from_tx: bool,
     /// Maximum x of the receiver, m.
     end_m: f32,
-    /// Maximum x of the receiver and of its sender, m, that leaves the relays after each their separation.
+    /// Maximum x of the receiver, and that of its sender, m. Each leaves the relays after it their separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,
@@ -153,7 +153,8 @@ impl Hop {
     }
 
     /// Creates the hop from `sender` to a receiver at an x up to `end_m`. `at` is the receiver's lateral offset and
-    /// altitude. It has no minimum length. `noise` is the noise over the interferer's power received at 1 m, 1/m^2.
+    /// altitude. The hop has no minimum length. `noise` is the noise over the interferer's power received at 1 m,
+    /// 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -523,9 +524,8 @@ pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
 
-/// Maximum number of Newton steps in the search for the maximum hop length with noise. It is for a length at which
-/// the margin g is concave. g is 0 or above where the target is met. Four to eight steps are usual; near a double
-/// root each halves the error.
+/// Maximum number of Newton steps in the search for the maximum hop length with noise. The steps are taken where g,
+/// the margin of the hop, is concave. Four to eight are usual; near a double root each halves the error.
 const STEPS: u8 = 32;
 
 /// Maximum number of steps of a search by bisection, each of which at least halves the interval.

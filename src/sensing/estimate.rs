@@ -99,21 +99,21 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Maximum difference of a new estimate that is too small for the relays to agree on it. It is a mean square relative
+/// Difference of a new estimate from the current one up to which it is never adopted. It is a mean square relative
 /// difference of the interference.
 const WORTH: f64 = 1e-5;
 
-/// Minimum difference of a new estimate that may show a change of the interference. It is a mean square relative
-/// difference of the interference.
+/// Difference of a new estimate from the current one above which the interference may have changed. It is a mean
+/// square relative difference of the interference.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of a difference to its variance that shows a change of a stationary interferer.
+/// Minimum ratio of an estimate's change to its variance for its adoption: stationary interferer.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of a difference to its variance that shows a change, for a moving interferer.
+/// Minimum ratio of an estimate's change to its variance for its adoption: moving interferer.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of a difference to its variance that shows another interferer in a settled chain. The estimation
-/// then starts again.
+/// Minimum ratio of an estimate's change to its variance for its adoption: settled chain. There is then another
+/// interferer, and the estimation starts again.
 const ANOTHER: f64 = 64.0;
 
 /// Squared relative change of the level measured at Rx that counts as a change of the interference.

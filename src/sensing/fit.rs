@@ -56,7 +56,7 @@ struct Factor {
 }
 
 /// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
-/// separate the unknowns. Its seven digits of an f32 suffice for sums of some hundred positions.
+/// separate the unknowns. The seven digits of an f32 suffice for sums of some hundred positions.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -116,8 +116,8 @@ impl Factor {
         last
     }
 
-    /// Returns the variance of the fit at a position, in units of one measurement's variance. `terms` are those of
-    /// the position. It is r^T G^-1 r, with G the matrix of the fit.
+    /// Returns the variance of the fit at a position, in units of one measurement's variance. It is r^T G^-1 r, with
+    /// r the position's `terms`, and G the matrix of the fit.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);

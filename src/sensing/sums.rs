@@ -81,8 +81,8 @@ pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. It is the middle of the measurable range,
-/// so that the square of v is in the range of an f32.
+/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. The unit is the middle of the measurable
+/// range, so that the square of v is in the range of an f32.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
 /// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
@@ -259,7 +259,7 @@ pub(crate) struct Listener {
     faded: Instant,
     /// Current position of the relay, the mean of those at which it measured.
     at: Placement,
-    /// Mean interference measured at that position, in units of `UNIT_W`.
+    /// Mean interference measured at the relay's current position, in units of `UNIT_W`.
     heard: Average,
 }
 

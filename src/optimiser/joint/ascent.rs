@@ -77,7 +77,7 @@ pub(crate) struct Ascent {
     floor: f32,
     /// Maximum target of the ascent, in ln(SIR), until the chain is checked at its upper bound.
     limit: f32,
-    /// Next increase of `limit`, in ln(SIR), if the chain fails that check.
+    /// Next increase of `limit`, in ln(SIR), if the chain fails the check at its upper bound.
     excess: f32,
     /// Cap on the slack (spare length of the chain at Rx), in units of D. It is lowered where slack would outweigh a
     /// penalty.

@@ -218,7 +218,7 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
-    /// Difference c - 1 of the condition's factor `c` and 1, computed without cancellation.
+    /// Difference `c` - 1, computed without cancellation. `c` is target SIR over gain, raised for noise.
     pub(super) e: f32,
     /// Squared length that is added to s in the condition s + `spare` >= `c` l, m^2; 0 without noise.
     pub(super) spare: f32,

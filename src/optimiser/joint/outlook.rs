@@ -71,9 +71,9 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function from the end of `hop` to its start; returns its end's policy. The end is a
-    /// relay. The relay's move in its two free coordinates is limited to [`low`, `high`], m, relative to its current
-    /// position.
+    /// Propagates the value function from the hop's receiver to its sender; returns the receiver's policy. The
+    /// receiver is a relay; `axis` is its dependent coordinate. Its move in the two free coordinates is limited to
+    /// [`low`, `high`], m, relative to its current position.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,

@@ -103,12 +103,12 @@ impl<'a> Site<'a> {
         Some(at.at(hop.stretched(target, from_m)?))
     }
 
-    /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches. It does so without a step
-    /// back in x.
+    /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
     ///
-    /// It is searched on the straight line to `wanted` from the allowed ones nearest to the middle of those in reach.
-    /// `None` if none is reached. For c = target / gain > 1 a hop from p reaches a ball, with the interferer at m:
-    /// its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// Its end must not be before the sender in x. The search is on the straight line to `wanted` from the allowed
+    /// position closest to the middle of the reachable ones. `None` if none is reached. For c = target / gain > 1 a
+    /// hop from p reaches a ball, with the interferer at m: its centre is p + (p - m) / (c - 1), its radius sqrt(c)
+    /// |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -475,9 +475,10 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Returns the slack of the last hop for `target`, m, and the derivatives of the slack. The slack is the hop's
-/// maximum length less its length. These are by the position of the last relay, which is at `at`, with `power_w`
-/// watts. `room` has its allowed lateral offsets and altitudes.
+/// Returns the slack of the last hop for `target`, m, and the derivatives of the slack.
+///
+/// The slack is the hop's maximum length less its length. The derivatives are by the position of the last relay,
+/// which is at `at`, with `power_w` watts. `room` has its allowed lateral offsets and altitudes.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,

@@ -34,14 +34,15 @@ pub(super) enum Start {
     /// of the allowed lateral offsets and altitudes, and a position one separation beside it. The corner is at the
     /// highest altitude, on the side away from the interferer.
     Turns,
-    /// Chain at the lowest altitude, for a target SIR so high that no hop leaps over the interferer.
+    /// Chain at the lowest altitude, for a target so high that no hop can pass the interferer in one leap.
     Near,
     /// Chain with relay 1 at the x of Rx, high above it or far to its side. The others are on the way down from
     /// there.
     Far,
 }
 
-/// Lateral offset and height in the middle of each arch that is tried, in units of D / 2.
+/// Parabolas that are tried as initial chains. Each has a lateral offset and a height in the middle, in units of D /
+/// 2.
 const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),

@@ -54,11 +54,13 @@ const DEPTH: f32 = 1e-20;
 const HALVINGS: u8 = 32;
 
 impl Fewest {
-    /// Returns the minimum number of relays for `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR above 0.
+    /// Returns the minimum number of relays for `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR
+    /// above 0.
     ///
-    /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive count if
-    /// `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay,
-    /// and all of them again with a minimum separation; in a field at most 32 chains of equal relays.
+    /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive
+    /// count if `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a
+    /// reach for each relay, and all of them again with a minimum separation; in an interference field at most 32
+    /// chains of equal relays.
     ///
     /// `None` if no number of relays meets it; [`Most::of`] returns the best that they can meet.
     pub fn of(mission: &Mission, target: f32, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
@@ -273,8 +275,8 @@ fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
     chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns the minimum number of relays for `target` in a field, all with the same `profile`. Without a minimum
-/// separation it is found by bisection; see [`Fewest::of`].
+/// Returns the minimum number of relays for `target` in an interference field. All relays have the same `profile`.
+/// Without a minimum separation it is found by bisection; see [`Fewest::of`].
 fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
     let met_by = |mission: &Mission, relays: u16| {
         mission

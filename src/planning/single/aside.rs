@@ -87,7 +87,7 @@ pub enum AsideCase {
     /// Optimum where the circles of constant SIR_1 (first hop) and SIR_2 (second hop) touch. It is at the lowest
     /// altitude.
     Touching,
-    /// Optimum at the maximum of SIR_1, lowest altitude: the first hop is the worse one even there.
+    /// Optimum at the lowest altitude and the maximum of the first hop's SIR. That hop is the worse one even there.
     Hilltop,
     /// Optimum above Rx, at the lowest altitude: the first hop is the better one even there.
     AboveRx,
@@ -107,7 +107,7 @@ pub enum AsideCase {
 }
 
 impl AsideCase {
-    /// Number of the case: 1 to 3 as in the module's text, 4 to 6 for edges along x, y and h, then 7 to 10.
+    /// Number of the case: 1 to 3 without limits, 4 to 6 for edges along x, y and h, then 7 to 10.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -122,21 +122,21 @@ impl AsideCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile`, and its case; `None` in a field. The position is in [0, D]
-/// and in the lateral band.
+/// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The
+/// position is in [0, D] and in the allowed lateral range.
 ///
-/// The mission's band of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the
-/// result is outside of the corridor, some 300 evaluations of both hops; with noise and lateral room some 23 000
-/// more.
+/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the
+/// optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral range some 23
+/// 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. The position is in
-/// [0, D] and in the bands of altitudes and lateral offsets.
+/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The
+/// position is in [0, D] and in the allowed ranges of altitudes and lateral offsets.
 ///
-/// Work: 48 bisection steps in f64, with noise as many for each. If the result is outside of the corridor, some 800
-/// evaluations of both hops; with noise and lateral room some 46 000 more.
+/// Work: 48 bisection steps in f64, with noise as many for each. If the optimum without limits is not allowed, some
+/// 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }

@@ -27,7 +27,8 @@ use crate::sir::{self, Sender};
 /// Number of bisection steps for the x at which both SIRs are equal: to an f32's step, even near Tx.
 const HALVINGS: u8 = 40;
 
-/// Position of a single relay, and the SIR (linear; in a field its mean) of the worse of its two hops.
+/// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field it is the
+/// mean SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Found {
@@ -72,7 +73,7 @@ impl Two<'_> {
     }
 
     /// Returns the position with x in [`low`, `high`] at which SIR_1 falls below SIR_2. These are the SIRs of the
-    /// first and the second hop. It is the better of the two neighbouring f32 values of x.
+    /// first and the second hop. The result is the better of the two f32 values of x next to the crossing.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

@@ -124,7 +124,8 @@ impl PlaceCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case. `None` in a field.
+/// Returns the optimal position of a relay with `profile` between Tx and Rx, and its case. `None` in an interference
+/// field.
 ///
 /// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
 pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
@@ -170,10 +171,10 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
     })
 }
 
-/// Returns the best x at or beyond the second rise of the first hop's SIR. That rise exists only with noise.
+/// Returns the best position at or beyond the maximum that the first hop's SIR has with noise.
 ///
-/// There the SIR falls to a minimum, rises to a maximum, and falls again. `None` if there is no such maximum at x
-/// below `end_m`.
+/// Along x that SIR falls to a minimum, rises to this maximum, and falls again. `None` if there is no such maximum at
+/// x below `end_m`.
 fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;
@@ -217,9 +218,11 @@ impl AltitudeCase {
     }
 }
 
-/// Returns the optimal altitude in the mission's band, m, and its case. The relay has `power_w` watts and is at `x_m`, in [0, D].
+/// Returns the optimal altitude in the mission's range, m, and its case. The relay has `power_w` watts and is at
+/// `x_m`, in [0, D].
 ///
-/// `None` in a field, and for `x_m` outside [0, D]. Work: at most six evaluations of both hops and one of Lemma 1.
+/// `None` in an interference field, and for `x_m` outside [0, D]. Work: at most six evaluations of both hops and one
+/// of Lemma 1.
 pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, AltitudeCase)> {
     let interferer = mission.interferer()?;
     if !(0.0..=mission.config().distance_m).contains(&x_m) {
@@ -257,8 +260,8 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and the rise's end, m. That altitude is
-/// limited to the allowed range `band`.
+/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and up to which altitude, m. That altitude
+/// is limited to the allowed range `band`.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
@@ -287,8 +290,8 @@ pub enum FreeCase {
     Touching,
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case; `None` in a field. Its x is in [0, D],
-/// and its altitude in the mission's band.
+/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. Its x
+/// is in [0, D], and its altitude in the mission's range.
 ///
 /// Work: at most 190 evaluations of both hops and one of Lemma 1.
 pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
@@ -333,7 +336,7 @@ pub struct Guide {
     pub c3: Option<f32>,
 }
 
-/// Returns the power ratios C_1 to C_3 for a relay at `altitude_m`, m, above 0; `None` in a field.
+/// Returns the power ratios C_1 to C_3 for a relay at `altitude_m`, m, above 0. `None` in an interference field.
 ///
 /// Relative error below 1e-4: `the_guide_agrees_with_the_cases` in `host-tests/tests/theorems/`. Constant work.
 pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
@@ -362,7 +365,7 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
 /// `power_w` watts and is at `x_m`.
 ///
 /// Any `x_m`, m, and `power_w`, W. Altitudes are above 0, and not limited to the mission's range. `None` for each
-/// that does not exist, and for both in a field. Constant work.
+/// that does not exist, and for both in an interference field. Constant work.
 pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
     let Some(interferer) = mission.interferer() else {
         return [None; 2];

@@ -46,7 +46,7 @@ pub const MAX_BODY: usize = if offer::LENGTH > LONG {
 #[cfg(not(feature = "upload"))]
 pub const MAX_BODY: usize = LONG;
 
-/// Message between neighbours. *Onward* is the direction of a pass: toward Rx, or toward Tx in a field.
+/// Message between neighbours. *Onward* is the direction of a pass: toward Rx, or toward Tx in an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
     /// Message to the next relay of a pass: target SIRs, and the sender's reach (farthest x) for each.

@@ -31,7 +31,7 @@ pub struct Sweep {
     pub relay: Station,
     /// True if relays use the joint method's lateral offsets and altitudes, and not the configured ones.
     pub chosen: bool,
-    /// Upsilon = E[1/I] measured by the sender at its position, 1/W; `None` to use the agreed field.
+    /// Upsilon = E[1/I] measured by the sender at its position, 1/W. `None` to use the mission's interference field.
     pub measured_per_w: Option<f32>,
     /// Reach of the sender for each target, the farthest x at which it meets the target, m. Shorter than the ladder
     /// if the upper targets cannot be met.

@@ -147,7 +147,8 @@ pub(super) struct Mark {
     pub(super) x_m: f32,
     /// First derivatives of the slack (spare length at Rx) by the segment's last relay's position, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives of the slack (spare length at Rx) by that position, 1/m: xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the slack (spare length at Rx) by the segment's last relay's position, 1/m. The order is
+    /// xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 

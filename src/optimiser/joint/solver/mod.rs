@@ -136,7 +136,8 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Creates a joint solver. `None` in a field, for more than `RELAYS` relays, or without the feature `altitude`.
+    /// Creates a joint solver. `None` in an interference field, for more than `RELAYS` relays, or without the feature
+    /// `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
         (fits && mission.interferer().is_some()).then(|| Self {
