@@ -24,7 +24,7 @@ pub enum Event {
     NeighbourLost {
         /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the neighbour.
+        /// Index of the lost neighbour.
         node: u16,
     },
     /// A lost neighbour is received again, or another node has replaced it. In the second case `node` differs from
@@ -32,19 +32,19 @@ pub enum Event {
     NeighbourBack {
         /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the neighbour.
+        /// Index of the neighbour that is received now.
         node: u16,
     },
     /// A node has reported eight times in a row that it does not receive this relay. It cannot be a neighbour. Raised once until
     /// the node receives this relay. An operator checks this transmitter and that receiver: antenna, power, channel.
     NotHeard {
-        /// Index of the node.
+        /// Index of the node that does not receive this relay.
         node: u16,
     },
     /// A node has another mission, or one that this relay cannot obtain; its messages are ignored. An operator loads both with
     /// the same mission before take-off. Raised once a minute for each node.
     MissionMismatch {
-        /// Index of the node.
+        /// Index of the node with the other mission.
         node: u16,
     },
     /// Three handshakes in a row from a node are signed with another key than this relay's. None in between has the
@@ -52,7 +52,7 @@ pub enum Event {
     /// without the key who sends three in a row does: if that node is received at the same time, it is an attack and
     /// the node is fine.
     KeyMismatch {
-        /// Index of the node.
+        /// Index of the node that signs with another key.
         node: u16,
     },
     /// Five handshakes in a row from a node have an epoch that is not newer than the known one. The key is right, but
@@ -62,7 +62,7 @@ pub enum Event {
     /// replay in order of five handshakes of one start does. If `node` is this relay, its neighbours know a newer
     /// epoch, and it becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
-        /// Index of the node.
+        /// Index of the node whose epoch went back.
         node: u16,
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see

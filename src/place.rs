@@ -18,7 +18,7 @@ pub struct Placement {
     pub x_m: f32,
     /// Lateral offset from the line Tx to Rx, m: to its right above 0, to its left below.
     pub y_m: f32,
-    /// Height above the ground, m.
+    /// Height of the position above the ground, m.
     pub altitude_m: f32,
 }
 
@@ -44,7 +44,7 @@ impl Placement {
 pub struct CrossSection {
     /// Lateral offset from the line Tx to Rx, m: to its right above 0, to its left below.
     pub y_m: f32,
-    /// Height above the ground, m.
+    /// Height of the relay above the ground, m.
     pub altitude_m: f32,
 }
 

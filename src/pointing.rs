@@ -23,9 +23,9 @@ const MAX_ERROR_RAD: f32 = 0.002_967;
 pub struct Bearing {
     /// Angle in the ground plane from x toward y, rad, within -pi to pi. 0 for a position straight above or below.
     pub azimuth_rad: f32,
-    /// Angle above the horizon, rad, within -pi/2 to pi/2.
+    /// Elevation: angle of the direction above the horizon, rad, within -pi/2 to pi/2.
     pub elevation_rad: f32,
-    /// Straight distance, m, above 0; relative error below 3e-7.
+    /// Straight distance to the position, m, above 0; relative error below 3e-7.
     pub distance_m: f32,
 }
 

@@ -66,7 +66,7 @@ pub struct Adjust {
     pub rounds: u16,
     /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
-    /// Local search for a better position.
+    /// Method by which a relay searches a better position when it moves.
     pub local: Local,
 }
 

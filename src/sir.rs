@@ -37,7 +37,7 @@ use crate::root::sqrt;
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
-/// interferer it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In a field it is Upsilon(x) /
+/// interferer it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In an interference field it is Upsilon(x) /
 /// `Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
@@ -94,11 +94,13 @@ impl Sender {
         }
     }
 
-    /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x. Infinite if both are at one place.
+    /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x. Infinite if both are at
+    /// one place.
     ///
-    /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is the paper's
-    /// `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). In a field it is
-    /// the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x) / (`mu_los` d^2).
+    /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is
+    /// the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta /
+    /// `mu_los`). In an interference field it is the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x) /
+    /// (`mu_los` d^2).
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
         let across = to.cross_section().apart_squared(self.cross_section);
@@ -106,7 +108,8 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. The paper's `SIR_{N+1}`, K / (d^2 + y^2 + h^2).
+/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. The paper's `SIR_{N+1}`, K / (d^2
+/// + y^2 + h^2).
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
@@ -151,15 +154,18 @@ const DOUBLINGS: u8 = 64;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Extremum {
-    /// SIR_1 falls up to this x, m (the paper's Psi^x), and rises beyond. The interferer is ahead of Tx (X > 0).
+    /// First hop's SIR along x falls up to this x, m (the paper's Psi^x), and rises beyond. The interferer is ahead
+    /// of Tx (X > 0).
     Valley(f32),
-    /// SIR_1 falls up to the first x, m, rises up to the second and falls beyond: X > 0, with noise.
+    /// First hop's SIR falls up to the first x, m, rises up to the second, and falls beyond. The interferer is ahead
+    /// of Tx (X > 0), with noise.
     ValleyAndHill(f32, f32),
-    /// SIR_1 rises up to this x, m, and falls beyond: the interferer is behind Tx (X < 0).
+    /// First hop's SIR along x rises up to this x, m, and falls beyond. The interferer is behind Tx (X < 0).
     Hill(f32),
-    /// SIR_1 falls with x: X = 0, or X > 0 and the noise exceeds the interference.
+    /// First hop's SIR falls with x. The interferer is at X = 0, or it is ahead of Tx and the noise exceeds the
+    /// interference.
     Falls,
-    /// SIR_1 is constant: the interferer is at Tx (X = Y = 0), and there is no noise.
+    /// First hop's SIR is the same at every x: the interferer is at Tx, and there is no noise.
     Level,
 }
 
@@ -272,9 +278,9 @@ fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
 
 /// Returns the largest SIR of the first hop to a relay at `altitude_m`. The maximum is over all x in [0, D].
 ///
-/// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of [`first_hop_turn`] for X
-/// < 0, with noise as well. In a field it is an upper bound: the largest Upsilon right above the transmitter. It is larger at
-/// lower altitudes.
+/// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of
+/// [`first_hop_turn`] for X < 0, with noise as well. In an interference field it is an upper bound: the largest
+/// Upsilon right above the transmitter. It is larger at lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

@@ -20,7 +20,7 @@ pub struct Instant {
     micros: u64,
 }
 
-/// A span of time, in microseconds.
+/// A duration, in microseconds.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Duration {

@@ -9,7 +9,7 @@ use crate::place::Placement;
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
-    /// Hold the last agreed position.
+    /// Hold the last agreed position while there is no quorum.
     #[default]
     Hold,
     /// Leave the line from the last agreed position, along y and upward. With a guard, only within its geofence
@@ -17,7 +17,7 @@ pub enum WithoutQuorum {
     Leave {
         /// Lateral offset that is added to the agreed position, m: -1e4 to 1e4.
         y_m: f32,
-        /// Climb from the agreed position, m: 0 to 1e4.
+        /// Height that is added to the agreed position, m: 0 to 1e4.
         up_m: f32,
     },
 }

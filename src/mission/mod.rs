@@ -237,9 +237,9 @@ pub enum Heading {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Band {
-    /// Lower limit, m.
+    /// Lower limit of the altitudes or lateral offsets, m.
     pub least_m: f32,
-    /// Upper limit, m: at least `least_m`.
+    /// Upper limit of the altitudes or lateral offsets, m: at least `least_m`.
     pub most_m: f32,
 }
 
@@ -293,7 +293,7 @@ impl Band {
 pub struct Profile {
     /// Altitude above the ground plane that the relay holds, m: 0.1 to 1e5.
     pub altitude_m: f32,
-    /// Transmit power, W: 1e-6 to 1e6.
+    /// Transmit power of the relay, W: 1e-6 to 1e6.
     pub power_w: f32,
 }
 

@@ -33,11 +33,11 @@ pub enum Local {
     /// Search from coarse to fine altitudes: at most 1080 evaluations of both hops.
     #[default]
     Fine,
-    /// The paper's grid, `columns` by `rows` evaluations.
+    /// Search on the paper's grid of positions: `columns` by `rows` evaluations of both hops.
     Grid {
-        /// Number of positions along x, including those of the neighbours, 2 to 255.
+        /// Number of positions of the grid along x, including those of the neighbours, 2 to 255.
         columns: u8,
-        /// Number of altitudes, 2 to 255.
+        /// Number of altitudes of the grid, 2 to 255.
         rows: u8,
     },
 }

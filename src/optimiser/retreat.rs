@@ -39,7 +39,7 @@ pub struct Retreat {
     /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest x that the sender may take, m.
+    /// Smallest x that the hop's sender may take, m.
     end_m: f32,
     to_rx: bool,
 }
@@ -132,12 +132,12 @@ impl Retreat {
     }
 }
 
-/// Hop as the x of its receiver and the x of its sender.
+/// Hop along the line: the x of its receiver and the x of its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
-    /// x of the receiver, m.
+    /// x of the hop's receiver, m.
     pub to_m: f32,
-    /// x of the sender, m.
+    /// x of the hop's sender, m.
     pub from_m: f32,
 }
 

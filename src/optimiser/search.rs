@@ -88,7 +88,7 @@ pub struct Search {
     /// True for plain passes, in which every relay takes the farthest x that meets the target. They are used in the
     /// paper's schedule, and after a relay refused to stay short of its farthest x.
     plain: bool,
-    /// Lowest known target that no chain can meet.
+    /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
     most: Option<f32>,
     /// Bisection of targets after a relay has refused its required position; `None` before.
     trials: Option<StandTrials>,

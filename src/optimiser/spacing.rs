@@ -79,13 +79,13 @@ use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Position that a relay requires of the previous relay of the pass, to meet the target.
+/// Position that a relay requires of the previous relay of the pass, so that its own hop meets the target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// Previous relay at its farthest x that meets the target; or Tx or Rx, which do not move.
+    /// Previous relay required at its farthest x that meets the target. Also for Tx or Rx, which do not move.
     AtReach,
-    /// Previous relay at this x, m.
+    /// Previous relay required at this x, m, short of its farthest one.
     At(f32),
 }
 
@@ -114,7 +114,7 @@ pub struct Hop {
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
-    /// Maximum x of the receiver, m.
+    /// Maximum x that the hop's receiver may take, m.
     end_m: f32,
     /// Maximum x of the receiver, and that of its sender, m. Each leaves the relays after it their separation.
     gathered_m: [f32; 2],

@@ -114,11 +114,11 @@ pub(crate) struct Trial {
 /// Use of the measurements that a sensing pass collected, during the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
-    /// Use the result of the pass for the interference estimate.
+    /// Use the measurements of this sensing pass for the interference estimate.
     Review,
-    /// Use the result of the pass although the measurements are inconsistent: the faulty relay is unknown.
+    /// Use the measurements although they are inconsistent: the faulty relay is unknown.
     Unknown,
-    /// Discard the result of this pass, and start another sensing pass soon.
+    /// Discard the measurements of this sensing pass, and start another sensing pass soon.
     Again,
 }
 

@@ -27,7 +27,7 @@ use crate::time::{Duration, Instant};
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum InterferenceEstimate {
-    /// Interference as the mission configures it.
+    /// Estimate not changed by measurements: the interference that the mission configures.
     #[default]
     Mission,
     /// Unknown interference; the relays spread along the line to measure.
@@ -70,7 +70,7 @@ impl InterferenceEstimate {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Spread {
-    /// Equal length of all hops.
+    /// Spacing with all hops of the same length.
     #[default]
     Even,
     /// First hop, from Tx, half as long as the other hops.
@@ -95,7 +95,7 @@ impl Spread {
 pub struct NumberedEstimate {
     /// Sequence number of the estimate, 0 for the initial one.
     pub number: u16,
-    /// Interference estimate.
+    /// Interference estimate with this number.
     pub estimate: InterferenceEstimate,
 }
 

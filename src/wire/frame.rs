@@ -36,7 +36,7 @@ pub struct Header {
     pub network: u16,
     /// Node number of the sender: 0 is Tx, 1 to N the relays, N + 1 Rx.
     pub sender: u16,
-    /// Node number of the destination.
+    /// Node number of the frame's destination.
     pub destination: u16,
     /// Number of frames that the sender sent before this one, wrapping.
     pub counter: u32,

@@ -46,9 +46,9 @@ const WENT_BACK: u8 = 5;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// True if a handshake to the node is to be sent.
+    /// True if a handshake to the table entry's node is to be sent.
     handshake: bool,
-    /// True if that handshake requests a reply although the node is proven to be present.
+    /// True if the next handshake to the node requests a reply although the node is proven to be present.
     asks: bool,
     /// True if the node has repeated this relay's nonce: it is present, and both know each other's nonce.
     proven: bool,
@@ -133,7 +133,7 @@ pub(crate) enum Checked {
     Handshake { first: bool },
     /// Handshake with the right tag but without proof: it may have been recorded.
     Unproven,
-    /// Frame without a tag.
+    /// Received frame without an authentication tag.
     Unsigned,
     /// Frame with a wrong tag, at least for the nonces of the current session.
     Forged,

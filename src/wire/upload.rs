@@ -22,7 +22,7 @@ pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
 pub struct Upload {
     version: u16,
     base: u16,
-    /// Checked parameters of a mission with one interferer.
+    /// Checked parameters of the uploaded mission, which has one interferer.
     config: MissionConfig,
     /// Positions of Tx and Rx, the ends of the mission's line; `None` for the configured ones. They are valid
     /// positions; every relay checks that they fit the mission.
@@ -48,7 +48,7 @@ pub enum UploadError {
     Base,
     /// The mission does not fit its line from Tx to Rx on earth, or the geofence.
     Line(LineError),
-    /// The relay already has this mission or a newer one.
+    /// The relay already has the uploaded mission or a newer one.
     Old,
     /// Frames are not signed, because `Settings::auth` is not set.
     Unsigned,

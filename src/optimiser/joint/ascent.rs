@@ -63,7 +63,7 @@ pub(crate) enum AscentStep {
     Raise,
     /// Compute the relays' moves again, by a backward pass from the last relay to the first.
     Again,
-    /// End the ascent.
+    /// End the ascent, the improvement of the current trial chain.
     Over,
 }
 

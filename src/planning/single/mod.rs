@@ -32,7 +32,7 @@ const HALVINGS: u8 = 40;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Found {
-    /// Position of the relay.
+    /// Position of the single relay.
     pub place: Placement,
     /// Smaller one of SIR_1 (hop from Tx) and SIR_2 (hop to Rx), linear.
     pub sir: f32,

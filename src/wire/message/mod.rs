@@ -55,16 +55,16 @@ pub enum Message {
     Verdict(Answer),
     /// Reply to a repeated pass message: it was received before, and its result is not known yet.
     Busy {
-        /// Number of the pass that is in progress.
+        /// Number of the pass along the chain that is in progress.
         number: u16,
     },
     /// Either direction: heartbeat request, reply, or both.
     Heartbeat {
         /// Digest of the sender's mission, so that a wrong configuration is detected before take-off.
         mission: u16,
-        /// Number of the sender's request, 0 for none.
+        /// Number of the sender's own heartbeat request, 0 for none.
         request: u16,
-        /// Number of the answered request, 0 for none.
+        /// Number of the destination's heartbeat request that is answered, 0 for none.
         reply: u16,
     },
     /// Message to the next relay of a pass: profiles (altitude and power) of all relays so far.
@@ -99,7 +99,7 @@ pub enum Message {
     },
     /// Either direction, also from the ground: a mission that is newer than the destination's.
     Offer {
-        /// Uploaded mission.
+        /// Uploaded mission that the sender offers.
         upload: Upload,
         /// Number of the destination's hello that the offer answers, 0 for none.
         offer_number: u16,

@@ -185,7 +185,7 @@ pub const MOST_NAMED: usize = 8;
 /// Profile of a relay, altitude and power, that differs from the mission's common one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Index of the relay in the view, from 1 next to Tx.
+    /// Index in the view of the relay with this profile, from 1 next to Tx.
     pub index: u16,
     /// Fixed altitude of the relay, m; 0 if the relay chooses its altitude.
     pub held_m: f32,
@@ -266,7 +266,7 @@ pub struct Token {
     pub place: Placement,
     /// Transmit power of the sender, W.
     pub power_w: f32,
-    /// Action of the relays in this pass.
+    /// Action that each relay performs when it receives the token in this pass.
     pub turn: AdjustStep,
     /// SIR of the chain before this pass, linear; 0 if unknown.
     pub sir: f32,
@@ -311,16 +311,16 @@ impl Token {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// Stay, and store the neighbours' positions.
+    /// Token's action: stay, and store the neighbours' positions.
     Look,
-    /// Move if another position has a better SIR.
+    /// Token's action: move if another position has a better SIR.
     Move {
-        /// Maximum change of altitude, m: the paper's `epsilon_h`.
+        /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Method of the search for a better position.
+        /// Method by which the relay searches a better position.
         local: Local,
     },
-    /// Stay for good: Algorithm 2 has ended.
+    /// Token's action: stay for good, because Algorithm 2 has ended.
     Stop,
 }
 
@@ -383,7 +383,7 @@ impl StepBody {
 /// Reply to a token of Algorithm 2, sent against its direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
-    /// Number of the token's pass.
+    /// Number of the pass in which the token was received.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,

@@ -261,7 +261,7 @@ impl Decision {
 pub struct Pulse {
     /// Number of the renewal, wrapping. When it is sent, all members have taken part in the previous one.
     pub number: u16,
-    /// Digest of the mission and the view.
+    /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
     /// Duration of the lease after a member has taken part in a renewal, in tenths of a second: 1 to 65535.
     pub lease: u16,
@@ -271,9 +271,9 @@ pub struct Pulse {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulsed {
-    /// Number of the acknowledged renewal.
+    /// Number of the acknowledged lease renewal.
     pub number: u16,
-    /// Digest of the mission and the view.
+    /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
     /// True if the last relay has received and acknowledged the renewal.
     pub done: bool,

@@ -45,7 +45,7 @@ struct ForwardPass {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Begin the next initial chain.
+    /// Begin the next initial chain, from which the search for the best chain continues.
     Begin,
     /// Search for the highest target SIR that the chain meets without moves of its relays.
     Seek(Seek, Purpose),
