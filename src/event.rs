@@ -41,8 +41,8 @@ pub enum Event {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node has another mission, or one that this relay cannot obtain; its messages are ignored. An operator loads both with
-    /// the same mission before take-off. Raised once a minute for each node.
+    /// A node has another mission, or one that this relay cannot obtain; the node's messages are ignored. An operator
+    /// loads both with the same mission before take-off. Raised once a minute for each node.
     MissionMismatch {
         /// Index of the node with the other mission.
         node: u16,

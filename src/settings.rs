@@ -47,13 +47,13 @@ pub enum Wiring {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Method {
-    /// Best x at fixed lateral offsets and altitudes: Algorithm 1, in a field of interference Algorithm 4.
+    /// Best x at fixed lateral offsets and altitudes: Algorithm 1, in an interference field Algorithm 4.
     #[default]
     Align,
-    /// Joint optimum of x, y and altitude within the mission's ranges. Not in a field of interference; up to 100
+    /// Joint optimum of x, y and altitude within the mission's ranges. Not in an interference field; up to 100
     /// relays.
     Joint,
-    /// Algorithm 1, followed by Algorithm 2, which moves one relay after the other. Not in a field of interference.
+    /// Algorithm 1, followed by Algorithm 2, which moves one relay after the other. Not in an interference field.
     Adjust(Adjust),
 }
 
@@ -116,7 +116,7 @@ pub struct Settings {
     /// Measurement of the interference by this relay, used in place of the mission's interference field. `None` if
     /// the mission has no such field.
     pub measure: Option<Measure>,
-    /// Estimation of an unknown interferer from measurements; `None` in a field of interference. Set it on all relays
+    /// Estimation of an unknown interferer from measurements; `None` in an interference field. Set it on all relays
     /// of a chain, or on none.
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.

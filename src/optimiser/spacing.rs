@@ -79,7 +79,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Position that a relay requires of the previous relay of the pass, so that its own hop meets the target.
+/// Position that a relay requires of the previous relay of the pass, for its hop to meet the target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {

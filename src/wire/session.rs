@@ -35,8 +35,8 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum distance of two nonces of one node in an epoch, between their lower halves. A nonce of the same number
-/// farther away belongs to another node that uses this number.
+/// Maximum difference between the lower halves of two nonces of one node in an epoch. A larger difference shows that
+/// two nodes use the same node number.
 const NEAR: u32 = 1 << 12;
 
 /// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. Fewer can be

@@ -23,7 +23,7 @@ const LEAST_TRUST: f32 = 1e-4;
 /// 0.5, since hop lengths vary as 1 / sqrt(SIR). Steps are divided by the rate, so a smaller one is raised to this.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of an ascent's target limit after the chain failed the check there, in ln(SIR).
+/// First increase of the limit of an ascent's target after the chain failed at the limit, in ln(SIR).
 const EXCESS: f32 = 0.03;
 
 /// First cap on the slack (spare length of the chain at Rx), in units of D. Slack above the cap does not count, so

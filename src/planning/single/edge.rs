@@ -406,7 +406,8 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts `new` into the list of the best lines if it is better than one of them; best first.
+/// Inserts `new` into the list of the best lines along x, best first, if it is better than one of them. Each has the
+/// SIR of the line, and the y of the lines on either side of it.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {

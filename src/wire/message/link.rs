@@ -160,8 +160,8 @@ impl Claim {
     }
 }
 
-/// Encodes a fence message into `buffer`; returns its length. The pass number on the wire is the number of the
-/// fence's association.
+/// Encodes a fence message into `buffer`; returns its length. On the wire, the number of the fence's association
+/// (session of two neighbours) is in the place of the pass number.
 pub(super) fn encode_fence(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, mission);
     let numbers = [fence.echo, fence.number].map(Word::new);
