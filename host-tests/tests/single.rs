@@ -6,7 +6,7 @@ use uav_relay::Mission;
 use uav_relay::planning::single::without_interferer::{best_in_field, stepped};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
-use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 fn mission(link: &StochasticLink) -> Mission {
@@ -20,7 +20,7 @@ fn link(d: f64, h: f64, tx_w: f64, power_w: f64, upsilon: Vec<(f64, f64)>) -> St
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: h,
             power_w,
         }],

@@ -8,7 +8,7 @@ use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
@@ -23,7 +23,7 @@ fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
 fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
-    let relay = Station {
+    let relay = Relay {
         altitude_m: round(d * log_uniform(rng, 0.005, 0.1)),
         power_w: round(log_uniform(rng, 0.1, 10.0)),
     };

@@ -239,7 +239,7 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
 ///
 /// All relays but one of the two at the link have to hold positions in one view, without recent changes.
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
-    let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.seen).collect();
+    let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.observed).collect();
     let agreements = groups(&seen);
     if agreements != 1 {
         return Some(format!("{agreements} agreements"));

@@ -217,7 +217,7 @@ fn relay(relays: u16) -> Relay {
 
 /// State of relay and autopilot that the firmware task of the test has observed.
 #[derive(Default)]
-struct Seen {
+struct Observed {
     events: Vec<AutopilotEvent>,
     setpoint: Option<Placement>,
     flown: bool,
@@ -228,7 +228,7 @@ struct Scene {
     pool: LocalPool,
     vehicle: Rc<Vehicle>,
     from_link: Uart,
-    seen: Rc<RefCell<Seen>>,
+    seen: Rc<RefCell<Observed>>,
 }
 
 impl Scene {
@@ -251,7 +251,7 @@ impl Scene {
             commands: RefCell::default(),
             results: RefCell::default(),
         });
-        let seen = Rc::<RefCell<Seen>>::default();
+        let seen = Rc::<RefCell<Observed>>::default();
         let task = {
             let (time, vehicle, seen) = (time.clone(), Rc::clone(&vehicle), Rc::clone(&seen));
             let (mut rx, mut tx) = (to_link.clone(), from_link.clone());

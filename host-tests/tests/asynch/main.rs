@@ -11,7 +11,7 @@ use host_tests::bench::agreed;
 use host_tests::fixtures;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Instant, Mission, Port, Side, Wiring};
-use wire::Fate;
+use wire::WriterFault;
 
 const END: Instant = Instant::from_millis(20_000);
 
@@ -94,8 +94,8 @@ fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
 fn a_stuck_port_delays_nobody() {
     let until = Instant::from_millis(60_000);
     for (port, line) in [(Port::Upstream, 5 + 3), (Port::Downstream, 3)] {
-        let [stuck, cut] = [Fate::Stuck, Fate::Cut]
-            .map(|fate| fly(Wiring::Pair, 5, 16, Some((3, port, fate)), until));
+        let [stuck, cut] = [WriterFault::Stuck, WriterFault::Cut]
+            .map(|fault| fly(Wiring::Pair, 5, 16, Some((3, port, fault)), until));
         assert_eq!(differing(&stuck, &cut), [line], "{port:?}");
         assert!(stuck.lines[line].is_empty() && cut.lines[line].len() > 10);
         let frames: usize = stuck.lines.iter().map(Vec::len).sum();
@@ -136,7 +136,7 @@ fn a_stuck_radio_delays_nobody_who_shares_its_channel() {
         Wiring::Shared,
         5,
         16,
-        Some((3, Port::Shared, Fate::Stuck)),
+        Some((3, Port::Shared, WriterFault::Stuck)),
         until,
     );
     assert!(

@@ -9,7 +9,7 @@ use uav_relay_scenario::mission::mission as of_scenario;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::setup::Setup;
 
-use super::net::{Deed, KEY, Net};
+use super::net::{KEY, Net, ScheduledEvent};
 
 fn signed(mut setup: Setup) -> Setup {
     setup.settings.auth = Some(Auth {
@@ -105,13 +105,13 @@ fn other_methods_choose_the_same() {
 /// Checks that a rebooted relay, also the leader, rejoins the chain with its next epoch.
 #[test]
 fn whoever_is_rebooted_rejoins() {
-    let deeds = [
-        (3_000, Deed::Reboot(4)),
-        (4_000, Deed::Restart),
-        (8_000, Deed::Reboot(1)),
+    let events = [
+        (3_000, ScheduledEvent::Reboot(4)),
+        (4_000, ScheduledEvent::Restart),
+        (8_000, ScheduledEvent::Reboot(1)),
     ];
     for wiring in [Wiring::Pair, Wiring::Shared] {
-        let mut net = Net::new(8, wiring, &deeds);
+        let mut net = Net::new(8, wiring, &events);
         net.run(Instant::from_millis(2_999));
         let places = net.bits();
         assert!(places.iter().all(Option::is_some));

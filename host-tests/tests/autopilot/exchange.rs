@@ -50,7 +50,7 @@ fn told_again(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
 fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
     let mut positions = Vec::new();
     for _ in 0..ms / 20 {
-        vehicle.step_alone();
+        vehicle.step_without_exchange();
         let now = vehicle.now;
         if relay.poll_timeout().is_some_and(|at| at <= now) {
             relay.handle_timeout(now);
@@ -106,9 +106,9 @@ fn an_engaged_drone_flies_to_its_relays_setpoint() {
             "{place:?}, {agreed:?}"
         );
         let value = |of: &str| {
-            let mut newest = vehicle.said.iter().rev();
+            let mut newest = vehicle.received.iter().rev();
             newest.find_map(|(_, said)| match said {
-                Said::Value { name, value } if name == of => Some(*value),
+                LinkMessage::Value { name, value } if name == of => Some(*value),
                 _ => None,
             })
         };
@@ -140,7 +140,7 @@ fn a_relay_is_handed_what_the_radio_hears() {
         noise: 100,
         ..RADIO_STATUS_DATA::DEFAULT
     };
-    vehicle.say_from([b'3', b'D'], &MavMessage::RADIO_STATUS(said));
+    vehicle.send_from([b'3', b'D'], &MavMessage::RADIO_STATUS(said));
     assert!(vehicle.link.exchange(&mut relay, vehicle.now).0);
     assert_eq!(relay.stats().samples_rejected, 1);
 }
@@ -200,7 +200,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
         ..COMMAND_LONG_DATA::DEFAULT
     });
     let before = first.clone();
-    vehicle.say_from([255, 190], &command);
+    vehicle.send_from([255, 190], &command);
     assert!(vehicle.link.exchange(&mut first, vehicle.now).0);
     // The guard forgets where the second drone may be.
     let mut expected = before.clone();

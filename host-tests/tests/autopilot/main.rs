@@ -16,7 +16,7 @@ mod vehicle;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::{AutopilotEvent, Kind};
 use uav_relay::{Instant, Placement};
-use vehicle::{Mode, Said, Vehicle, place};
+use vehicle::{LinkMessage, Mode, Vehicle, place};
 
 #[test]
 fn an_autopilot_is_found_and_asked_for_its_messages() {
@@ -33,17 +33,16 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
             (87, usize::from(!is_px4)),
             (162, usize::from(!is_px4)),
         ] {
-            let asked = vehicle
-                .said
-                .iter()
-                .filter(|(_, said)| matches!(said, Said::Interval { id: of, .. } if *of == id));
+            let asked = vehicle.received.iter().filter(
+                |(_, said)| matches!(said, LinkMessage::Interval { id: of, .. } if *of == id),
+            );
             assert_eq!(asked.count(), times, "{id}");
         }
         assert!(
             vehicle
-                .said
+                .received
                 .iter()
-                .any(|(_, said)| matches!(said, Said::Heartbeat))
+                .any(|(_, said)| matches!(said, LinkMessage::Heartbeat))
         );
         assert!(
             vehicle
@@ -151,7 +150,7 @@ fn without_a_position_the_last_target_is_kept() {
             assert_eq!((target.lat_e7, target.lon_e7), (last.lat_e7, last.lon_e7));
             assert!(!target.has_velocity());
         }
-        assert!(vehicle.heard("relay: no position, keeps last target"));
+        assert!(vehicle.has_text("relay: no position, keeps last target"));
         vehicle.position_every_ms = 200;
         vehicle.run(800);
         assert_eq!(
@@ -201,10 +200,10 @@ fn numbers_for_the_operator_come_once_a_second() {
         ("relay_h", 20.0),
     ] {
         let values: Vec<f32> = vehicle
-            .said
+            .received
             .iter()
             .filter_map(|(_, said)| match said {
-                Said::Value { name: of, value } if of == name => Some(*value),
+                LinkMessage::Value { name: of, value } if of == name => Some(*value),
                 _ => None,
             })
             .collect();
@@ -217,7 +216,7 @@ fn numbers_for_the_operator_come_once_a_second() {
     }
     assert!(vehicle.link.say("a line of a relay"));
     vehicle.run(100);
-    assert!(vehicle.heard("a line of a relay"));
+    assert!(vehicle.has_text("a line of a relay"));
 }
 
 #[test]
@@ -310,8 +309,8 @@ fn the_operator_reads_of_a_view_and_a_mission_once() {
     use uav_relay::HoldReason::Unheard;
 
     let texts_since = |vehicle: &Vehicle, from: Instant| -> Vec<String> {
-        let texts = vehicle.said.iter().filter_map(|(at, said)| match said {
-            Said::Text(text) if *at >= from => Some(text.clone()),
+        let texts = vehicle.received.iter().filter_map(|(at, said)| match said {
+            LinkMessage::Text(text) if *at >= from => Some(text.clone()),
             _ => None,
         });
         texts.collect()
@@ -372,12 +371,12 @@ fn a_reason_that_does_not_last_is_not_told() {
         vehicle.link.handle_hold(vehicle.now, [reason, None]);
         vehicle.run(20);
     }
-    assert!(!vehicle.heard("relay: waits, too close to the previous drone"));
+    assert!(!vehicle.has_text("relay: waits, too close to the previous drone"));
     for _ in 0..200 {
         vehicle.link.handle_hold(vehicle.now, [Some(Close), None]);
         vehicle.run(20);
     }
-    assert!(vehicle.heard("relay: waits, too close to the previous drone"));
+    assert!(vehicle.has_text("relay: waits, too close to the previous drone"));
 }
 
 #[test]
@@ -389,7 +388,7 @@ fn the_operator_reads_why_the_guard_holds_the_relay_back() {
     vehicle.run(2_000);
     vehicle.link.handle_hold(vehicle.now, [None, Some(Order)]);
     vehicle.run(1_000);
-    assert!(!vehicle.heard(order), "on the ground nobody asks");
+    assert!(!vehicle.has_text(order), "on the ground nobody asks");
     vehicle.fly_off();
     for i in 0..3_000 {
         // The reasons last 4 s and 3.5 s in turn.
@@ -397,8 +396,8 @@ fn the_operator_reads_why_the_guard_holds_the_relay_back() {
         vehicle.link.handle_hold(vehicle.now, [None, Some(reason)]);
         vehicle.run(20);
     }
-    let told = vehicle.said.iter().filter_map(|(at, said)| match said {
-        Said::Text(text) if text == order => Some(*at),
+    let told = vehicle.received.iter().filter_map(|(at, said)| match said {
+        LinkMessage::Text(text) if text == order => Some(*at),
         _ => None,
     });
     let told: Vec<Instant> = told.collect();

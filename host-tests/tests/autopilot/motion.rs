@@ -89,7 +89,7 @@ impl Rig {
                 }
                 _ => {}
             }
-            let answer = self.real.hear(self.now, self.now, &frame);
+            let answer = self.real.handle_frame(self.now, self.now, &frame);
             self.link.handle_bytes(self.now, &answer);
         }
         while self.link.poll_position().is_some() {}
@@ -272,7 +272,7 @@ fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
                 rig.events.clear();
                 rig.texts.clear();
                 rig.real.lost_us = lost_us;
-                rig.real.runs_slow(rig.now, slow);
+                rig.real.slow_clock(rig.now, slow);
                 rig.run(120_000);
                 let states = rig
                     .events
@@ -368,7 +368,7 @@ fn a_drone_that_is_given_back_at_full_speed_stops() {
         let mut rig = Rig::new(kind);
         rig.run(2_000);
         for _ in 0..500 {
-            rig.real.push([10.0, 0.0, 0.0]);
+            rig.real.shove([10.0, 0.0, 0.0]);
             rig.step();
         }
         let given = rig.at()[0];

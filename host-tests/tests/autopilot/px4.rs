@@ -89,7 +89,7 @@ fn the_pilot_takes_it_and_nothing_is_taken_back() {
     vehicle.mode = Mode::Position;
     vehicle.run(1_100);
     assert_eq!(vehicle.link.state(), State::Standby);
-    assert!(vehicle.heard("relay: released, manual mode"));
+    assert!(vehicle.has_text("relay: released, manual mode"));
     let from = vehicle.now;
     vehicle.place = place(140.0);
     vehicle.run(10_000);

@@ -105,7 +105,7 @@ fn with_one_key_it_flies_to_its_place() {
         vehicle.run(20_000);
         assert_eq!(vehicle.link.state(), State::Engaged);
         assert!((vehicle.place.x_m - 150.0).abs() < 0.1, "{kind:?}");
-        assert!(vehicle.heard("relay: engaged, flies to position"));
+        assert!(vehicle.has_text("relay: engaged, flies to position"));
         assert_eq!(mistrust(&vehicle), []);
         assert_eq!(vehicle.link.refused(), 0);
     }

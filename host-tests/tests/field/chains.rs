@@ -4,7 +4,7 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::{log_uniform, seed};
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 
 use super::off;
 
@@ -34,7 +34,7 @@ fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: 10.0,
             power_w: 1.0,
         }],
@@ -117,7 +117,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
 /// Draws a chain of identical relays with constant interference along the line.
 fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
     let distance_m = log_uniform(rng, 10.0, 1e5);
-    let station = Station {
+    let station = Relay {
         altitude_m: (log_uniform(rng, 0.002, 0.2) * distance_m).clamp(1.0, 5000.0),
         power_w: log_uniform(rng, 0.01, 100.0),
     };
@@ -212,11 +212,11 @@ fn expected_sirs_follow_power_over_distance_and_upsilon() {
         eta: 4.0,
         upsilon: vec![(0.0, 1.0), (100.0, 11.0)],
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 3.0,
                 power_w: 10.0,
             },
-            Station {
+            Relay {
                 altitude_m: 6.0,
                 power_w: 13.0,
             },

@@ -6,7 +6,7 @@ use uav_relay::planning::fleet::{self, Fewest};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, count, log_uniform};
-use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::{ROUNDING, chain, round};
@@ -18,7 +18,7 @@ pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink 
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: h,
             power_w: 1.0,
         }],

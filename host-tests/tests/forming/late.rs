@@ -48,11 +48,11 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
     chain.until(5_000, Bench::holds).unwrap();
     chain.reboot(1, 3);
-    let calls = |chain: &Bench| {
+    let requests_view = |chain: &Bench| {
         let mut flying = chain.flying.iter();
         flying.any(|frame| frame.to == 3 && frame.is(|m| matches!(m, Message::Proposal(_))))
     };
-    chain.until(10_000, calls).unwrap();
+    chain.until(10_000, requests_view).unwrap();
     // The lost request is repeated; relay 2 then reboots once more for a second view.
     let late = chain.bench.flying.pop_back().unwrap();
     chain.until(10_000, Bench::holds).unwrap();

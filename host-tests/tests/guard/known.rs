@@ -12,7 +12,7 @@ use crate::world::World;
 const SPEED: f64 = 10.0;
 
 fn world(relays: usize, from_m: f64, step_m: f64) -> World {
-    let confines = GuardConfig {
+    let config = GuardConfig {
         fence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,
@@ -26,7 +26,7 @@ fn world(relays: usize, from_m: f64, step_m: f64) -> World {
         hover_m: 0.0,
         lag: Duration::from_millis(200),
     };
-    let mut world = World::new(1, confines, &row(relays, from_m, step_m));
+    let mut world = World::new(1, config, &row(relays, from_m, step_m));
     for drone in &mut world.drones {
         drone.speed = SPEED;
     }

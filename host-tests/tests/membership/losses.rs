@@ -2,7 +2,7 @@
 
 use uav_relay::{Adjust, Band, Local, Method, MissionConfig};
 use uav_relay_oracle::mission::of_stochastic_link;
-use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
@@ -147,7 +147,7 @@ fn a_chain_in_a_field_forms_anew_from_the_other_end() {
         eta: 3.0,
         upsilon: vec![(0.0, 2e4), (400.0, 5e3), (1_000.0, 4e4)],
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 20.0,
                 power_w: 1.0
             };

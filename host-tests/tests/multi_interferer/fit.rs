@@ -45,22 +45,22 @@ fn the_cases_of_a_separate_program_are_met() {
         let scene = of_case(&case);
         let raster = Raster::even(&scene, count(&case, "nx"), count(&case, "nh"));
         let part = |name| case.part(name).unwrap();
-        let theirs = raster.weigh(part("xH"), part("yH"));
+        let theirs = raster.best_power(part("xH"), part("yH"));
         assert!(above(theirs.error, part("err")).abs() < 1e-12);
         assert!(above(theirs.power_w, part("pH")).abs() < 1e-12);
         assert!(above(theirs.error / raster.total(), part("rel_err")).abs() < 1e-12);
         let on_theirs = fit(&scene, &raster).unwrap();
         let ours = hypothetical(&scene).unwrap();
         let fine = Raster::graded(&scene, None, 500_000);
-        let truly = |x, y| fine.weigh(x, y).error;
+        let truly = |x, y| fine.best_power(x, y).error;
         let gained = above(truly(ours.x_m, ours.y_m), truly(part("xH"), part("yH")));
-        let there = above(raster.weigh(ours.x_m, ours.y_m).error, part("err"));
+        let there = above(raster.best_power(ours.x_m, ours.y_m).error, part("err"));
         println!(
             "{}: on its raster {:.1e} above its error; by our raster {there:.1e}, and {gained:.1e} on a fine one; {ours:?}",
             case.id,
-            above(on_theirs.weighed.error, part("err")),
+            above(on_theirs.best_power.error, part("err")),
         );
-        assert!(above(on_theirs.weighed.error, part("err")) < 1e-9);
+        assert!(above(on_theirs.best_power.error, part("err")) < 1e-9);
         assert!(there < 1e-5 && gained < 1e-7);
         assert!(above(ours.relative_error, part("rel_err")).abs() < case.rtol);
         let mean = part("err") / (case.params.d * (case.params.h_max - case.params.h_min));
@@ -113,7 +113,7 @@ fn the_rasters_are_fine_enough() {
         println!("{} sources: {:?}", scene.sources.len(), started.elapsed());
         let error = |most, also| {
             let raster = Raster::graded(&scene, also, most);
-            raster.weigh(found.x_m, found.y_m).error / raster.total()
+            raster.best_power(found.x_m, found.y_m).error / raster.total()
         };
         let best = error(600_000, Some((found.x_m, found.y_m)));
         search = search.max(above(error(4_000, None), best).abs());

@@ -30,16 +30,16 @@ fn no_random_place_is_better() {
             .map(|_| {
                 let x = rng.random_range(low..=high);
                 let y = log_uniform(&mut rng, 1e-3 * d, 10.0 * d);
-                (rough.weigh(x, y).error, x, y)
+                (rough.best_power(x, y).error, x, y)
             })
             .collect();
         drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = drawn
             .iter()
             .take(WEIGHED)
-            .map(|&(_, x, y)| raster.weigh(x, y).error)
+            .map(|&(_, x, y)| raster.best_power(x, y).error)
             .fold(f64::INFINITY, f64::min);
-        let margin = above(best, found.weighed.error);
+        let margin = above(best, found.best_power.error);
         nearest = nearest.min(margin);
         assert!(
             margin > -1e-9,

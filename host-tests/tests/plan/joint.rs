@@ -40,7 +40,7 @@ fn agreed(scenario: &Scenario, relays: u16) -> f64 {
     let mut setup = Setup::new(mission);
     setup.settings.method = Method::Joint;
     setup.profiles.clone_from(&own);
-    setup.held = mission::held(scenario, relays);
+    setup.held = mission::fixed_altitude_relays(scenario, relays);
     let outcome = chain::run(setup).unwrap();
     if outcome.ending != Ending::Settled {
         return 0.0;

@@ -8,7 +8,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::recorded;
 use uav_relay_oracle::reference::joint::{self, Corridor, Place};
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
 };
@@ -141,7 +141,7 @@ fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
         eta: channel.eta(),
         noise_w: 0.0,
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: scenario.altitude_m,
                 power_w: scenario.uav_w,
             };

@@ -13,7 +13,7 @@ use super::schedule::{SECOND, Schedule};
 use host_tests::fixtures::mission;
 
 /// Returns the number of times that all relays together raised the event `name`.
-fn told(air: &Air, name: &str) -> u32 {
+fn event_count(air: &Air, name: &str) -> u32 {
     let of = |((_, event), times): (&(usize, String), &u32)| (event == name).then_some(*times);
     air.events.iter().filter_map(of).sum()
 }
@@ -26,12 +26,12 @@ fn a_link_that_is_one_way_from_the_start_leaves_one_relay_out_for_good() {
     for (from, to) in [(2, 1), (1, 2), (0, 1), (1, 0), (3, 2), (2, 3)] {
         for seed in 0..10 {
             let mut schedule = Schedule::of(4, seed);
-            schedule.deafen(from, to, 0, 3_600 * SECOND);
+            schedule.cut_link_between(from, to, 0, 3_600 * SECOND);
             let mut air = schedule.begun();
             air.spare = 1;
             air.run(900 * SECOND);
             air.measure();
-            let found = told(&air, "NeighbourBack");
+            let found = event_count(&air, "NeighbourBack");
             println!(
                 "relay {} deaf to {}: flown {:.1} s, the first at {:?} s, the longest pause {:.1} s, {found} times found, {} frames; {}",
                 to + 1,
@@ -157,7 +157,7 @@ fn a_relay_of_another_mission_is_told_of_once_a_minute() {
         let most = air.events.iter().max_by_key(|(_, times)| **times);
         println!(
             "{wiring:?}: {} times, {} frames, most {most:?}; {}",
-            told(&air, "MissionMismatch"),
+            event_count(&air, "MissionMismatch"),
             air.frames,
             air.described()
         );
@@ -188,7 +188,7 @@ fn an_epoch_that_goes_back_on_wires_is_told_and_costs_few_frames() {
             air.events,
             air.described()
         );
-        assert!(told(&air, "EpochWentBack") > 0);
+        assert!(event_count(&air, "EpochWentBack") > 0);
         assert!(rate < 6.0, "{rate} frames a second");
     }
 }

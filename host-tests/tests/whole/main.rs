@@ -25,7 +25,7 @@ fn number(name: &str, usual: u64) -> u64 {
 
 /// Result of one schedule of faults.
 #[derive(Clone, Debug)]
-struct Found {
+struct Measured {
     seed: u64,
     /// Time from the last fault until the chain was whole for good, s; `None` beyond 15 minutes. In a whole chain,
     /// all relays hold positions in one membership view.
@@ -37,12 +37,12 @@ struct Found {
     text: String,
 }
 
-fn flown(seed: u64, schedule: &Schedule) -> Found {
+fn flown(seed: u64, schedule: &Schedule) -> Measured {
     ended(seed, schedule, schedule.begun())
 }
 
 /// Runs the chain `air` to the end of its schedule, and until it is whole.
-fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
+fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Measured {
     let end = schedule.faults_end_us;
     air.run(end);
     // The chain has to stay whole for a minute.
@@ -54,7 +54,7 @@ fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
         air.run(at);
     }
     let whole_us = air.whole_since_us.map(|since| since.saturating_sub(end));
-    Found {
+    Measured {
         seed,
         whole_s: whole_us.map(|us| us as f64 / 1e6),
         groups: air.groups,
@@ -72,7 +72,7 @@ fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
 }
 
 /// Runs `count` schedules on all cores. Returns the results in the order of their seeds.
-fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Found> {
+fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Measured> {
     let next = AtomicU64::new(first);
     let all = Mutex::new(Vec::new());
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -91,7 +91,7 @@ fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Found
         }
     });
     let mut all = all.into_inner().unwrap();
-    all.sort_by_key(|found: &Found| found.seed);
+    all.sort_by_key(|found: &Measured| found.seed);
     all
 }
 
@@ -100,11 +100,11 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
     let first = number("SEED", 1);
     let count = number("COUNT", 150);
     let all = flown_all(first, count, random);
-    let late: Vec<&Found> = all
+    let late: Vec<&Measured> = all
         .iter()
         .filter(|found| found.whole_s.is_none_or(|s| s > WHOLE_S as f64))
         .collect();
-    let two: Vec<&Found> = all.iter().filter(|found| found.groups > 1).collect();
+    let two: Vec<&Measured> = all.iter().filter(|found| found.groups > 1).collect();
     let mut took: Vec<(f64, u64)> = all
         .iter()
         .map(|found| (found.whole_s.unwrap_or(f64::INFINITY), found.seed))
@@ -211,7 +211,7 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
         for minutes in [10, 25, 120] {
             let mut schedule = Schedule::of(relays, 1);
             for at in (0..usize::from(relays)).filter(|at| *at != early) {
-                schedule.deeds[at].0 = 60 * minutes * SECOND;
+                schedule.events[at].0 = 60 * minutes * SECOND;
             }
             schedule.faults_end_us = 60 * minutes * SECOND;
             let found = flown(1, &schedule);
@@ -256,7 +256,7 @@ fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
 /// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
 /// Returns the number of chains, those that recovered late, and those that flew as two chains at once.
-fn with_steps(forward: bool) -> (u64, Vec<Found>, Vec<Found>) {
+fn with_steps(forward: bool) -> (u64, Vec<Measured>, Vec<Measured>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);
     for seed in 1..=count {

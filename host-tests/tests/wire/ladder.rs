@@ -5,7 +5,7 @@ use uav_relay::optimiser::ladder::Ladder;
 use uav_relay_decode::range::targets;
 
 use super::config;
-use super::said::Said;
+use super::message::WireMessage;
 use super::strategies::kinds;
 
 fn bits(targets: &[f32]) -> Vec<u32> {
@@ -24,7 +24,7 @@ fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
 }
 
 /// Returns the codes by which a sweep message gives its target SIRs: anchor, gap and growth.
-fn ladder_of(sweep: &Said) -> (f32, u8, u8) {
+fn ladder_of(sweep: &WireMessage) -> (f32, u8, u8) {
     let code = |name| sweep.number(name) as u8;
     let anchor = sweep.number("anchor") as f32;
     (anchor.abs(), code("gap"), code("growth"))

@@ -2,7 +2,7 @@
 
 use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
-use uav_relay_oracle::reference::{Link, Station, joint};
+use uav_relay_oracle::reference::{Link, Relay, joint};
 use uav_relay_tools::figures::altitude::best_common;
 use uav_relay_tools::figures::aside::{ALTITUDES_M, MOST_ROOM_M, OFFSETS_M, RELAY_W, ROOM_M};
 
@@ -13,7 +13,7 @@ fn link(relays: usize, y_i: f64, altitude_m: f64) -> Link {
         y_i,
         min_separation_m: 4.0,
         relays: vec![
-            Station {
+            Relay {
                 altitude_m,
                 power_w: 1.0
             };
@@ -164,7 +164,7 @@ fn common_and_joint_altitudes_are_the_reference_programs() {
 fn link_of_one(y_i: f64) -> Link {
     Link {
         y_i,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: ALTITUDES_M.0,
             power_w: RELAY_W,
         }],

@@ -3,7 +3,7 @@
 use uav_relay_oracle::cases;
 use uav_relay_oracle::cases::OPTIMA;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_tools::figures::stochastic::{Kind, mission};
 use uav_relay_tools::figures::walk;
 
@@ -14,7 +14,7 @@ fn link(relays: usize, x_i: f64, y_i: f64, power_w: f64) -> Link {
         x_i,
         y_i,
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 20.0,
                 power_w
             };
@@ -320,7 +320,7 @@ fn field_link(field: &str, relays: usize) -> StochasticLink {
             })
             .collect(),
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 20.0,
                 power_w: 1.0
             };

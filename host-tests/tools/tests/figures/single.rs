@@ -1,7 +1,7 @@
 //! Single relay: the equal-SIR locus, the best position by altitude, and the readings of the gain.
 
 use uav_relay_oracle::cases;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_tools::figures::locus::CHOICES;
 use uav_relay_tools::figures::single::{ALTITUDES_M, REALISATIONS};
 
@@ -15,7 +15,7 @@ fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
         interferer_w: 20.0,
         x_i: 30.0,
         y_i: 30.0,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: f64::from(altitude_m),
             power_w: relay_w,
         }],
@@ -30,7 +30,7 @@ fn locus_link(row: &super::Row<'_>, altitude_m: f64) -> Link {
         tx_w: row.number("tx_w"),
         x_i: row.number("interferer_x_m"),
         y_i: row.number("interferer_y_m"),
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m,
             power_w: 1.0,
         }],

@@ -8,12 +8,12 @@ use pcap_file::pcapng::blocks::enhanced_packet::EnhancedPacketOption;
 use pcap_file::pcapng::{Block, PcapNgReader};
 use proptest::collection::vec;
 use proptest::prelude::*;
-use uav_relay_capture::{Capture, Cut, Direction, Frame, MOST};
+use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, MOST};
 
 /// Returns the pieces of a stream, which arrives in `reads`, with their lengths. The last number is the length of the
 /// incomplete end.
 fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
-    let (mut cut, mut all) = (Cut::default(), Vec::new());
+    let (mut cut, mut all) = (FrameSplitter::default(), Vec::new());
     for read in reads {
         let taken: Result<(), Infallible> = cut.push(read, |piece| {
             all.push((piece.bytes.to_vec(), piece.len));
