@@ -173,7 +173,7 @@ fn assert_separation(places: &[Placement], least_m: f64, told: &str) {
 }
 
 #[test]
-fn at_mixed_altitudes() {
+fn near_optimal_at_mixed_altitudes() {
     let mut rng = generator(901);
     let mut tally = Tally::default();
     while tally.scenes < count(1000) {
@@ -194,7 +194,7 @@ fn at_mixed_altitudes() {
 }
 
 #[test]
-fn with_a_separation_that_binds() {
+fn near_optimal_with_a_separation() {
     let mut rng = generator(902);
     let mut tally = Tally::default();
     let mut binding = 0;
@@ -261,7 +261,7 @@ fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
 }
 
 #[test]
-fn in_uneven_fields() {
+fn near_optimal_in_uneven_fields() {
     let mut rng = generator(903);
     let mut tally = Tally::default();
     while tally.scenes < count(1000) {
@@ -279,7 +279,7 @@ fn in_uneven_fields() {
 
 /// Checks relays with different altitudes and powers in uneven fields. Half of the scenes have a least separation.
 #[test]
-fn in_uneven_fields_by_relays_that_differ() {
+fn near_optimal_in_uneven_fields_by_unlike_relays() {
     let mut rng = generator(905);
     let mut tally = Tally::default();
     while tally.scenes < count(1000) {
@@ -323,7 +323,7 @@ fn in_uneven_fields_by_relays_that_differ() {
 /// Checks that chains agree by messages on targets that they meet, with an upper bound that holds. Runs are with and
 /// without prediction and message faults.
 #[test]
-fn by_messages() {
+fn chains_agree_by_messages_on_feasible_targets() {
     let mut rng = generator(904);
     let (mut settled, mut near, mut most) = (0, 0, 0);
     while settled < 60.min(count(1000)) {

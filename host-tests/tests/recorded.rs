@@ -130,7 +130,7 @@ fn optima_of_independent_programs_are_recorded() {
 /// Checks the 2 000 numbered optima, which are recorded without positions. Forty of them were found again, with
 /// positions, from another random seed.
 #[test]
-fn the_numbered_optima_were_found_again() {
+fn the_numbered_optima_are_reproduced() {
     let stored = optima().unwrap();
     assert_eq!(stored.len(), COUNT as usize);
     for number in (17..COUNT).step_by(50) {
@@ -173,7 +173,7 @@ fn the_numbered_scenarios_are_of_many_kinds() {
 /// Checks that no random move of one or all relays improves a recorded optimum. Scenes are in the plane, with lateral
 /// offsets, with held altitudes, and in noise.
 #[test]
-fn no_move_is_better() {
+fn no_single_move_improves_an_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(35));
     let mut legal = 0;
     let scenes = |set, many| of(set).step_by(3).take(many);

@@ -27,7 +27,7 @@ fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
 
 proptest! {
     #[test]
-    fn any_way_of_reading_gives_the_same_pieces(
+    fn pieces_do_not_depend_on_the_read_sizes(
         bytes in vec(prop_oneof![1 => Just(0_u8), 3 => any::<u8>()], 0..400),
         at in vec(0..400_usize, 0..6),
     ) {
@@ -46,7 +46,7 @@ proptest! {
 }
 
 #[test]
-fn of_a_long_piece_the_begin_is_kept_and_the_length_is_told() {
+fn a_long_piece_is_cut_and_its_full_length_reported() {
     let mut noise = vec![7; 10 * MOST];
     noise.extend([0, 2, 9, 0]);
     let (pieces, rest) = pieces(&[&noise]);
@@ -56,7 +56,7 @@ fn of_a_long_piece_the_begin_is_kept_and_the_length_is_told() {
 }
 
 #[test]
-fn a_capture_holds_what_went_in() {
+fn a_capture_contains_every_written_frame() {
     let mut capture = Capture::new(Vec::new(), "a test", "of everything").unwrap();
     let ports = ["one", "two"].map(|name| capture.interface(name, "a port").unwrap());
     let ways = [Direction::In, Direction::Out, Direction::Unknown];

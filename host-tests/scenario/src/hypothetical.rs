@@ -674,7 +674,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bottom_of_a_bent_valley_is_found() {
+    fn the_minimum_of_a_curved_valley_is_found() {
         let valley = |(x, y): (f64, f64)| 1.0 + (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2);
         let found = minimise(valley, (-1.2, 1.0), (0.1, 0.1), 1e-15, 500);
         assert!(

@@ -36,7 +36,7 @@ fn relays_of_one_view_are_one_group_and_of_two_views_two() {
 type Change = fn(&mut ObservedState);
 
 #[test]
-fn who_is_off_has_no_place_or_no_lease_flies_nothing() {
+fn without_power_position_or_lease_no_relay_flies() {
     let all = || vec![seen(0, 2, 1), seen(1, 1, 1)];
     let changes: [Change; 3] = [
         |one| one.is_on = false,
@@ -55,7 +55,7 @@ fn who_is_off_has_no_place_or_no_lease_flies_nothing() {
 }
 
 #[test]
-fn all_of_a_view_have_to_hold_their_places_for_one_target() {
+fn an_agreement_needs_all_relays_of_a_view_at_one_target() {
     let all = || vec![seen(0, 2, 1), seen(0, 2, 2)];
     assert!(has_agreed(&all()));
     assert!(!has_agreed(&all()[..1]));

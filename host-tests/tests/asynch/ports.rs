@@ -151,7 +151,7 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
 }
 
 #[test]
-fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
+fn a_failed_write_is_counted_and_the_frame_sent_again() {
     let time = Time::default();
     let down = Taker {
         fails: 23,
@@ -180,7 +180,7 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
 
 /// Checks that a port that is always ready, or always fails, lets all other ports run.
 #[test]
-fn a_port_that_is_always_ready_starves_nobody() {
+fn an_always_ready_port_starves_no_other_port() {
     for fails in [false, true] {
         let time = Time::default();
         let down = Taker::until(usize::MAX);

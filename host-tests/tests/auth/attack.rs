@@ -132,11 +132,11 @@ fn count() -> u64 {
 }
 
 #[test]
-fn a_million_attacks_change_nothing() {
+fn a_million_attacks_have_no_effect() {
     under_attack(Wiring::Pair, count());
 }
 
 #[test]
-fn nor_do_they_on_a_shared_channel() {
+fn a_million_attacks_on_a_shared_channel_have_no_effect() {
     under_attack(Wiring::Shared, count() / 10);
 }

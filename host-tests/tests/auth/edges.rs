@@ -53,7 +53,7 @@ impl Link {
 }
 
 #[test]
-fn a_counter_63_behind_is_taken_once_and_64_behind_never() {
+fn a_counter_63_behind_is_accepted_once_and_64_never() {
     let mut link = Link::new();
     for (counter, raises) in [
         (1_000, "received"),
@@ -72,7 +72,7 @@ fn a_counter_63_behind_is_taken_once_and_64_behind_never() {
 }
 
 #[test]
-fn the_last_counter_is_never_taken_and_nothing_comes_after() {
+fn the_last_counter_is_never_accepted_nor_used() {
     let mut link = Link::new();
     assert_eq!(link.send_with_counter(u32::MAX), Some("replayed"));
     assert_eq!(link.send_with_counter(u32::MAX - 1), Some("received"));
@@ -85,7 +85,7 @@ fn the_last_counter_is_never_taken_and_nothing_comes_after() {
 }
 
 #[test]
-fn a_handshake_counts_its_counter_too() {
+fn a_handshakes_counter_is_used_up_too() {
     let mut link = Link::new();
     assert_eq!(link.send_with_counter(0), Some("replayed"));
     assert_eq!(link.send_with_counter(7), Some("received"));
@@ -94,7 +94,7 @@ fn a_handshake_counts_its_counter_too() {
 }
 
 #[test]
-fn nonces_only_rise() {
+fn nonces_only_increase() {
     let mut link = Link::new();
     let own = link.nonces[1];
     for (theirs, raises) in [
@@ -115,7 +115,7 @@ fn nonces_only_rise() {
 }
 
 #[test]
-fn what_is_signed_for_other_nonces_is_forged() {
+fn a_tag_for_other_nonces_counts_as_forged() {
     let mut link = Link::new();
     let [theirs, own] = link.nonces;
     for nonces in [
@@ -134,7 +134,7 @@ fn what_is_signed_for_other_nonces_is_forged() {
 
 /// Checks the warning at `Auth::epoch`: a relay with a reused epoch is ignored, and accepts old frames.
 #[test]
-fn an_epoch_used_twice_is_no_fresh_start() {
+fn a_reused_epoch_is_not_accepted_as_a_restart() {
     let mut link = Link::new();
     for counter in 1..=100 {
         assert_eq!(link.send_with_counter(counter), Some("received"));
@@ -167,7 +167,7 @@ fn epoch_0_is_refused() {
 
 /// Checks that logs do not show the key.
 #[test]
-fn a_key_is_not_shown() {
+fn debug_output_does_not_show_the_key() {
     let shown = format!("{:?}", relay(3, 2, Wiring::Pair, (4, Instant::ZERO)));
     assert!(shown.contains("Key(..)"));
     assert!(

@@ -14,7 +14,7 @@ fn is_handshake(heard: &RecordedFrame) -> bool {
 
 /// Checks that replayed handshakes change no position, even while relays authenticate each other again.
 #[test]
-fn recorded_handshakes_at_any_time_change_no_place() {
+fn replayed_handshakes_change_no_position() {
     let mut events = vec![(6_000, ScheduledEvent::Reboot(4))];
     for second in 7..30 {
         let index = 1 + second * 5 % 8;
@@ -70,7 +70,7 @@ fn recorded_handshakes_at_any_time_change_no_place() {
 
 /// Checks that a booted relay accepts each recorded handshake at most once, and then the genuine one.
 #[test]
-fn recorded_handshakes_are_answered_once_each_and_overtaken() {
+fn replayed_handshakes_are_answered_once_and_superseded() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     for start in 2..=9 {
         net.run(Instant::from_millis(u64::from(start) * 1_000));
@@ -113,7 +113,7 @@ fn recorded_handshakes_are_answered_once_each_and_overtaken() {
 /// Checks that a relay deceived by a replayed handshake authenticates its neighbour all the same. The relay has
 /// answered the replay, and its answer is lost.
 #[test]
-fn a_relay_that_took_a_recorded_handshake_finds_out() {
+fn a_relay_recovers_from_a_replayed_handshake() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     net.run(Instant::from_millis(1_000));
     let old = net
@@ -140,7 +140,7 @@ fn a_relay_that_took_a_recorded_handshake_finds_out() {
 
 /// Checks that replayed handshakes do not keep a silent neighbour from being declared lost.
 #[test]
-fn a_silent_neighbour_is_lost_whatever_is_played_back() {
+fn a_silent_neighbour_is_lost_despite_replays() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     for start in 2..=60 {
         net.run(Instant::from_millis(u64::from(start) * 1_000));

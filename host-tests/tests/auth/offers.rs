@@ -107,7 +107,7 @@ impl Attacker {
 
 /// Checks that a chain without a key accepts no mission, neither from the ground nor from neighbours.
 #[test]
-fn a_chain_without_tags_takes_no_mission_from_anybody() {
+fn a_chain_without_tags_accepts_no_offer() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let settings = Settings {
             wiring,
@@ -146,7 +146,7 @@ fn a_chain_without_tags_takes_no_mission_from_anybody() {
 
 /// Checks that recorded, altered or forged answers do not complete an upload at the ground station.
 #[test]
-fn the_ground_is_not_told_lies_either() {
+fn the_ground_station_ignores_forged_frames() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let events = [(6_000, ScheduledEvent::Upload(Side::Upstream, 1))];
         let mut net = Net::new(8, wiring, &events);

@@ -21,7 +21,7 @@ fn number(rng: &mut ChaCha8Rng) -> f32 {
 }
 
 #[test]
-fn no_target_leaves_that_is_not_finite_and_near() {
+fn every_target_sent_is_finite_and_near() {
     let mut sent = 0;
     for seed in 0..RUNS {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -101,7 +101,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
 /// Checks that of two commands that arrive at once, the second is ignored until it is repeated. A cable or a router
 /// can deliver two commands together.
 #[test]
-fn two_commands_at_once_are_obeyed_one_after_the_other() {
+fn simultaneous_commands_are_obeyed_in_sequence() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
     for (side, node) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
         vehicle

@@ -133,7 +133,7 @@ fn an_engaged_drone_flies_to_its_relays_setpoint() {
 /// Checks that the autopilot link passes the radio's noise sample to the relay. A relay that does not measure
 /// interference counts the sample as rejected.
 #[test]
-fn a_relay_is_handed_what_the_radio_hears() {
+fn exchange_passes_the_radios_noise_to_the_relay() {
     let (mut vehicle, mut relay) = flies(Kind::ArduCopter, Settings::default());
     assert_eq!(relay.stats().samples_rejected, 0);
     let said = RADIO_STATUS_DATA {
@@ -166,7 +166,7 @@ fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_si
 }
 
 #[test]
-fn a_relay_is_handed_the_side_that_an_operator_clears() {
+fn exchange_passes_an_operators_clearance_to_the_relay() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.armed = true;
@@ -211,7 +211,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
 
 /// Checks that a drone on the wrong side of its neighbour cannot come under setpoint control.
 #[test]
-fn a_drone_out_of_order_cannot_be_engaged() {
+fn a_drone_out_of_sequence_cannot_be_engaged() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.armed = true;

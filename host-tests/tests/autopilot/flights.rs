@@ -388,7 +388,7 @@ fn fly(seed: u64) -> (Vec<String>, u32, bool) {
 }
 
 #[test]
-fn nothing_is_engaged_without_a_pilots_choice() {
+fn setpoint_control_needs_the_pilots_choice() {
     let first = uav_relay_oracle::random::seed(1);
     let count = std::env::var("COUNT").ok();
     let count: u64 = count.and_then(|text| text.parse().ok()).unwrap_or(1_000);

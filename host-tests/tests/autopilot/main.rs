@@ -19,7 +19,7 @@ use uav_relay::{Instant, Placement};
 use vehicle::{LinkMessage, Mode, Vehicle, place};
 
 #[test]
-fn an_autopilot_is_found_and_asked_for_its_messages() {
+fn an_autopilot_is_found_and_its_messages_requested() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut vehicle = Vehicle::new(kind);
         vehicle.run(2_000);
@@ -57,7 +57,7 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
 
 /// Checks that polling at the last representable instants yields few frames, so that a poll loop ends.
 #[test]
-fn the_frames_of_one_instant_end_at_the_last_instant_too() {
+fn poll_transmit_ends_at_the_latest_instant_too() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         for before_us in [0, 1, 1_000_000] {
             let mut vehicle = Vehicle::new(kind);
@@ -74,7 +74,7 @@ fn the_frames_of_one_instant_end_at_the_last_instant_too() {
 }
 
 #[test]
-fn messages_that_come_too_seldom_are_asked_for_again() {
+fn infrequent_messages_are_requested_again() {
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.run(6_000);
     let before = vehicle.intervals(33);
@@ -89,7 +89,7 @@ fn messages_that_come_too_seldom_are_asked_for_again() {
 }
 
 #[test]
-fn heartbeats_of_others_are_not_the_mode() {
+fn heartbeats_of_other_systems_do_not_set_the_mode() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.engage();
     vehicle.run(3_000);
@@ -106,7 +106,7 @@ fn heartbeats_of_others_are_not_the_mode() {
 }
 
 #[test]
-fn a_plane_is_no_copter() {
+fn a_plane_is_not_taken_for_a_copter() {
     // Mode 4 of an ArduPlane is ACRO.
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.mute = true;
@@ -119,7 +119,7 @@ fn a_plane_is_no_copter() {
 }
 
 #[test]
-fn positions_are_as_old_as_the_autopilot_says() {
+fn the_age_of_a_position_is_that_of_the_autopilots_clock() {
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.run(3_000);
     vehicle.late_ms = 130;
@@ -164,7 +164,7 @@ fn without_a_position_the_last_target_is_kept() {
 }
 
 #[test]
-fn an_autopilot_that_is_switched_off_and_on_is_asked_anew() {
+fn a_restarted_autopilot_is_sent_its_requests_again() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut vehicle = Vehicle::flying(kind);
         vehicle.engage();
@@ -186,7 +186,7 @@ fn an_autopilot_that_is_switched_off_and_on_is_asked_anew() {
 }
 
 #[test]
-fn numbers_for_the_operator_come_once_a_second() {
+fn operator_values_are_sent_once_a_second() {
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.run(2_000);
     vehicle
@@ -220,7 +220,7 @@ fn numbers_for_the_operator_come_once_a_second() {
 }
 
 #[test]
-fn the_setpoint_of_before_is_forgotten_on_none() {
+fn a_withdrawn_setpoint_is_not_flown_again() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.setpoint = Some(Placement::on_line(900.0, 20.0));
     vehicle.engage();
@@ -239,7 +239,7 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
 
 /// Checks that a setpoint that is not finite or too far away does not end the stream of targets.
 #[test]
-fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
+fn a_drone_without_a_setpoint_holds_until_the_next_one() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut vehicle = Vehicle::engaged(kind, 110.0);
         for wrong in [f32::NAN, f32::INFINITY, 1e9] {
@@ -257,7 +257,7 @@ fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
 
 /// Checks that targets have no yaw if the bearing to be pointed at is not a valid angle.
 #[test]
-fn a_bearing_that_is_none_is_left_out() {
+fn a_bearing_of_none_is_left_out() {
     use uav_relay::pointing::Bearing;
 
     let mut vehicle = Vehicle::engaged(Kind::Px4, 110.0);
@@ -304,7 +304,7 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
 
 /// Checks that a new membership view or mission is reported to the operator once. Only drones in flight report it.
 #[test]
-fn the_operator_reads_of_a_view_and_a_mission_once() {
+fn a_view_and_a_mission_are_reported_to_the_operator_once() {
     use uav_relay::Event;
     use uav_relay::HoldReason::Unheard;
 
@@ -360,7 +360,7 @@ fn the_operator_reads_of_a_view_and_a_mission_once() {
 
 /// Checks that the operator is not told of reasons to wait that change while an agreement spreads.
 #[test]
-fn a_reason_that_does_not_last_is_not_told() {
+fn a_short_hold_reason_is_not_reported() {
     use uav_relay::HoldReason::Close;
 
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
@@ -380,7 +380,7 @@ fn a_reason_that_does_not_last_is_not_told() {
 }
 
 #[test]
-fn the_operator_reads_why_the_guard_holds_the_relay_back() {
+fn the_operator_gets_the_guards_hold_reason() {
     use uav_relay::HoldReason::{Order, Unheard};
 
     let mut vehicle = Vehicle::new(Kind::ArduCopter);

@@ -653,7 +653,7 @@ fn fly(seed: u64) -> Report {
 }
 
 #[test]
-fn drones_that_begin_anywhere_come_no_nearer_than_they_may() {
+fn drones_that_begin_anywhere_keep_their_separation() {
     let first = seed(1);
     let count = crate::count();
     let all: Vec<(u64, Report)> = (first..first + count)

@@ -18,7 +18,7 @@ pub(crate) const LONGEST: u32 = 8;
 pub(crate) struct Signs {
     /// Number and time of every heartbeat request to the neighbour.
     pub(crate) asked: Vec<(u16, Instant)>,
-    /// Last time when the neighbour was certainly alive. `perhaps` is the last time when it may have been.
+    /// Last time when the neighbour was certainly alive. `possibly_alive` is the last time when it may have been.
     pub(crate) certainly_alive: Instant,
     pub(crate) possibly_alive: Instant,
     /// Time at which the last possible sign of life was received.

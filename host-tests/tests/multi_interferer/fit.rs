@@ -38,7 +38,7 @@ fn count(case: &Case, name: &str) -> u32 {
 /// Compares the single interferer fitted to several ones with values of a separate program. That program integrates
 /// errors by the midpoint rule on nx x nh cells.
 #[test]
-fn the_cases_of_a_separate_program_are_met() {
+fn the_fit_agrees_with_the_reference_program() {
     let cases = cases::of("hyp_msi").unwrap();
     assert_eq!(cases.len(), 2);
     for case in cases {
@@ -84,7 +84,7 @@ fn one_source_is_its_own_hypothetical_interferer() {
 }
 
 #[test]
-fn equal_sources_at_one_place_are_one_of_their_common_power() {
+fn equal_sources_at_one_position_are_one_of_their_sum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(73));
     for copies in 2..=5_u32 {
         let mut scene = scene(&mut rng, 1..=1, 1..=1);
@@ -182,7 +182,7 @@ fn extreme_scenes_have_a_finite_fit() {
 /// Checks that the fitted interferer is on the true ones' side if lateral offsets are permitted. Without lateral
 /// offsets, its side is always positive.
 #[test]
-fn with_room_beside_the_line_the_side_is_known() {
+fn with_lateral_range_the_fit_is_on_the_right_side() {
     let source = |x_m: f64, y_m: f64| Source {
         power_w: 50.0,
         x_m,

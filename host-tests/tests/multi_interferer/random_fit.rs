@@ -15,7 +15,7 @@ const DRAWN: usize = 20_000;
 const WEIGHED: usize = 100;
 
 #[test]
-fn no_random_place_is_better() {
+fn no_random_position_fits_better() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(75));
     let mut nearest = f64::INFINITY;
     for at in 0..20 {

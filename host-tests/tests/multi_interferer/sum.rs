@@ -64,7 +64,7 @@ fn alone(scene: &Scene, source: &Source) -> Link {
 }
 
 #[test]
-fn a_scene_is_what_the_scenario_says() {
+fn a_scene_has_the_scenarios_values() {
     let mut scenario = Scenario {
         altitude_max_m: 300.0,
         ..Scenario::default()

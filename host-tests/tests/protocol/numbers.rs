@@ -40,7 +40,7 @@ fn requests_view(relay: &mut Relay, now: Instant) -> bool {
 }
 
 #[test]
-fn only_the_next_number_is_new_and_those_before_are_over() {
+fn only_the_next_pass_number_is_new() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     let number = sweep_in(&sweep).number;
     assert!(number.is_multiple_of(64), "{number}");
@@ -77,7 +77,7 @@ fn only_the_next_number_is_new_and_those_before_are_over() {
 }
 
 #[test]
-fn the_first_pass_of_another_life_is_never_the_next_one() {
+fn the_first_pass_after_a_reboot_is_never_the_next_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     // The chain is `last` passes beyond its first; the next first number is 64 after it.
     for last in [32, 62, 63] {
@@ -98,7 +98,7 @@ fn the_first_pass_of_another_life_is_never_the_next_one() {
 /// Checks that a rebooted relay takes no part in a later pass. Before, it has received a delayed copy of the first
 /// pass.
 #[test]
-fn a_pass_that_was_held_up_lets_nobody_into_a_later_one() {
+fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(3), 1));
     let mut rebooted = relay(mission(3), 2);
     again(&mut rebooted, &sweep, now, 0);
@@ -137,7 +137,7 @@ fn the_same_number_with_other_content_is_another_pass() {
 }
 
 #[test]
-fn the_fourth_straggler_in_a_row_is_a_leader_that_insists() {
+fn the_fourth_late_pass_in_a_row_requests_a_view() {
     let (mut now, sweep) = first_sweep(&mut relay(mission(2), 1));
     let mut tail = after_two(&sweep, now, 1);
     for round in 0..3 {
@@ -161,7 +161,7 @@ fn the_fourth_straggler_in_a_row_is_a_leader_that_insists() {
 }
 
 #[test]
-fn a_relay_that_missed_the_beginning_calls_for_another() {
+fn a_relay_that_missed_the_first_pass_requests_a_view() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     for (off, first) in [
         (0, true),

@@ -83,7 +83,7 @@ fn last_setpoint(lines: &[Line], drone: u16) -> Option<[u32; 3]> {
 }
 
 #[test]
-fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_does() {
+fn three_drones_locate_an_interferer_like_the_simulation() {
     let flight = Flight::new(&unknown(), RELAYS, 1e-4, 7).unwrap();
     assert_eq!(
         flight.mission().config().interference,

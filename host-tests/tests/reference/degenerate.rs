@@ -97,7 +97,7 @@ fn degenerate_reaches_are_right() {
 /// Checks a chain in which relay 1 must not go as far as possible. There it would be too close to the interferer for
 /// relay 2's altitude.
 #[test]
-fn going_farthest_is_not_best_at_different_altitudes() {
+fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
     let link = Link {
         distance_m: 2224.8,
         tx_w: 22.15,

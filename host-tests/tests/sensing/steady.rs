@@ -13,7 +13,7 @@ use crate::wrong::{named, share};
 
 /// Checks that a static world leads to at most five new agreements in an hour of measurements.
 #[test]
-fn a_still_world_becomes_silent() {
+fn with_a_fixed_interferer_estimates_stop_changing() {
     let seeds: Vec<u64> = (0..count(12)).collect();
     let found: Vec<u32> = seeds
         .into_par_iter()
@@ -41,7 +41,7 @@ fn a_still_world_becomes_silent() {
 }
 
 #[test]
-fn under_faults_all_believe_the_same_to_the_bit() {
+fn under_faults_all_estimates_are_equal_to_the_bit() {
     let seeds: Vec<u64> = (0..count(20)).collect();
     let mut shares: Vec<f64> = seeds
         .into_par_iter()
@@ -70,7 +70,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
 /// Checks that a chain of eight detects one wrong sensor and ignores it. The sensor is wrong from the start or from
 /// 40 s on.
 #[test]
-fn a_broken_sensor_is_named_and_left_out() {
+fn a_broken_sensor_is_reported_and_excluded() {
     for (off_db, since_s) in [
         (10.0, 0),
         (-10.0, 0),

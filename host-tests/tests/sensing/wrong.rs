@@ -109,7 +109,7 @@ fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync)
 }
 
 #[test]
-fn one_wrong_relay_costs_next_to_nothing() {
+fn one_wrong_sensor_of_a_relay_costs_little_sir() {
     for relays in [5, 8] {
         let of = |seed| 1 + (seed % u64::from(relays)) as u16;
         hold(relays, &sound(relays), "a relay", of);
@@ -117,7 +117,7 @@ fn one_wrong_relay_costs_next_to_nothing() {
 }
 
 #[test]
-fn a_wrong_end_costs_next_to_nothing() {
+fn one_wrong_sensor_of_tx_or_rx_costs_little_sir() {
     for relays in [5, 8] {
         let sound = sound(relays);
         hold(relays, &sound, "the receiver", |_| relays + 1);
@@ -128,7 +128,7 @@ fn a_wrong_end_costs_next_to_nothing() {
 /// Checks that one or two relays never blame another sensor, and report that no interferer fits. Three or four relays
 /// may blame another one in 2 % of the scenes.
 #[test]
-fn a_short_chain_seldom_names_another_sensor() {
+fn a_short_chain_seldom_accuses_a_correct_sensor() {
     for relays in [1, 2, 3, 4] {
         for (what, says) in KINDS {
             let one = |seed: usize| {
@@ -154,7 +154,7 @@ fn a_short_chain_seldom_names_another_sensor() {
 }
 
 #[test]
-fn sensors_that_are_right_are_not_named() {
+fn correct_sensors_are_not_accused() {
     let mut all = 0;
     for relays in [5, 8, 3, 2, 1, 20] {
         let each: Vec<(Vec<u16>, f64)> = (0..count(24))

@@ -70,7 +70,7 @@ fn parts<'a>(
 }
 
 #[test]
-fn without_room_beside_the_line_there_is_one_view() {
+fn without_lateral_range_there_is_one_view() {
     let svg = draw(&level(8));
     let document = Document::parse(&svg).unwrap();
     assert!(!has_text(&document, "from above") && !has_text(&document, "y (m)"));
@@ -80,7 +80,7 @@ fn without_room_beside_the_line_there_is_one_view() {
 /// Checks the view from above of an interferer beside a straight chain. In a side view it would seem to be below the
 /// chain.
 #[test]
-fn an_interferer_beside_the_line_is_seen_beside_it() {
+fn the_view_from_above_shows_an_interferer_at_its_offset() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();
     let picture = level(8);
     for (y, sign) in [(400.0, 1.0), (-400.0, -1.0)] {
@@ -278,7 +278,7 @@ fn a_short_chain_has_every_number_in_both_views() {
 }
 
 #[test]
-fn hostile_rooms_still_make_a_picture() {
+fn extreme_lateral_views_still_make_a_picture() {
     for view in [
         LateralView::default(),
         LateralView {

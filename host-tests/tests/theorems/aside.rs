@@ -92,7 +92,7 @@ const CASES: [&str; 8] = [
 
 type Draw = fn(&mut ChaCha8Rng) -> LateralScene;
 
-/// Checks a relay at a given altitude with lateral offsets. All cases must occur but those of `but`.
+/// Checks a relay at a given altitude with lateral offsets. All cases must occur but those of `absent`.
 fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -122,12 +122,12 @@ fn anywhere(seed: u64, draw: Draw, cases: &[&str]) {
 }
 
 #[test]
-fn a_relay_aside_at_its_altitude_is_no_worse_than_brute_force() {
+fn a_relay_at_its_altitude_beats_brute_force() {
     at_its_altitude(511, LateralScene::random, &["Edge(Upward)"]);
 }
 
 #[test]
-fn at_its_altitude_in_noise_it_is_no_worse_than_brute_force() {
+fn a_relay_at_its_altitude_in_noise_beats_brute_force() {
     at_its_altitude(531, LateralScene::noisy, &["Edge(Upward)", "Level"]);
 }
 
@@ -177,7 +177,7 @@ fn one_relay_aside_has_the_recorded_optimum() {
 /// Checks that the solution without lateral offsets is that of Theorems 1 and 3. Permitted offsets never make it
 /// worse.
 #[test]
-fn without_room_it_is_theorems_1_and_3() {
+fn without_lateral_range_it_is_theorems_1_and_3() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(514));
     for _ in 0..10_000 {
         let scene = Scene::random(&mut rng);

@@ -96,7 +96,7 @@ fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Measu
 }
 
 #[test]
-fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
+fn every_schedule_ends_in_one_whole_chain_within_120_s() {
     let first = number("SEED", 1);
     let count = number("COUNT", 150);
     let all = flown_all(first, count, random);
@@ -135,7 +135,7 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
 ///
 /// Two chains can fly only where a copy is on either side of a cut, because each copy has its vote.
 #[test]
-fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
+fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
     let all = flown_all(first, count, with_copy);
     let mut faults = Vec::new();
@@ -166,7 +166,7 @@ fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
 /// Their causes are view numbers far ahead, an idle neighbour that is switched on elsewhere, two interleaved chains,
 /// and two candidates for one position that are received in turn.
 #[test]
-fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
+fn schedules_that_once_got_stuck_end_in_one_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
         let found = flown(seed, &without_steps(seed));
         assert!(
@@ -205,7 +205,7 @@ fn a_radio_that_was_off_for_hours_joins_again_within_120_s() {
 }
 
 #[test]
-fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
+fn a_drone_switched_on_hours_early_joins_within_120_s() {
     let mut late = Vec::new();
     for (relays, early) in [(2, 1), (4, 0), (4, 3), (6, 2)] {
         for minutes in [10, 25, 120] {
@@ -232,7 +232,7 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
 /// Checks that a chain recovers if one relay has a stored vote with a far later view number. The vote is from an
 /// earlier flight.
 #[test]
-fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
+fn a_relay_with_far_later_views_joins_within_120_s() {
     for (relays, later) in [(2_u16, 1), (4, 0), (5, 2), (8, 7)] {
         for number in [257, 3_000, 20_000, 100_000] {
             let schedule = Schedule::of(relays, 1);
@@ -297,7 +297,7 @@ fn clocks_that_step_back_leave_one_whole_chain() {
 /// Checks clocks that step forward. A step ends the wait for others' leases early, so that two chains may fly until
 /// these expire.
 #[test]
-fn clocks_that_step_forward_leave_a_whole_chain_and_seldom_two_for_a_while() {
+fn clocks_that_step_forward_seldom_split_the_chain() {
     let (count, late, two) = with_steps(true);
     assert!(late.is_empty());
     assert!(two.len() as u64 * 100 <= count);

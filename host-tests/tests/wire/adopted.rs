@@ -72,7 +72,7 @@ fn a_granted_view_flies_the_mission_of_its_proposal() {
 }
 
 #[test]
-fn a_decision_of_the_flown_mission_is_taken_of_others_not() {
+fn only_a_decision_of_the_flown_mission_is_accepted() {
     let (mut met, flown) = adopted();
     met.events();
     met.receive(0, &proposed(id(2, 1), mission_id(&flown), 3, 8));
@@ -99,7 +99,7 @@ fn a_decision_of_the_flown_mission_is_taken_of_others_not() {
 }
 
 #[test]
-fn in_a_field_no_upload_is_held() {
+fn in_a_field_no_upload_is_stored() {
     let mission = MissionConfig {
         interference: Interference::Field(FIELD),
         ..paper(8)
@@ -112,7 +112,7 @@ fn in_a_field_no_upload_is_held() {
 }
 
 #[test]
-fn a_stored_mission_is_held_and_flown_after_a_reboot() {
+fn a_stored_mission_is_flown_after_a_reboot() {
     let (met, newer) = adopted();
     let mut bytes = [0; KEPT];
     met.upload().unwrap().encode(&mut bytes).unwrap();

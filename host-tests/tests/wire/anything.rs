@@ -280,20 +280,20 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
 }
 
 #[test]
-fn any_messages_leave_a_relay_in_bounds() {
+fn any_messages_keep_a_relay_within_its_limits() {
     led_by_anything(source(), 4, &["verdict", "turn", "view"]);
     led_by_anything(source(), 1, &[]);
     led_by_anything(source(), 8, &["work", "view"]);
 }
 
 #[test]
-fn any_messages_leave_a_relay_on_the_line_in_bounds() {
+fn any_messages_keep_a_relay_on_the_line_in_its_limits() {
     led_by_anything(paper(8), 4, &["verdict", "view"]);
     led_by_anything(paper(8), 8, &["sweep at the last", "view"]);
 }
 
 #[test]
-fn any_messages_leave_a_relay_in_a_field_in_bounds() {
+fn any_messages_keep_a_relay_in_a_field_in_its_limits() {
     let field = mission(Interference::Field(FIELD));
     led_by_anything(field, 4, &["verdict", "view"]);
     led_by_anything(field, 1, &["sweep at the last", "view"]);

@@ -40,7 +40,7 @@ fn a_part_without_quorum_stops_requesting_views() {
 /// Checks that a leader without a quorum proposes again, after ever longer waits. The first one is `probe_after`; it
 /// doubles with each refusal, up to eight times.
 #[test]
-fn a_leader_without_quorum_proposes_again_ever_later() {
+fn a_leader_without_quorum_proposes_at_growing_intervals() {
     let mut head = Bench::new(1, 8, Wiring::Pair);
     let mission = head.mission;
     head.receive(
@@ -86,7 +86,7 @@ fn a_leader_without_quorum_proposes_again_ever_later() {
 /// Checks that a hello is answered by a hello only if it requests one. A view number far ahead of the relay's own is
 /// approached in limited steps.
 #[test]
-fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
+fn a_hello_is_answered_by_a_hello_on_request() {
     for (asks, newest, known) in [
         (false, 0, 0),
         (true, 0, 0),

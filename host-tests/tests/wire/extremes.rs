@@ -111,7 +111,7 @@ fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut BoundsSeen) {
 }
 
 #[test]
-fn the_vectors_hold_both_bounds_of_every_field() {
+fn the_vectors_contain_both_bounds_of_every_field() {
     let (mut seen, mut all) = (BoundsSeen::new(), BoundsSeen::new());
     for layout in &FORMAT.messages {
         for field in &layout.fields {

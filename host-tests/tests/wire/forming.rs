@@ -148,7 +148,7 @@ fn a_member_adds_its_vote() {
 /// Checks that the last relay decides again for a view that was accepted and may have been agreed on. A view is the
 /// agreed membership of the chain.
 #[test]
-fn a_view_that_may_have_been_agreed_on_is_decided_again() {
+fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);
     let of = (last.mission, 0);
     // Proposal by which the view of relay 3 was decided, and its size.

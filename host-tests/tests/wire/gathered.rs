@@ -124,7 +124,7 @@ fn a_full_roster_is_continued_by_the_next_pass() {
 /// Checks that a relay that does not know the collected profiles refuses a pass and requests a view. Such a relay has
 /// missed a collection, for example by a reboot.
 #[test]
-fn a_pass_of_unknown_profiles_is_stale_and_asks_for_a_view() {
+fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
     let fresh = fourth(false);
     let asked = |message: &WireMessage| message.is("Hello") && message.has(FORMS);
     let first = of(&fresh, "Gather", FIRST, 0, &[2]);

@@ -24,7 +24,7 @@ const fn wiring(port: Port) -> Wiring {
 }
 
 #[test]
-fn ground_stations_offer_and_ask_and_are_told() {
+fn ground_stations_offer_request_and_get_replies() {
     for (own, ground, port) in [
         (1, 0, Port::Upstream),
         (8, 9, Port::Downstream),
@@ -90,7 +90,7 @@ fn messages_that_the_ground_may_not_send_are_misaddressed() {
 }
 
 #[test]
-fn the_ground_is_heard_by_the_nearest_with_a_key_alone() {
+fn only_near_relays_with_a_key_accept_the_ground() {
     for (own, ground, port) in [
         (2_u16, 0, Port::Upstream),
         (7, 9, Port::Downstream),

@@ -64,7 +64,7 @@ fn a_fused_multiply_add_would_give_other_bits() {
 }
 
 #[test]
-fn the_gap_codes_are_what_the_document_says() {
+fn the_gap_codes_follow_the_document() {
     for gap in 1..=u8::MAX {
         let (e, m) = (i32::from(gap >> 3), f32::from(gap & 7));
         let value = (1.0 + m / 8.0) * 2_f32.powi(e - 25);

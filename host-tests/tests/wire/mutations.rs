@@ -124,7 +124,7 @@ impl VerdictCounts {
 }
 
 #[test]
-fn any_number_at_any_offset_is_judged_as_the_tables_say() {
+fn numbers_at_any_offset_are_checked_as_in_the_tables() {
     let mut seen = VerdictCounts::default();
     for vector in vectors().frames {
         let (name, body) = (&vector.name, &vector.body);
@@ -162,7 +162,7 @@ fn any_number_at_any_offset_is_judged_as_the_tables_say() {
 }
 
 #[test]
-fn damaged_bodies_are_judged_as_the_tables_say() {
+fn damaged_bodies_are_checked_as_in_the_tables() {
     let mut seen = VerdictCounts::default();
     for vector in vectors().frames {
         let (name, body) = (&vector.name, &vector.body);

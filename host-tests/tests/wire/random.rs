@@ -83,7 +83,7 @@ proptest! {
     #![proptest_config(config(8000))]
 
     #[test]
-    fn any_body_is_judged_by_the_tables(
+    fn any_body_is_checked_as_in_the_tables(
         body in bodies(),
         noise in vec(any::<u8>(), 0..300),
     ) {
@@ -95,7 +95,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_with_a_good_crc_are_judged_by_the_tables(
+    fn any_bytes_with_a_good_crc_are_checked_as_in_the_tables(
         bytes in vec(any::<u8>(), 0..240),
         version in prop_oneof![3 => Just(Some(0x10)), 1 => Just(None)],
         flags in prop_oneof![3 => Just(Some(0)), 1 => Just(Some(0x10)), 1 => Just(None)],
@@ -137,7 +137,7 @@ proptest! {
 }
 
 #[test]
-fn the_draws_reach_messages_and_both_refusals() {
+fn random_bodies_reach_messages_and_both_errors() {
     /// First unused message tag; all later tags are counted with it.
     const NONE: usize = 21;
 
@@ -163,7 +163,7 @@ fn the_draws_reach_messages_and_both_refusals() {
 }
 
 #[test]
-fn node_numbers_that_do_not_fit_are_not_written() {
+fn node_numbers_out_of_range_are_not_encoded() {
     let message = Message::Busy { number: 1 };
     for (number, fits) in [(4094, true), (4095, false), (4096, false), (65535, false)] {
         for [sender, destination] in [[number, 2], [1, number]] {
@@ -181,7 +181,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
 
 /// Checks that a sweep message with a joint solution is encoded as `Aside`, without measured values.
 #[test]
-fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
+fn joint_sweeps_are_asides_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {
         number: 1,
         view_digest: 2,

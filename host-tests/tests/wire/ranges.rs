@@ -31,7 +31,7 @@ fn is_accepted(body: &[u8]) -> bool {
 /// Checks that an offer is refused if its relays do not fit on the line with its least separation. It tries f32
 /// separations around the limit.
 #[test]
-fn an_offer_needs_room_for_its_relays() {
+fn an_offer_needs_space_for_its_relays() {
     let mut seen = [0; 2];
     for relays in [2_u16, 3, 8, 9, 100, 333, 1000] {
         for distance_m in [1.0_f32, 35.7, 1000.0, 99_999.0] {

@@ -176,7 +176,7 @@ fn every_frame_is_counted_once() {
 }
 
 #[test]
-fn bytes_at_a_port_that_is_not_wired_are_dropped() {
+fn bytes_at_an_unused_port_are_dropped() {
     let all = &[Port::Upstream, Port::Downstream, Port::Shared];
     for wiring in [Wiring::Pair, Wiring::Shared] {
         fed_with_anything(paper(8).interference, 4, wiring, all, &["received"]);

@@ -86,7 +86,7 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
 }
 
 #[test]
-fn a_sweep_goes_the_way_of_the_mission_and_its_verdict_back() {
+fn a_sweep_goes_from_the_leader_and_its_verdict_back() {
     for config in missions() {
         for kind in [0, 4] {
             let (mut bench, from, to) = relay_4(config);
@@ -137,7 +137,7 @@ fn a_token_is_forwarded_and_its_result_returned() {
 /// kind, and passes that are over. Tokens (messages of Algorithm 2) are stale without a position, in a field, or
 /// beyond Rx.
 #[test]
-fn what_is_not_awaited_or_does_not_fit_is_stale() {
+fn unexpected_or_unfit_messages_are_stale() {
     for config in missions() {
         for with_sweep in [false, true] {
             let (mut bench, from, to) = relay_4(config);
@@ -168,7 +168,7 @@ fn what_is_not_awaited_or_does_not_fit_is_stale() {
 
 /// Checks a pass in a field by which the sender would have to be beyond Rx: no target SIR can be met.
 #[test]
-fn a_reach_from_beyond_rx_is_of_no_use() {
+fn a_reach_beyond_rx_leaves_no_feasible_target() {
     let (mut bench, from, to) = relay_4(mission(Interference::Field(FIELD)));
     let beyond = json!({ "reach_m": [1000.0_f32.next_up()] });
     let sweep = one_of_each(FIRST, bench.mission)[0].with(beyond);

@@ -26,7 +26,7 @@ fn hello_choosing(bench: &Bench, neighbour: u16) -> WireMessage {
 /// Checks that a relay on a shared channel accepts hellos of the four nearest nodes on each side. Other frames of
 /// nodes that are not its neighbours count as misaddressed.
 #[test]
-fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
+fn on_a_channel_the_four_nearest_of_each_side_are_received() {
     for sender in 0..=14_u16 {
         let (bench, sweep) = sixth();
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
@@ -59,7 +59,7 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
 
 /// Checks a neighbour that reports no neighbour of its own. Messages to it wait until it chooses this relay again.
 #[test]
-fn a_neighbour_back_with_a_newer_view_makes_the_relay_ask() {
+fn a_returning_neighbours_newer_view_causes_a_request() {
     for (newest, calls) in [(0, false), (id(5, 1), true)] {
         let (mut bench, _) = sixth();
         let mission = bench.mission;
@@ -77,7 +77,7 @@ fn a_neighbour_back_with_a_newer_view_makes_the_relay_ask() {
 /// Checks that a relay holds a received pass back while its next neighbour has chosen another node. It forwards the
 /// pass afterwards.
 #[test]
-fn a_pass_waits_for_a_neighbour_that_takes_another() {
+fn a_pass_waits_for_a_neighbour_busy_with_another() {
     let (mut bench, sweep) = sixth();
     bench.receive(AIR, &hello_choosing(&bench.clone(), 5));
     assert_eq!(bench.receive_from(5, AIR, &sweep), []);

@@ -30,7 +30,7 @@ fn an_offer_to_a_node_without_a_key_is_only_counted() {
 }
 
 #[test]
-fn a_newer_mission_is_held_and_offered_and_a_view_requested() {
+fn a_newer_mission_is_stored_offered_and_a_view_requested() {
     for (side, from, other) in [(0, 3, 5), (1, 5, 3)] {
         let mut met = SignedBench::fourth();
         let base = met.base;
@@ -92,7 +92,7 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
 /// Checks that a relay with sites refuses a mission of another length, and reports it once. The length of a line
 /// between the sites is fixed.
 #[test]
-fn a_relay_with_sites_refuses_another_distance_and_tells_once() {
+fn a_relay_with_sites_refuses_another_distance_once() {
     let refused = Event::UploadRefused {
         why: LineError::Distance,
     };
@@ -178,7 +178,7 @@ fn a_hello_of_an_older_mission_is_answered_by_an_offer() {
 }
 
 #[test]
-fn a_proposal_of_a_mission_that_is_not_held_leads_to_a_hello() {
+fn a_proposal_of_an_unknown_mission_leads_to_a_hello() {
     let mut met = SignedBench::fourth();
     let base = met.base;
     let newer = mission_id(&upload(2, base));

@@ -91,7 +91,7 @@ fn passes_have_the_digest_of_their_view() {
 /// Checks that a relay requests a new membership view when it receives a pass of another view. Both views are of the
 /// same mission.
 #[test]
-fn a_pass_of_another_view_has_the_relay_ask_for_one() {
+fn a_pass_of_another_view_causes_a_view_request() {
     let (mut bench, own) = in_view(id(2, 1));
     for port in [UP, DOWN] {
         bench.receive(port, &loaded_hello(0, bench.mission, 4, 0));
@@ -152,7 +152,7 @@ fn a_late_proposal_of_an_old_view_changes_nothing() {
 }
 
 #[test]
-fn a_view_request_is_forwarded_unless_it_is_of_an_older_view() {
+fn a_view_request_is_forwarded_unless_its_view_is_older() {
     let view = id(3, 2);
     let (bench, _) = in_view(view);
     for (newest, fresh, calls) in [
@@ -178,7 +178,7 @@ fn a_view_request_is_forwarded_unless_it_is_of_an_older_view() {
 /// Checks that an accepted membership view counts as agreed only after a pass or lease renewal in it. All members
 /// have accepted it then.
 #[test]
-fn a_view_counts_once_a_pass_or_renewal_of_it_has_come() {
+fn a_view_counts_after_its_first_pass_or_renewal() {
     let view = id(3, 2);
     let (bench, own) = in_view(view);
     let of = (bench.mission, 0);

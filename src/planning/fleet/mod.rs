@@ -57,7 +57,7 @@ impl Fewest {
     /// Returns the minimum number of relays for `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR above 0.
     ///
     /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive count if
-    /// `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay,
+    /// `proven`: `the_fewest_are_those_of_an_exhaustive_search` in `host-tests/tests/fleet/`. Work: with one interferer a reach for each relay,
     /// and all of them again with a minimum separation; in a field at most 32 chains of equal relays.
     ///
     /// `None` if no number of relays meets it; [`Most::of`] returns the best that they can meet.
@@ -306,7 +306,7 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
 /// Returns the highest target (linear, to an f32's step) of the mission's N equal relays in its field.
 ///
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
-/// `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
+/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
 /// each three square roots for every point of the field and relay.
 #[cfg(feature = "internals")]
 #[doc(hidden)]

@@ -50,7 +50,7 @@ pub enum SourceError<E> {
 /// Passes all items of `input`, a capture or a byte stream, to `take`.
 ///
 /// # Errors
-/// [`Trouble`]; the items before it have been passed on.
+/// [`SourceError`]; the items before it have been passed on.
 pub fn read<E>(
     mut input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,

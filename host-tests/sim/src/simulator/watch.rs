@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn where_all_hear_their_neighbours_all_are_in_the_chain() {
+    fn with_all_links_all_relays_are_in_the_chain() {
         let on: Vec<usize> = (0..8).collect();
         assert_eq!(longest(&on, near, |_| true), (8, vec![on.clone()]));
         let left = [0, 1, 4, 5, 7];
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_neighbours_that_are_not_linked_one_is_left_out() {
+    fn one_of_two_unlinked_neighbours_is_left_out() {
         let on: Vec<usize> = (0..8).collect();
         let links = |one, other| near(one, other) && (one, other) != (2, 3);
         let (length, ways) = longest(&on, links, |_| true);
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_do_not_hear_each_other_are_chains_of_their_own() {
+    fn unlinked_parts_are_separate_chains() {
         let on: Vec<usize> = (0..8).collect();
         let halves = |one: usize, other: usize| near(one, other) && (one < 4) == (other < 4);
         let both = longest(&on, halves, |_| true);
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn however_many_ways_there_are_only_some_are_looked_at() {
+    fn the_number_of_examined_chains_is_limited() {
         let on: Vec<usize> = (0..60).collect();
         // Twenty groups of three; each chain takes any one relay of each group.
         let links = |one: usize, other: usize| other / 3 == one / 3 + 1;

@@ -33,7 +33,7 @@ impl Chain {
 /// Returns the best chain of relays at one common altitude, with any powers; exact except for rounding.
 ///
 /// Tested to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
-/// (`of_one_source_it_is_the_optimum_of_the_reference`, `brute_force_finds_the_same` in `host-tests/tests/several`).
+/// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in `host-tests/tests/several`).
 ///
 /// If the least separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a position when
 /// another hop is the bottleneck. `None` without relays or interferers, if altitudes differ, if the relays do not fit on the

@@ -71,7 +71,7 @@ fn both_hops_are_equal_on_the_locus_and_nowhere_between() {
 }
 
 #[test]
-fn the_locus_is_the_reference_programs() {
+fn the_locus_agrees_with_the_reference() {
     let table = Table::read("locus");
     for (tx, (x, y)) in CHOICES {
         let of = [("tx_w", tx), ("interferer_x_m", x), ("interferer_y_m", y)];
@@ -96,7 +96,7 @@ fn the_locus_is_the_reference_programs() {
 
 /// Checks the page: more power shifts the locus toward Rx. An interferer nearer to the line shifts it down.
 #[test]
-fn the_locus_moves_as_it_is_said_to() {
+fn the_locus_moves_as_the_text_says() {
     let table = Table::read("locus");
     let upper = |tx: f64, y: f64, x: f64| {
         let of = [("tx_w", tx), ("interferer_y_m", y), ("x_m", x)];
@@ -115,7 +115,7 @@ fn the_locus_moves_as_it_is_said_to() {
 }
 
 #[test]
-fn the_best_place_and_the_baselines_are_the_references() {
+fn the_optimum_and_baselines_agree_with_the_reference() {
     let table = Table::read("single");
     let (low, high) = ALTITUDES_M;
     for (tx, relay) in REALISATIONS {
@@ -179,7 +179,7 @@ fn blind(link: &Link) -> f64 {
 }
 
 #[test]
-fn every_reading_of_the_gain_is_what_it_says() {
+fn every_definition_of_the_gain_has_its_value() {
     let table = Table::read("single-gains");
     let (low, high) = ALTITUDES_M;
     let (tx, relay) = REALISATIONS[0];
@@ -233,7 +233,7 @@ fn every_reading_of_the_gain_is_what_it_says() {
 
 /// Checks the page: in linear SIR no powers come near the printed 30.14 % over random.
 #[test]
-fn no_linear_reading_comes_near_what_is_printed() {
+fn no_linear_definition_gives_the_papers_gain() {
     let table = Table::read("single-gains");
     let rows = table.rows(&[]);
     assert_eq!(rows.len(), 17 * 17 * 4);
