@@ -11,7 +11,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde_json::json;
 use uav_relay::Instant;
-use uav_relay_capture::{Capture, Cut, Direction, Frame, Interface};
+use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, Interface};
 
 use crate::log::Log;
 use crate::replug::Replug;
@@ -179,7 +179,10 @@ fn write(
     interfaces: &[Interface],
     pieces: &Receiver<Piece>,
 ) -> io::Result<()> {
-    let mut cuts: Vec<[Cut; 2]> = interfaces.iter().map(|_| <[Cut; 2]>::default()).collect();
+    let mut cuts: Vec<[FrameSplitter; 2]> = interfaces
+        .iter()
+        .map(|_| <[FrameSplitter; 2]>::default())
+        .collect();
     while let Ok(first) = pieces.recv() {
         let mut next = Some(first);
         while let Some(piece) = next {

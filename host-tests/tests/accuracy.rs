@@ -130,7 +130,7 @@ fn largest(function: &Function, approximate: fn([f32; 2]) -> f32) -> f64 {
 }
 
 #[test]
-fn the_errors_of_both_libraries_are_as_stated() {
+fn the_stated_errors_of_both_libraries_are_right() {
     println!("| function | error | micromath | libm |\n| --- | --- | --- | --- |");
     for function in &FUNCTIONS {
         let found = [function.micromath, function.libm].map(|f| largest(function, f));
@@ -149,7 +149,7 @@ fn the_errors_of_both_libraries_are_as_stated() {
 
 #[test]
 #[ignore = "measures time"]
-fn the_cost_of_both_libraries_on_the_host() {
+fn cost_of_both_libraries_on_the_host() {
     println!("| function | micromath, ns | libm, ns | ratio |\n| --- | --- | --- | --- |");
     for function in &FUNCTIONS {
         let x: Vec<[f32; 2]> = arguments(function).collect();

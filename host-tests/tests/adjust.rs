@@ -64,7 +64,7 @@ fn rises(outcome: &Outcome) -> bool {
 /// Checks that the fine local search raises the SIR of fifty relays and that a coarse grid does not. The optimum, an
 /// SIR of 6.49838, is 19.4 % above that of the starting positions.
 #[test]
-fn fine_turns_gain_what_a_coarse_grid_does_not() {
+fn fine_search_gains_sir_over_a_coarse_grid() {
     let of = |rounds, local| {
         let (link, setup) = setup(
             50,
@@ -104,7 +104,7 @@ fn fine_turns_gain_what_a_coarse_grid_does_not() {
 /// Compares the moves of the paper's grid search with those that a separate program computes. The starting positions
 /// are far from those with equal SIR on all hops.
 #[test]
-fn the_grid_moves_where_a_separate_program_moves() {
+fn grid_search_moves_as_the_reference_program() {
     let link = Link {
         y_i: 150.0,
         min_separation_m: 4.0,
@@ -238,7 +238,7 @@ fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
 
 /// Checks that no relay has a better position when Algorithm 2 ends before its last permitted round.
 #[test]
-fn it_ends_where_nobody_can_do_better() {
+fn adjusting_ends_in_a_local_optimum() {
     let local = Local::Grid {
         columns: 21,
         rows: 11,
@@ -282,7 +282,7 @@ fn it_ends_where_nobody_can_do_better() {
 
 /// Checks that both local searches keep the least separation where a smaller one would raise the SIR.
 #[test]
-fn relays_keep_their_distance_where_it_costs() {
+fn relays_keep_their_separation_where_it_costs_sir() {
     for local in [
         Local::Fine,
         Local::Grid {

@@ -18,7 +18,7 @@ fn off(got: f64, want: f64) -> f64 {
 }
 
 #[test]
-fn a_single_relay_stands_where_the_reference_says() {
+fn a_single_relay_has_the_reference_position() {
     let cases = cases::of("baseline_single").unwrap();
     assert!(!cases.is_empty());
     for case in cases {
@@ -40,7 +40,7 @@ fn a_single_relay_stands_where_the_reference_says() {
 }
 
 #[test]
-fn chains_stand_where_the_reference_says() {
+fn chains_have_the_reference_positions() {
     let cases = cases::of("baseline_multi").unwrap();
     assert!(!cases.is_empty());
     for case in cases {
@@ -133,7 +133,7 @@ fn surplus_relays_shorten_all_hops_in_proportion() {
 
 /// Checks that a Tx with less power has its relay right above it.
 #[test]
-fn the_weaker_ground_station_has_its_relay_above_it() {
+fn the_relay_of_the_weaker_ground_station_is_above_it() {
     let mut link = Link::paper(60);
     link.tx_w = 0.5;
     let places = blind_places(&scene(&link));

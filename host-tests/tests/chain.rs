@@ -157,7 +157,7 @@ fn silent_places_equal_those_by_messages() {
 /// Checks that message faults change the duration only, over 1 000 random seeds. The positions of eight relays equal
 /// those of a run without faults.
 #[test]
-fn faults_change_nothing_but_the_time_it_takes() {
+fn faults_change_only_the_time_to_agree() {
     let undisturbed = settle(Setup::new(mission(8)));
     for predict in [true, false] {
         let quiet = {
@@ -210,7 +210,7 @@ fn faults_change_nothing_but_the_time_it_takes() {
 }
 
 #[test]
-fn each_fault_alone_and_at_its_worst_changes_nothing() {
+fn each_fault_alone_changes_no_position() {
     let quiet = settle(Setup::new(mission(5))).bits();
     let none = Faults::default();
     for faults in [
@@ -256,7 +256,7 @@ fn the_same_seed_gives_the_same_run() {
 }
 
 #[test]
-fn one_shared_channel_does_as_well_as_two_wires() {
+fn a_shared_channel_gives_the_positions_of_two_wires() {
     let wires = settle(Setup::new(mission(8))).bits();
     let outcome = settle(Setup::on_shared_channel(mission(8)));
     assert_eq!(outcome.bits(), wires);
@@ -276,7 +276,7 @@ fn one_shared_channel_does_as_well_as_two_wires() {
 /// Checks relays with their own altitudes and powers. The leader's predicted target is wrong, but the search still
 /// finds the optimum.
 #[test]
-fn a_mixed_chain_is_solved_as_it_is() {
+fn a_chain_of_different_relays_is_solved_exactly() {
     let mission = mission(8);
     let profiles = [(3, 30.0, 0.5), (5, 20.0, 4.0), (8, 35.0, 1.0)];
     let profiles = profiles.map(|(index, altitude_m, power_w)| {
@@ -339,7 +339,7 @@ fn a_silent_relay_is_noticed_by_both_neighbours_in_time() {
 }
 
 #[test]
-fn neighbours_that_live_are_not_lost_over_an_hour_of_bad_days() {
+fn live_neighbours_are_not_lost_in_an_hour_of_faults() {
     let mut setup = Setup::new(mission(4));
     setup.faults = Faults::BAD_DAY;
     // A kill at the end of the hour makes the run go on until then.
@@ -352,7 +352,7 @@ fn neighbours_that_live_are_not_lost_over_an_hour_of_bad_days() {
 }
 
 #[test]
-fn an_interferer_at_the_receiver_leaves_nothing_to_place() {
+fn an_interferer_at_rx_makes_the_mission_infeasible() {
     let mut link = Link::paper(4);
     link.x_i = 1000.0;
     link.y_i = 0.0;

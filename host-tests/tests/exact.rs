@@ -11,7 +11,7 @@ use uav_relay::{Mission, Placement, Profile, Schedule};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
@@ -24,7 +24,7 @@ const NEAR: f64 = 1e-3;
 const ROUNDING: f64 = 2e-4;
 
 /// Returns true if `target` is met with every relay as far along the line as the target permits.
-fn plainly(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
+fn is_met_greedily(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {
         uav_relay::mission::Heading::TowardRx => 0.0,
@@ -88,8 +88,9 @@ impl Tally {
     ) {
         let of = |index| profile_of(mission, own, index);
         self.scenes += 1;
-        self.before +=
-            usize::from((1..10).any(|k| plainly(mission, own, best * (1.0 - 1e-4 * f64::from(k)))));
+        self.before += usize::from(
+            (1..10).any(|k| is_met_greedily(mission, own, best * (1.0 - 1e-4 * f64::from(k)))),
+        );
         let agreed = plan::solve(mission, Schedule::Bracketed, of);
         let agreed = agreed.unwrap_or_else(|_| panic!("nothing of {best}: {told}"));
         let target = f64::from(agreed.target);
@@ -121,7 +122,7 @@ impl Tally {
         }
     }
 
-    fn tell(&mut self, what: &str) {
+    fn print(&mut self, what: &str) {
         println!(
             "{what}: {} scenes, {:.2} % within 0.1 % ({:.2} % where nobody holds back), worst {:.1} % short; {} went on plainly; \
              {} sweeps at most",
@@ -162,7 +163,7 @@ fn spread(of: &mut [f64]) -> String {
     )
 }
 
-fn keep_apart(places: &[Placement], least_m: f64, told: &str) {
+fn assert_separation(places: &[Placement], least_m: f64, told: &str) {
     for pair in places.windows(2) {
         let apart = f64::from(pair[1].x_m - pair[0].x_m)
             .hypot(f64::from(pair[1].altitude_m - pair[0].altitude_m));
@@ -172,7 +173,7 @@ fn keep_apart(places: &[Placement], least_m: f64, told: &str) {
 }
 
 #[test]
-fn at_mixed_altitudes() {
+fn near_optimal_at_mixed_altitudes() {
     let mut rng = generator(901);
     let mut tally = Tally::default();
     while tally.scenes < count(1000) {
@@ -187,13 +188,13 @@ fn at_mixed_altitudes() {
         let sir = |places: &[Placement]| link.chain_sir(&xs(places));
         tally.judge(&mission, &own, best, sir, &format!("{link:?}"));
     }
-    tally.tell("mixed altitudes");
+    tally.print("mixed altitudes");
     assert_eq!(tally.near, tally.scenes);
     assert!(tally.tight() >= 99.0);
 }
 
 #[test]
-fn with_a_separation_that_binds() {
+fn near_optimal_with_a_separation() {
     let mut rng = generator(902);
     let mut tally = Tally::default();
     let mut binding = 0;
@@ -221,12 +222,12 @@ fn with_a_separation_that_binds() {
         binding += usize::from(as_relays_know_it(&free).optimum().unwrap() > best * (1.0 + NEAR));
         let told = format!("{link:?}");
         let sir = |places: &[Placement]| {
-            keep_apart(places, link.min_separation_m, &told);
+            assert_separation(places, link.min_separation_m, &told);
             link.chain_sir(&xs(places))
         };
         tally.judge(&mission, &own, best, sir, &told);
     }
-    tally.tell("binding separation");
+    tally.print("binding separation");
     println!("it binds in {binding}");
     assert!(binding * 4 >= tally.scenes && tally.near * 100 >= tally.scenes * 88);
     assert!(tally.tight() >= 70.0);
@@ -237,7 +238,7 @@ fn with_a_separation_that_binds() {
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
-    let relay = Station {
+    let relay = Relay {
         altitude_m: round(d * log_uniform(rng, 0.005, 0.1)),
         power_w: round(log_uniform(rng, 0.1, 10.0)),
     };
@@ -260,7 +261,7 @@ fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
 }
 
 #[test]
-fn in_uneven_fields() {
+fn near_optimal_in_uneven_fields() {
     let mut rng = generator(903);
     let mut tally = Tally::default();
     while tally.scenes < count(1000) {
@@ -271,14 +272,14 @@ fn in_uneven_fields() {
         let sir = |places: &[Placement]| link.chain_sir(&xs(places));
         tally.judge(&mission, &[], best, sir, &format!("{link:?}"));
     }
-    tally.tell("uneven fields");
+    tally.print("uneven fields");
     assert_eq!(tally.near, tally.scenes);
     assert!(tally.tight() >= 99.0);
 }
 
 /// Checks relays with different altitudes and powers in uneven fields. Half of the scenes have a least separation.
 #[test]
-fn in_uneven_fields_by_relays_that_differ() {
+fn near_optimal_in_uneven_fields_by_unlike_relays() {
     let mut rng = generator(905);
     let mut tally = Tally::default();
     while tally.scenes < count(1000) {
@@ -310,19 +311,19 @@ fn in_uneven_fields_by_relays_that_differ() {
         }
         let told = format!("{apart_m} {link:?}");
         let sir = |places: &[Placement]| {
-            keep_apart(places, apart_m, &told);
+            assert_separation(places, apart_m, &told);
             link.chain_sir(&xs(places))
         };
         tally.judge(&mission, &own, best, sir, &told);
     }
-    tally.tell("uneven fields, relays that differ");
+    tally.print("uneven fields, relays that differ");
     assert!(tally.near * 100 >= tally.scenes * 88 && tally.tight() >= 80.0);
 }
 
 /// Checks that chains agree by messages on targets that they meet, with an upper bound that holds. Runs are with and
 /// without prediction and message faults.
 #[test]
-fn by_messages() {
+fn chains_agree_by_messages_on_feasible_targets() {
     let mut rng = generator(904);
     let (mut settled, mut near, mut most) = (0, 0, 0);
     while settled < 60.min(count(1000)) {

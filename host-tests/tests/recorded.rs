@@ -12,8 +12,8 @@ use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random::joint::judged::{COUNT, numbered, optima};
 use uav_relay_oracle::random::{log_uniform, seed};
 use uav_relay_oracle::recorded::{Optimum, Record, all, optimum};
-use uav_relay_oracle::reference::joint::{Corridor, Hold, Place, keeps_rules, sir};
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::joint::{Corridor, FixedCrossSection, Place, keeps_rules, sir};
+use uav_relay_oracle::reference::{Link, Relay};
 
 const BAND: Corridor = Corridor::plane(20.0, 300.0);
 
@@ -37,7 +37,7 @@ fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
 /// Returns the link with its relays at the given altitudes, without a least separation.
 fn flown(link: &Link, altitudes: &[f64]) -> Link {
     let relays = link.relays.iter().zip(altitudes);
-    let relays = relays.map(|(relay, &altitude_m)| Station {
+    let relays = relays.map(|(relay, &altitude_m)| Relay {
         altitude_m,
         ..*relay
     });
@@ -130,7 +130,7 @@ fn optima_of_independent_programs_are_recorded() {
 /// Checks the 2 000 numbered optima, which are recorded without positions. Forty of them were found again, with
 /// positions, from another random seed.
 #[test]
-fn the_numbered_optima_were_found_again() {
+fn the_numbered_optima_are_reproduced() {
     let stored = optima().unwrap();
     assert_eq!(stored.len(), COUNT as usize);
     for number in (17..COUNT).step_by(50) {
@@ -173,7 +173,7 @@ fn the_numbered_scenarios_are_of_many_kinds() {
 /// Checks that no random move of one or all relays improves a recorded optimum. Scenes are in the plane, with lateral
 /// offsets, with held altitudes, and in noise.
 #[test]
-fn no_move_is_better() {
+fn no_single_move_improves_an_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(35));
     let mut legal = 0;
     let scenes = |set, many| of(set).step_by(3).take(many);
@@ -311,7 +311,7 @@ fn an_unknown_scene_is_an_error_and_rules_are_checked() {
         ..Link::paper(2)
     };
     let places = [200.0, 260.0].map(|x_m| Place::in_plane(x_m, 20.0));
-    let held = Hold {
+    let held = FixedCrossSection {
         relay: 1,
         y_m: 400.0,
         altitude_m: 350.0,

@@ -102,7 +102,7 @@ fn detected(report: &ChainReport) -> f64 {
 
 /// Checks that the remaining chain agrees on exactly the positions of a new chain of that length.
 #[test]
-fn the_chain_that_is_left_is_as_good_as_a_new_one() {
+fn the_remaining_chain_is_as_good_as_a_new_one() {
     for (relays, lost) in [(4, 2), (8, 1), (8, 4), (8, 8), (16, 9)] {
         let (outcome, _) = recovered(losing(relays, lost));
         let mut left = outcome.bits();
@@ -124,7 +124,7 @@ fn without_a_quorum_the_last_relay_goes_on() {
 
 /// Checks that authentication does not change the positions after a loss. It costs only the time of a handshake.
 #[test]
-fn tags_change_nothing_but_the_time() {
+fn tags_change_only_the_time() {
     let (bare, _) = recovered(losing(8, 4));
     let mut setup = losing(8, 4);
     setup.auth = true;

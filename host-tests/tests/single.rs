@@ -6,7 +6,7 @@ use uav_relay::Mission;
 use uav_relay::planning::single::without_interferer::{best_in_field, stepped};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
-use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 fn mission(link: &StochasticLink) -> Mission {
@@ -20,7 +20,7 @@ fn link(d: f64, h: f64, tx_w: f64, power_w: f64, upsilon: Vec<(f64, f64)>) -> St
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: h,
             power_w,
         }],
@@ -67,7 +67,7 @@ fn the_best_place_is_no_worse_than_a_dense_search() {
 }
 
 #[test]
-fn the_algorithm_finds_what_the_reference_finds() {
+fn the_algorithm_agrees_with_the_reference() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(82));
     let mut same = 0;
     for _ in 0..500 {
@@ -96,7 +96,7 @@ fn the_algorithm_finds_what_the_reference_finds() {
 /// Checks a field of interference in which the first target SIR that can be met is not the best. Upsilon = E[1/I] is
 /// 0.1, and 100 from x = 90 m on; the first such target is 0.00998.
 #[test]
-fn the_first_target_that_is_met_is_not_the_best() {
+fn the_first_feasible_target_is_not_the_optimum() {
     let steep = link(100.0, 10.0, 10.0, 1.0, vec![(89.99, 0.1), (90.0, 100.0)]);
     let mission = mission(&steep);
     let common = mission.config().common;
@@ -109,7 +109,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
 /// Compares one relay in a constant field with a public reference. With Upsilon = E[1/I] of 4 and steps of 0.0001,
 /// the reference reaches an SIR of 0.0065 at x = 77.298 m.
 #[test]
-fn a_constant_field_is_as_a_separate_program_has_it() {
+fn a_constant_field_agrees_with_the_reference_program() {
     let even = link(100.0, 10.0, 10.0, 1.0, vec![(0.0, 4.0)]);
     let mission = mission(&even);
     let common = mission.config().common;

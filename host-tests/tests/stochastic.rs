@@ -8,7 +8,7 @@ use uav_relay::{Interference, Measure, Mission, Profile, Schedule};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::log_uniform;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;
@@ -23,7 +23,7 @@ fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
 fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
-    let relay = Station {
+    let relay = Relay {
         altitude_m: round(d * log_uniform(rng, 0.005, 0.1)),
         power_w: round(log_uniform(rng, 0.1, 10.0)),
     };
@@ -94,7 +94,7 @@ fn retreats_agree_with_the_reference() {
 /// Compares chains in a constant field with the closed-form optimum. They have 1 to 50 relays, with and without
 /// prediction.
 #[test]
-fn in_an_even_field_the_optimum_is_found() {
+fn the_optimum_in_a_uniform_field_is_found() {
     let mut rng = generator(62);
     let (mut short, mut above, mut most) = (0.0_f64, 0.0_f64, 0);
     for round in 0..150 {
@@ -118,7 +118,7 @@ fn in_an_even_field_the_optimum_is_found() {
 
 /// Checks that Algorithm 4 with the paper's fixed step takes the same steps as the reference.
 #[test]
-fn the_fixed_step_is_the_papers() {
+fn the_fixed_step_is_that_of_the_paper() {
     let mut rng = generator(63);
     let mut steps = 0;
     for round in 0..60 {
@@ -147,7 +147,7 @@ fn the_fixed_step_is_the_papers() {
 
 /// Checks relays with own altitudes or powers, for which the leader's predicted target is wrong.
 #[test]
-fn relays_may_differ() {
+fn different_relays_meet_the_agreed_target_in_a_field() {
     let mut rng = generator(68);
     let mut worst = 0.0_f64;
     for round in 0..60 {
@@ -173,7 +173,7 @@ fn relays_may_differ() {
 }
 
 #[test]
-fn faults_change_nothing() {
+fn faults_change_no_position() {
     let mut rng = generator(65);
     for seed in 0..60 {
         let link = link(&mut rng, 2 + seed % 12, 4, 5.0);
@@ -204,7 +204,7 @@ fn silent_places_equal_those_by_messages() {
 
 /// Checks that relays in a field keep the least separation, and that it limits the target SIR.
 #[test]
-fn relays_keep_their_distance() {
+fn relays_keep_their_separation() {
     let mut link = StochasticLink {
         upsilon: vec![(0.0, 1e7)],
         ..even(60)
@@ -233,7 +233,7 @@ fn even(relays: usize) -> StochasticLink {
 
 /// Checks that relays loaded with a constant field measure the true one, and agree again.
 #[test]
-fn what_is_measured_takes_the_place_of_what_was_agreed() {
+fn measurements_replace_the_agreed_field() {
     let mut rng = generator(67);
     let i_max_w = 4e-6_f32;
     // alpha falls and beta rises toward the middle.

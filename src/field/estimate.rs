@@ -137,7 +137,7 @@ impl Estimator {
     /// instructions on a Cortex-M4F; 408 were counted.
     ///
     /// With 10 000 samples Upsilon is within 5 % in 99 of 100 cases for alpha from 3 to 20 and beta from 0.5 to 20, as asserted
-    /// by `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_holds` in
+    /// by `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_covers_the_error` in
     /// `host-tests/tests/field/estimation.rs`.
     pub fn estimate(&self) -> Option<Estimate> {
         let fit = Fit::of(self)?;

@@ -25,7 +25,7 @@
 //!
 //! # Accuracy
 //! Error against geodesics, for points up to 500 m beside the line: at most 1 mm for lines up to 10 km, 5 mm for 100 km
-//! (`places_agree_with_geodesics` in `host-tests/tests/axis`); round trip within one unit of [`Geodetic`]. The distance of a far
+//! (`positions_agree_with_geodesics` in `host-tests/tests/axis`); round trip within one unit of [`Geodetic`]. The distance of a far
 //! point: within 0.2 % anywhere on earth, and 0.002 % up to 1000 km (`distances_agree_with_geodesics`, in the same folder).
 
 use crate::geodetic::{Geodetic, Sites, to_integer};

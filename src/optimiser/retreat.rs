@@ -19,7 +19,7 @@
 //!
 //! Between two points of the field d(y)^2 = c Upsilon(y) - q with q = (h - h0)^2 is linear in y, so y - d(y) is convex where it
 //! is defined. Its minimum is at an end, where d falls to the minimum step, or where d'(y) = 1: d = c b / 2 with b the slope of
-//! Upsilon. `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/` compares it with grids of positions. If a minimum
+//! Upsilon. `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/` compares it with grids of positions. If a minimum
 //! separation or a climb excludes some y, the ranges may have holes, and l_k is a bound.
 //!
 //! Accuracy: asserted by `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` against f64.

@@ -30,8 +30,8 @@
 //! ```
 //!
 //! which is true except within w of the interferer. So if the target cannot be met from x0, the sender may *hold back* for a
-//! receiver at X - w: to climb before it comes near, or to leave the minimum step. `at_mixed_altitudes` and
-//! `with_a_separation_that_binds` in `host-tests/tests/exact.rs` compare this with a search over all positions.
+//! receiver at X - w: to climb before it comes near, or to leave the minimum step. `near_optimal_at_mixed_altitudes` and
+//! `near_optimal_with_a_separation` in `host-tests/tests/exact.rs` compare this with a search over all positions.
 //!
 //! For the joint method `Hop::stretched` is the reach as a differentiable function.
 //!

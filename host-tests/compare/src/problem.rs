@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use uav_relay_oracle::reference::joint::Corridor;
-use uav_relay_oracle::reference::{Link, Station, path_loss_factor};
+use uav_relay_oracle::reference::{Link, Relay, path_loss_factor};
 use uav_relay_scenario::{Interference, Scenario};
 
 /// Coordinates of the relays that a solver may choose.
@@ -102,7 +102,7 @@ impl Problem {
         let factor =
             |loss_db: f64| path_loss_factor(channel.carrier_hz, 10_f64.powf(loss_db / 10.0));
         let mu_los = factor(channel.excess_loss_los_db);
-        let station = Station {
+        let station = Relay {
             altitude_m: scenario.altitude_m,
             power_w: scenario.uav_w,
         };

@@ -76,7 +76,7 @@ impl<'s> Draw<'s> {
     /// Draws fields for a message. `hint` may choose a value; all others are within the permitted ranges.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
-        together(&layout.name, &mut fields);
+        obey_rules(&layout.name, &mut fields);
         fields
     }
 
@@ -250,7 +250,7 @@ impl<'s> Draw<'s> {
 }
 
 /// Changes fields of a message so that they obey the rules between them. [`range`](crate::range) checks these rules.
-fn together<'f>(message: &str, fields: &mut Fields<'f>) {
+fn obey_rules<'f>(message: &str, fields: &mut Fields<'f>) {
     let get = |fields: &Fields<'f>, name: &str| Numbers(fields).get(name);
     let single = |fields: &mut Fields<'f>, name: &str, number: f64| {
         fields.set(name, Value::Single(number as f32));

@@ -10,7 +10,7 @@
 //! | [`draw`] | random messages, valid over the whole range of every field |
 //! | [`envelope`] | frame around a body: header, CRC and COBS |
 //! | [`frame`], [`refusal`] | a decoded frame; reasons for rejection |
-//! | [`members`] | verification of tags |
+//! | [`tags`] | verification of tags |
 //! | [`source`] | frames from a capture or a byte stream |
 //! | [`shown`] | a frame as text and as JSON |
 //! | [`vectors`] | test vectors |
@@ -21,11 +21,11 @@ pub mod draw;
 pub mod envelope;
 pub mod format;
 pub mod frame;
-pub mod members;
 pub mod range;
 pub mod refusal;
 pub mod shown;
 pub mod source;
+pub mod tags;
 pub mod value;
 pub mod vectors;
 pub mod walk;

@@ -14,7 +14,7 @@ pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
     let alone = fields.0.iter();
     let mut alone = alone.filter(|(field, value)| !is_within(field, value));
     let wrong = alone.next().map(|(field, _)| field.name.as_str());
-    wrong.or_else(|| together(&layout.name, &Numbers(fields)))
+    wrong.or_else(|| check_rules(&layout.name, &Numbers(fields)))
 }
 
 /// Returns true if the value is within the field's range. Rules behind a semicolon, between fields, are not checked.
@@ -120,7 +120,7 @@ impl<'f> Numbers<'_, 'f> {
 }
 
 /// Checks the rules between the fields of a message. Returns the name of the first field that breaks one.
-fn together(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
+fn check_rules(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
     let get = |name| numbers.get(name);
     let zero = |name| numbers.is_zero(name);
     let rules: &[(&'static str, bool)] = match message {

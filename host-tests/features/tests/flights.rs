@@ -64,7 +64,7 @@ fn hops(places: &[f32]) -> Vec<f64> {
 }
 
 #[test]
-fn five_find_the_best_places_on_the_same_bytes() {
+fn five_relays_reach_the_optimum_with_the_same_bytes() {
     let mut chain = Chain::new(paper(5), Settings::default()).unwrap();
     chain.fly(MINUTE);
     let places = places(chain.relays());
@@ -84,7 +84,7 @@ fn five_find_the_best_places_on_the_same_bytes() {
 }
 
 #[test]
-fn four_go_on_without_the_third_on_the_same_bytes() {
+fn four_relays_go_on_without_the_third_with_the_same_bytes() {
     let mut chain = Chain::new(paper(5), shared()).unwrap();
     chain.fly(MINUTE);
     assert_eq!(bits(&places(chain.relays())), OF_FIVE);
@@ -112,7 +112,7 @@ fn unless<E>(there: bool, error: E) -> Option<E> {
 }
 
 #[test]
-fn what_was_left_out_is_refused() {
+fn disabled_features_are_rejected() {
     let refused = |settings| Chain::new(paper(5), settings).err();
     let by = |method| Settings {
         method,
@@ -161,7 +161,7 @@ fn what_was_left_out_is_refused() {
 
 #[cfg(feature = "auth")]
 #[test]
-fn five_that_sign_find_the_same_places() {
+fn five_relays_with_a_key_find_the_same_positions() {
     let auth = uav_relay::Auth {
         key: uav_relay::Key::new([7; 32]),
         epoch: 1,

@@ -13,15 +13,15 @@ use super::setting;
 use super::watch::{Sent, Watched};
 
 /// Maximum number of fuzzed operations in one run, which take some milliseconds of computing.
-const MOST_OPERATIONS: usize = 256;
+const MAX_OPERATIONS: usize = 256;
 
-const MOST_RELAYS: u8 = 4;
+const MAX_RELAYS: u8 = 4;
 
 /// Maximum number of frames in transit to one relay. One more displaces the oldest.
-const MOST_UNDER_WAY: usize = 24;
+const MAX_IN_TRANSIT: usize = 24;
 
 /// Maximum number of rounds in one operation. A round delivers a frame to each relay.
-const MOST_ROUNDS: u8 = 128;
+const MAX_ROUNDS: u8 = 128;
 
 /// Rounding error of a position, as a part of the distance from Tx to Rx: one step of its f32.
 const ROUNDING: f64 = 1.3e-7;
@@ -44,7 +44,7 @@ pub fn flown(data: &[u8]) -> Option<Vec<Watched>> {
     let mut input = Input::new(data);
     let mut chain = Chain::new(&mut input)?;
     let to_the_end = input.below(4) == 3;
-    for _ in 0..MOST_OPERATIONS {
+    for _ in 0..MAX_OPERATIONS {
         if input.is_empty() {
             break;
         }
@@ -74,7 +74,7 @@ struct Chain {
 
 impl Chain {
     fn new(input: &mut Input<'_>) -> Option<Self> {
-        let mission = setting::mission(input, MOST_RELAYS)?;
+        let mission = setting::mission(input, MAX_RELAYS)?;
         let common = setting::of_chain(input, &mission);
         let mut chain = Self {
             mission,
@@ -113,19 +113,19 @@ impl Chain {
             2 => {
                 self.take(at);
             }
-            3 => self.double(at),
-            4 => self.put_back(at),
+            3 => self.duplicate_frame(at),
+            4 => self.delay_frame(at),
             5 => self.damage(at, input),
             6 => self.cut(at, input),
             7 => self.noise(at, input),
-            8 => self.pass(Duration::from_millis(u64::from(input.word()))),
+            8 => self.advance_time(Duration::from_millis(u64::from(input.word()))),
             9 => self.wake(),
             10 => self.restart(),
             11 => self.reboot(at),
             12 => self.sample(at, input),
             14 => self.position(at, input),
             _ => {
-                let rounds = input.below(MOST_ROUNDS);
+                let rounds = input.below(MAX_ROUNDS);
                 if rounds == 0 {
                     self.upload(at, input);
                 }
@@ -153,7 +153,7 @@ impl Chain {
         self.settle(at);
     }
 
-    fn double(&mut self, at: usize) {
+    fn duplicate_frame(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.front().cloned()
         {
@@ -162,7 +162,7 @@ impl Chain {
     }
 
     /// Moves the oldest frame in transit to relay `at` behind all others.
-    fn put_back(&mut self, at: usize) {
+    fn delay_frame(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()
         {
@@ -203,7 +203,7 @@ impl Chain {
         self.arrive(at, port, input.piece());
     }
 
-    fn pass(&mut self, span: Duration) {
+    fn advance_time(&mut self, span: Duration) {
         self.now = self.now + span;
         self.settle_all();
     }
@@ -302,9 +302,9 @@ impl Chain {
         for frame in sent {
             self.send(at, &frame);
         }
-        self.look_at_place(at);
-        self.look_at_separation(at);
-        self.look_at_separation(at + 1);
+        self.check_place(at);
+        self.check_separation(at);
+        self.check_separation(at + 1);
     }
 
     /// Puts a frame of relay `from` in transit: to one neighbour, or on a shared channel to all relays.
@@ -316,7 +316,7 @@ impl Chain {
                 Port::Shared if at != from => Port::Shared,
                 _ => continue,
             };
-            if member.arriving.len() >= MOST_UNDER_WAY {
+            if member.arriving.len() >= MAX_IN_TRANSIT {
                 member.arriving.pop_front();
             }
             let bytes = frame.bytes.clone();
@@ -325,7 +325,7 @@ impl Chain {
     }
 
     /// Checks that a relay's view has no more relays on either side of it than the mission has.
-    fn look_at_place(&self, at: usize) {
+    fn check_place(&self, at: usize) {
         if let Some(member) = self.members.get(at) {
             let relay = member.watched.relay();
             let (before, after) = (at + 1, self.members.len() - at);
@@ -340,7 +340,7 @@ impl Chain {
 
     /// Checks the separation of relay `at` (from 0) from the relay before it, if one pass placed both. A pass is a
     /// round of messages along the chain.
-    fn look_at_separation(&self, at: usize) {
+    fn check_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)
                 .and_then(|before| self.members.get(before)),

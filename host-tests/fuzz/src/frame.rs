@@ -32,12 +32,12 @@ const SIGNS: u8 = 8;
 pub fn frame(data: &[u8]) {
     let plain = sealed(data.to_vec());
     let wire = stuffed(&plain);
-    comes_through(&plain, &wire);
-    flipped(&plain);
-    taken_apart(&plain);
-    signed(&plain);
+    check_round_trip(&plain, &wire);
+    check_flipped_bit(&plain);
+    check_decoded(&plain);
+    check_signed(&plain);
     if let Ok(opened) = frame::open(&plain) {
-        judged(opened.body);
+        check_body(opened.body);
     }
     let Ok((header, message)) = frame::decode(&plain) else {
         return;
@@ -63,7 +63,7 @@ pub fn frame(data: &[u8]) {
 }
 
 /// Checks that `frame::open` splits an intact frame into the parts that the format defines.
-fn taken_apart(plain: &[u8]) {
+fn check_decoded(plain: &[u8]) {
     let opened = frame::open(plain);
     let (Some(checked), Some(&[_, first, _, second])) = (
         plain.len().checked_sub(CHECK),
@@ -93,12 +93,12 @@ fn taken_apart(plain: &[u8]) {
 
 /// Checks a relay that requires authentication tags. The body with valid addresses and tag is accepted once, and
 /// rejected as forged with a flipped bit.
-fn signed(plain: &[u8]) {
+fn check_signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
-    let Some(Met {
+    let Some(HandshakenPair {
         mut relay,
         mut member,
-    }) = met()
+    }) = handshaken_pair()
     else {
         return;
     };
@@ -150,19 +150,19 @@ fn signed(plain: &[u8]) {
 
 /// Relay 2 of 3, which requires authentication tags, and its upstream neighbour, after their handshake.
 #[derive(Clone)]
-struct Met {
+struct HandshakenPair {
     relay: Relay,
     member: Member,
 }
 
-fn met() -> Option<Met> {
+fn handshaken_pair() -> Option<HandshakenPair> {
     thread_local! {
-        static MET: Option<Met> = meet();
+        static PAIR: Option<HandshakenPair> = make_handshaken_pair();
     }
-    MET.with(Clone::clone)
+    PAIR.with(Clone::clone)
 }
 
-fn meet() -> Option<Met> {
+fn make_handshaken_pair() -> Option<HandshakenPair> {
     let mut input = Input::new(&[0, 2, SIGNS]);
     let mission = setting::mission(&mut input, 3)?;
     let settings = setting::of_chain(&mut input, &mission);
@@ -174,7 +174,7 @@ fn meet() -> Option<Met> {
     let mut relay = Relay::new(mission, identity, settings, 1, now).ok()?;
     let mut handshake = [0; MAX_FRAME];
     let transmit = relay.poll_transmit(now, &mut handshake)?;
-    let mut member = Member::greeted(handshake.get(..transmit.len)?)?;
+    let mut member = Member::from_handshake(handshake.get(..transmit.len)?)?;
     let header = Header {
         network: NETWORK,
         sender: 1,
@@ -183,10 +183,10 @@ fn meet() -> Option<Met> {
     };
     relay.handle_bytes(now, Port::Upstream, &stuffed(&member.handshake(header)));
     assert_eq!(relay.stats().rejected(), 0);
-    Some(Met { relay, member })
+    Some(HandshakenPair { relay, member })
 }
 
-fn comes_through(plain: &[u8], wire: &[u8]) {
+fn check_round_trip(plain: &[u8], wire: &[u8]) {
     let mut deframer = Deframer::new();
     for &byte in wire {
         let outcome = deframer.push(byte);
@@ -201,7 +201,7 @@ fn comes_through(plain: &[u8], wire: &[u8]) {
 }
 
 /// Checks that a flipped bit in a frame is detected. The CRC chooses the bit.
-fn flipped(plain: &[u8]) {
+fn check_flipped_bit(plain: &[u8]) {
     let mut plain = plain.to_vec();
     let bits = plain.len() * 8;
     let chosen = plain
@@ -219,7 +219,7 @@ fn flipped(plain: &[u8]) {
 }
 
 /// Checks that a message body is accepted or rejected as the tables of `FORMAT.md` say.
-fn judged(body: &[u8]) {
+fn check_body(body: &[u8]) {
     static FORMAT: LazyLock<Option<Format>> = LazyLock::new(|| Format::load().ok());
     let Some(format) = &*FORMAT else {
         unreachable!("a test loads the tables");

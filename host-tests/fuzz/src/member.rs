@@ -21,7 +21,7 @@ const HANDSHAKE: u16 = 2;
 const NONCE: usize = 8;
 
 /// Length of a handshake's body, bytes: two nonces and a flag.
-const TOLD: usize = 2 * NONCE + 1;
+const HANDSHAKE_BODY: usize = 2 * NONCE + 1;
 
 /// Simulated neighbour that signs frames to the tested relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -35,7 +35,7 @@ pub struct Member {
 
 impl Member {
     /// Creates a neighbour that has received the tested relay's handshake, if `frame` is one.
-    pub fn greeted(frame: &[u8]) -> Option<Self> {
+    pub fn from_handshake(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;
         for &byte in frame {
@@ -43,10 +43,10 @@ impl Member {
                 ended = handshake_in(plain);
             }
         }
-        let body = ended.filter(|body| body.len() == TOLD)?;
+        let body = ended.filter(|body| body.len() == HANDSHAKE_BODY)?;
         Some(Self {
             key: KEY,
-            own: raised(&[0; NONCE]),
+            own: incremented(&[0; NONCE]),
             relay: body.get(..NONCE)?.to_vec(),
             counter: 0,
         })
@@ -56,7 +56,7 @@ impl Member {
     pub fn unknown() -> Self {
         Self {
             key: KEY,
-            own: raised(&[0; NONCE]),
+            own: incremented(&[0; NONCE]),
             relay: vec![0; NONCE],
             counter: 0,
         }
@@ -65,14 +65,14 @@ impl Member {
     /// Returns this neighbour as after a restart: with a larger nonce.
     pub fn restarted(&self) -> Self {
         Self {
-            own: raised(&self.own),
+            own: incremented(&self.own),
             counter: 0,
             ..self.clone()
         }
     }
 
     /// Returns this neighbour with another signing key.
-    pub fn stranger(&self) -> Self {
+    pub fn with_other_key(&self) -> Self {
         let mut other = self.clone();
         for byte in &mut other.key {
             *byte ^= 1;
@@ -124,7 +124,7 @@ fn handshake_in(plain: &[u8]) -> Option<Vec<u8>> {
 }
 
 /// Returns a little-endian number of any length, plus one.
-fn raised(number: &[u8]) -> Vec<u8> {
+fn incremented(number: &[u8]) -> Vec<u8> {
     let mut carry = true;
     let up = number.iter().map(|&byte| {
         let (sum, over) = byte.overflowing_add(u8::from(carry));

@@ -11,10 +11,10 @@ use uav_relay::wire::digest::MissionId;
 use super::input::Input;
 use parts::Body;
 
-pub use parts::Known;
+pub use parts::RelayState;
 
 /// Builds a message body of one of the kinds 0 to 19 with fuzzed fields, or arbitrary bytes.
-pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
+pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     let tag = match input.below(16) {
         15 => 15 + input.below(6),
         tag => tag,
@@ -22,7 +22,7 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
     let mut body = Body {
         bytes: vec![tag],
         input,
-        known,
+        state,
     };
     match tag {
         0 => body.sweep(Extra::Nothing),
@@ -30,8 +30,8 @@ pub fn body(input: &mut Input<'_>, known: &Known) -> Vec<u8> {
         2 => body.number(),
         3 => {
             body.digest();
-            body.question();
-            body.question();
+            body.request_number();
+            body.request_number();
         }
         4 => body.sweep(Extra::Upsilon),
         5 => body.sweep(Extra::Aside),
@@ -84,9 +84,9 @@ impl Body<'_, '_> {
             Extra::Upsilon => {
                 self.float(|input| input.scaled(1e-9, 1e32));
             }
-            Extra::Aside => self.beside(),
+            Extra::Aside => self.lateral(),
         }
-        let distance_m = self.known.distance_m;
+        let distance_m = self.state.distance_m;
         self.list(if single { 1 } else { 16 }, 0.0, distance_m);
     }
 
@@ -96,7 +96,7 @@ impl Body<'_, '_> {
         if self.small(0, 1) == 1 {
             self.small(0, 15);
         }
-        let distance_m = self.known.distance_m;
+        let distance_m = self.state.distance_m;
         self.list(16, -distance_m, distance_m);
         if self.small(0, 1) == 1 {
             self.place();
@@ -147,7 +147,7 @@ impl Body<'_, '_> {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);
         self.word(version);
-        self.question();
+        self.request_number();
         self.small(0, 15);
         self.small(0, 31);
     }
@@ -199,7 +199,7 @@ impl Body<'_, '_> {
         self.digest();
         self.association();
         self.relay();
-        let distance_m = self.known.distance_m;
+        let distance_m = self.state.distance_m;
         for _ in 0..4 {
             self.float(|input| input.even(-distance_m, 2.0 * distance_m));
         }

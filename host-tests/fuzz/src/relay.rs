@@ -10,19 +10,19 @@ use uav_relay_decode::envelope::{sealed, stuffed, unsigned};
 use super::counted::intact;
 use super::input::Input;
 use super::member::Member;
-use super::message::{Known, body};
+use super::message::{RelayState, body};
 use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
 
 /// Maximum number of fuzzed operations in one run, which take some milliseconds of computing.
-const MOST_OPERATIONS: usize = 256;
+const MAX_OPERATIONS: usize = 256;
 
 /// Maximum number of relays in the fuzzed mission; but one mission in sixteen has a thousand.
-const MOST_RELAYS: u8 = 5;
+const MAX_RELAYS: u8 = 5;
 
 /// Maximum number of timeouts that one operation handles.
-const MOST_WAKES: u8 = 64;
+const MAX_WAKES: u8 = 64;
 
 /// Fuzz target. Reads `data` as a mission, a relay, its settings, and operations on it.
 ///
@@ -40,8 +40,8 @@ pub fn relay(data: &[u8]) {
 pub fn flown(data: &[u8]) -> Option<Watched> {
     let mut input = Input::new(data);
     let mut bench = Bench::new(&mut input)?;
-    bench.greet();
-    for _ in 0..MOST_OPERATIONS {
+    bench.exchange_handshakes();
+    for _ in 0..MAX_OPERATIONS {
         if input.is_empty() {
             break;
         }
@@ -62,14 +62,14 @@ struct Bench {
 }
 
 /// Bytes of a frame for the relay, and the counter that must count the frame.
-struct Said {
+struct TestFrame {
     wire: Vec<u8>,
-    fate: Fate,
+    counter: ExpectedCounter,
 }
 
 /// Counter of the relay that must count a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Fate {
+enum ExpectedCounter {
     Counted,
     Read,
     Unsigned,
@@ -79,7 +79,7 @@ enum Fate {
 
 impl Bench {
     fn new(input: &mut Input<'_>) -> Option<Self> {
-        let mut mission = setting::mission(input, MOST_RELAYS)?;
+        let mut mission = setting::mission(input, MAX_RELAYS)?;
         if input.below(16) == 15 {
             mission = mission.with_relays(1000).ok()?;
         }
@@ -105,14 +105,14 @@ impl Bench {
     }
 
     /// Exchanges handshakes between the relay and its neighbours, if it requires authentication tags.
-    fn greet(&mut self) {
+    fn exchange_handshakes(&mut self) {
         let (sent, _) = self.watched.settle(self.now);
         for side in [0, 1] {
             let there = [self.index > 1, self.index < self.mission.relays()];
             // Handshakes come first, upstream before downstream.
             let place = usize::from(side == 1 && there == [true; 2]);
             let heard = sent.get(place).filter(|_| there.get(side) == Some(&true));
-            let member = heard.and_then(|frame| Member::greeted(&frame.bytes));
+            let member = heard.and_then(|frame| Member::from_handshake(&frame.bytes));
             let member = member.or_else(|| self.ground(side));
             self.introduce(side, member);
         }
@@ -129,7 +129,9 @@ impl Bench {
         let handshake = stuffed(&Member::unknown().handshake(header));
         self.watched.bytes(self.now, port, &handshake);
         let (sent, _) = self.watched.settle(self.now);
-        let heard = sent.last().and_then(|frame| Member::greeted(&frame.bytes));
+        let heard = sent
+            .last()
+            .and_then(|frame| Member::from_handshake(&frame.bytes));
         // The handshake above was that of an earlier start.
         heard.map(|member| member.restarted())
     }
@@ -158,14 +160,14 @@ impl Bench {
 
     fn operate(&mut self, input: &mut Input<'_>) {
         match input.below(16) {
-            0 => self.pass(Duration::from_micros(u64::from(input.word()))),
-            1 => self.pass(Duration::from_millis(u64::from(input.word()))),
+            0 => self.advance_time(Duration::from_micros(u64::from(input.word()))),
+            1 => self.advance_time(Duration::from_millis(u64::from(input.word()))),
             // Time should not run backward. If it does, the only consequence may be delays.
             2 => {
                 let back = u64::from(input.word());
                 self.now = Instant::from_micros(self.now.as_micros().saturating_sub(back));
             }
-            3..6 => self.wake(1 + input.below(MOST_WAKES)),
+            3..6 => self.wake(1 + input.below(MAX_WAKES)),
             6 => {
                 let port = port(input.byte());
                 self.noise(port, input.piece());
@@ -187,7 +189,7 @@ impl Bench {
         }
     }
 
-    fn pass(&mut self, span: Duration) {
+    fn advance_time(&mut self, span: Duration) {
         self.now = self.now + span;
     }
 
@@ -261,7 +263,7 @@ impl Bench {
             30 => port = addresses::port(input.byte()),
             _ => {}
         }
-        let known = Known {
+        let state = RelayState {
             digest: digest(&self.mission),
             relays: self.mission.relays(),
             flown: self.flown(),
@@ -269,26 +271,26 @@ impl Bench {
             view: self.watched.relay().view(),
             number: self.watched.number(),
             association: self.watched.association(),
-            asked: self.watched.asked(),
+            offer_number: self.watched.asked(),
             distance_m: self.mission.config().distance_m,
         };
-        let body = body(input, &known);
-        let Said { wire, mut fate } = self.said(side, header, &body, input);
+        let body = body(input, &state);
+        let TestFrame { wire, mut counter } = self.test_frame(side, header, &body, input);
         if (header, port) != from(self.index, side, self.wiring) {
-            fate = Fate::Counted;
+            counter = ExpectedCounter::Counted;
         }
         // The delimiter ends an incomplete frame.
         self.watched.bytes(self.now, port, &[0]);
         let heard = (port == Port::Shared) == (self.wiring == Wiring::Shared);
-        self.hear(port, &wire, heard.then_some(fate));
+        self.deliver(port, &wire, heard.then_some(counter));
         if how / 64 == 3 {
             self.settle();
             let place = self.watched.relay().setpoint();
-            let again = match fate {
-                Fate::Read => Fate::Replayed,
-                _ => fate,
+            let again = match counter {
+                ExpectedCounter::Read => ExpectedCounter::Replayed,
+                _ => counter,
             };
-            self.hear(port, &wire, heard.then_some(again));
+            self.deliver(port, &wire, heard.then_some(again));
             let same = place == self.watched.relay().setpoint();
             assert!(same, "a frame that came twice");
         }
@@ -308,26 +310,26 @@ impl Bench {
         self.watched.relay().upload().map_or(loaded, Upload::id)
     }
 
-    /// Delivers a frame and checks that the relay counts it as `fate` says. `fate` is `None` at a port that is not
+    /// Delivers a frame and checks that the relay counts it as `counter` says. `counter` is `None` at a port that is not
     /// connected.
-    fn hear(&mut self, port: Port, wire: &[u8], fate: Option<Fate>) {
+    fn deliver(&mut self, port: Port, wire: &[u8], counter: Option<ExpectedCounter>) {
         let before = self.watched.relay().clone();
         self.watched.bytes(self.now, port, wire);
         let after = self.watched.relay();
         let (was, is) = (before.stats(), after.stats());
         let key = self.watched.settings().auth.is_some();
         let counted = frames(is, key) - frames(was, key);
-        assert_eq!(counted, u64::from(fate.is_some()), "frames counted");
-        let grown = match fate {
-            None | Some(Fate::Counted) => return,
-            Some(Fate::Read) => {
+        assert_eq!(counted, u64::from(counter.is_some()), "frames counted");
+        let grown = match counter {
+            None | Some(ExpectedCounter::Counted) => return,
+            Some(ExpectedCounter::Read) => {
                 return assert_eq!(refusals(is), refusals(was), "a member's frame");
             }
-            Some(Fate::Unsigned) => is.unsigned - was.unsigned,
-            Some(Fate::Forged) => is.forged - was.forged,
-            Some(Fate::Replayed) => is.replayed - was.replayed,
+            Some(ExpectedCounter::Unsigned) => is.unsigned - was.unsigned,
+            Some(ExpectedCounter::Forged) => is.forged - was.forged,
+            Some(ExpectedCounter::Replayed) => is.replayed - was.replayed,
         };
-        assert_eq!(grown, 1, "{fate:?}");
+        assert_eq!(grown, 1, "{counter:?}");
         assert_eq!(before.phase(), after.phase());
         assert_eq!(before.setpoint(), after.setpoint());
         assert_eq!(before.target(), after.target());
@@ -336,12 +338,18 @@ impl Bench {
 
     /// Builds a frame with this body. It is signed if the relay requires authentication tags; now and then it is made
     /// as an attacker would.
-    fn said(&mut self, side: usize, header: Header, body: &[u8], input: &mut Input<'_>) -> Said {
+    fn test_frame(
+        &mut self,
+        side: usize,
+        header: Header,
+        body: &[u8],
+        input: &mut Input<'_>,
+    ) -> TestFrame {
         let Some(Some(member)) = self.members.get_mut(side) else {
-            let (wire, fate) = (stuffed(&unsigned(header, body)), Fate::Counted);
-            return Said { wire, fate };
+            let (wire, counter) = (stuffed(&unsigned(header, body)), ExpectedCounter::Counted);
+            return TestFrame { wire, counter };
         };
-        let (plain, fate) = match input.below(16) {
+        let (plain, counter) = match input.below(16) {
             10 => {
                 let mut plain = member.signed(header, body);
                 plain.truncate(plain.len() - 4);
@@ -349,27 +357,33 @@ impl Bench {
                 if let Some(byte) = plain.get_mut(place) {
                     *byte ^= 1 << input.below(8);
                 }
-                (sealed(plain), Fate::Forged)
+                (sealed(plain), ExpectedCounter::Forged)
             }
-            11 => (unsigned(header, body), Fate::Unsigned),
-            12 => (member.stranger().signed(header, body), Fate::Forged),
+            11 => (unsigned(header, body), ExpectedCounter::Unsigned),
+            12 => (
+                member.with_other_key().signed(header, body),
+                ExpectedCounter::Forged,
+            ),
             // Restarted, but without a new handshake.
-            13 => (member.restarted().signed(header, body), Fate::Forged),
+            13 => (
+                member.restarted().signed(header, body),
+                ExpectedCounter::Forged,
+            ),
             14 => {
                 let mut member = member.restarted();
                 let plain = member.signed(header, body);
                 self.introduce(side, Some(member));
-                (plain, Fate::Read)
+                (plain, ExpectedCounter::Read)
             }
-            _ => (member.signed(header, body), Fate::Read),
+            _ => (member.signed(header, body), ExpectedCounter::Read),
         };
-        let fate = if plain.len() > MAX_DECODED {
-            Fate::Counted
+        let counter = if plain.len() > MAX_DECODED {
+            ExpectedCounter::Counted
         } else {
-            fate
+            counter
         };
         let wire = stuffed(&plain);
-        Said { wire, fate }
+        TestFrame { wire, counter }
     }
 }
 

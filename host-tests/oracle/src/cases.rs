@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::reference::{Link, Station};
+use crate::reference::{Link, Relay};
 
 /// Optimum (linear SIR) of the default scenario for each number of relays. An independent program has computed the
 /// values, to nine digits.
@@ -114,7 +114,7 @@ impl Case {
             eta: p.eta,
             noise_w: 0.0,
             relays: vec![
-                Station {
+                Relay {
                     altitude_m: p.h,
                     power_w: p.p_u
                 };

@@ -4,10 +4,10 @@ use uav_relay::channel::AirGround;
 use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
 use uav_relay_scenario::Source;
 use uav_relay_scenario::number::narrow;
-use uav_relay_scenario::scene::{Corridor, Relay, Scene};
+use uav_relay_scenario::scene::{self, Corridor, Scene};
 
 use crate::reference::stochastic::StochasticLink;
-use crate::reference::{Link, Station};
+use crate::reference::{Link, Relay};
 
 /// Converts a reference link to a mission, and to the profiles of relays that differ. `None` if a relay would reject
 /// a number.
@@ -22,7 +22,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
         AirGround::Weighted(weight.clamp(0.0, 1.0)),
     )
     .ok()?;
-    let profile = |station: &Station| Profile {
+    let profile = |station: &Relay| Profile {
         altitude_m: narrow(station.altitude_m),
         power_w: narrow(station.power_w),
     };
@@ -56,7 +56,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
 /// relays.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
-    let relay = |station: &Station| Relay {
+    let relay = |station: &Relay| scene::Relay {
         altitude_m: station.altitude_m,
         power_w: station.power_w,
         holds: false,
@@ -140,7 +140,7 @@ pub fn as_relays_know_it(link: &Link) -> Link {
         relays: link
             .relays
             .iter()
-            .map(|station| Station {
+            .map(|station| Relay {
                 altitude_m: round(station.altitude_m),
                 power_w: round(station.power_w),
             })

@@ -13,8 +13,8 @@ use serde::Deserialize;
 use uav_relay_scenario::number::narrow;
 
 use crate::random::joint::Scenario;
-use crate::reference::joint::{Corridor, Hold, Place};
-use crate::reference::{Link, Station};
+use crate::reference::joint::{Corridor, FixedCrossSection, Place};
+use crate::reference::{Link, Relay};
 
 const FILE: &str = include_str!("../data/optima.jsonl");
 
@@ -94,7 +94,7 @@ impl Row {
             eta: self.eta,
             noise_w: single(self.noise_w),
             relays: powers
-                .map(|power_w| Station {
+                .map(|power_w| Relay {
                     altitude_m: least_m,
                     power_w: single(power_w),
                 })
@@ -106,15 +106,15 @@ impl Row {
             left_m,
             right_m,
         };
-        let hold = |&(relay, y_m, altitude_m): &(usize, f64, f64)| Hold {
+        let hold = |&(relay, y_m, altitude_m): &(usize, f64, f64)| FixedCrossSection {
             relay,
             y_m: single(y_m),
             altitude_m: single(altitude_m),
         };
-        let held: Vec<Hold> = self.held.iter().map(hold).collect();
+        let held: Vec<FixedCrossSection> = self.held.iter().map(hold).collect();
         // Decimals may be rounded to beyond a wall.
         let place = |(relay, &[x_m, y_m, altitude_m]): (usize, &[f64; 3])| {
-            let room = Hold::room(&held, relay, corridor);
+            let room = FixedCrossSection::corridor_of(&held, relay, corridor);
             Place {
                 x_m: x_m.clamp(0.0, link.distance_m),
                 y_m: y_m.clamp(room.left_m, room.right_m),
@@ -140,7 +140,7 @@ impl Row {
 
 /// Returns all parameters of a scene in f32, to find it among the recorded ones. The altitudes of `link` are left
 /// out, because the joint problem ignores them.
-fn key(link: &Link, corridor: Corridor, held: &[Hold]) -> Vec<f32> {
+fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {
     let common = [
         link.distance_m,
         link.min_separation_m,
@@ -185,7 +185,11 @@ pub fn all() -> Result<&'static [Record]> {
 ///
 /// # Errors
 /// If the scene is not recorded: `SEED` and `COUNT` of a test can select recorded scenes only.
-pub fn optimum(link: &Link, corridor: Corridor, held: &[Hold]) -> Result<Option<Optimum>> {
+pub fn optimum(
+    link: &Link,
+    corridor: Corridor,
+    held: &[FixedCrossSection],
+) -> Result<Option<Optimum>> {
     let wanted = key(link, corridor, held);
     let found = all()?.iter().find(|record| record.key == wanted);
     found.map(|record| record.best.clone()).ok_or_else(|| {

@@ -70,7 +70,7 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
         change.relays.insert(shot.relay, (shot.is_on, shot.place));
         change.messages = shot.messages;
     }
-    for stand in &outcome.stands {
+    for stand in &outcome.snapshots {
         changes.entry(stand.at).or_default().believed = Some(stand.believed.estimate);
     }
     let last = changes.entry(outcome.ended).or_default();

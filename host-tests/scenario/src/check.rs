@@ -64,7 +64,7 @@ impl Check<'_> {
             let path = join(path, key.name);
             match table.get(key.name) {
                 Some(value) => {
-                    self.alone(&path, value, table, key)?;
+                    self.check_exclusive(&path, value, table, key)?;
                     self.value(&path, value, &key.rule)?;
                 }
                 None if !key.is_missed(table) => {}
@@ -77,7 +77,7 @@ impl Check<'_> {
                             &path,
                             None,
                             Problem::Missing,
-                            key.instead(keys.clone())
+                            key.alternatives(keys.clone())
                                 .fold(rule.to_string(), |said, other| {
                                     format!("{said}, or {} instead, {}", other.name, other.rule)
                                 }),
@@ -90,7 +90,7 @@ impl Check<'_> {
     }
 
     /// Rejects `key` if the table also has a key that excludes it, as `power_w` excludes `power_dbm`.
-    fn alone(
+    fn check_exclusive(
         &self,
         path: &str,
         value: &Value,
@@ -203,7 +203,7 @@ fn as_number(value: &Value) -> Option<f64> {
 /// Creates the error for a table that [`table`] accepts but serde cannot convert.
 ///
 /// This is a fault of the program: the table of allowed keys and the Rust types differ.
-pub(super) fn unread(file: &str, error: &toml::de::Error) -> ScenarioError {
+pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),
         key: None,

@@ -131,7 +131,7 @@ pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, Sce
     let sections = sections.clone();
     sections
         .try_into()
-        .map_err(|error| check::unread(file, &error))
+        .map_err(|error| check::internal_mismatch(file, &error))
 }
 
 /// Checks that the number of relays in `[network]` equals the one in `[plan]`, if both are given.

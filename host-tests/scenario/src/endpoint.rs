@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_an_address_is_named() {
+    fn errors_of_an_address_are_named() {
         use EndpointError::{NoHost, NoLocal, NoPort};
         for (text, error) in [
             ("udp:", NoHost),

@@ -7,7 +7,7 @@ use toml::Table;
 use uav_relay::flight::axis::{Axis, AxisError};
 use uav_relay::{Geodetic, Placement};
 
-use super::check::{mistake, unread};
+use super::check::{internal_mismatch, mistake};
 use super::error::{Problem, ScenarioError};
 use super::keys::number;
 use super::link::{Access, Link, RateModel, RateStep};
@@ -157,7 +157,9 @@ struct RawPlan {
 /// Converts the table of a file to [`RawFile`]. [`crate::check::table`] must have accepted the table.
 pub(super) fn from_table(file: &str, table: &Table) -> Result<RawFile, ScenarioError> {
     let table = table.clone();
-    table.try_into().map_err(|error| unread(file, &error))
+    table
+        .try_into()
+        .map_err(|error| internal_mismatch(file, &error))
 }
 
 /// Builds the scenario after checking that its keys agree with each other.
@@ -184,7 +186,7 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     }
     let (line, distance_m) = line(file, raw.site, geometry.distance_m)?;
     let powers = powers(file, &raw.power)?;
-    let room = Room {
+    let room = RelayArea {
         line: line.as_ref(),
         distance_m,
         altitudes_m: [altitude_min_m, altitude_max_m],
@@ -350,7 +352,7 @@ fn interference(
     raw: Option<&[RawSource]>,
     field: Option<RawField>,
     listens: bool,
-    room: &Room,
+    room: &RelayArea,
 ) -> Result<Interference, ScenarioError> {
     let one = || "either one [field] or one or more [[interferer]]".to_owned();
     match (raw, field) {
@@ -431,14 +433,14 @@ fn relays(
             ))
         };
         let table = format!("relay[{place}].");
-        let said = Said {
+        let said = GivenPower {
             table: &table,
             in_w: ("power_w", raw.power_w),
             in_dbm: ("power_dbm", raw.power_dbm),
             eirp: ("", None),
             gain: ("power.uav_gain_dbi", Some(gain_dbi)),
         };
-        let power_w = said.of_ours(file)?;
+        let power_w = said.chain_eirp_w(file)?;
         if raw.altitude_m.is_none() && power_w.is_none() {
             return fail(
                 Problem::NothingDiffers,
@@ -597,7 +599,7 @@ pub(super) struct Powers {
 }
 
 /// Power of a sender as the file gives it: in W, in dBm, or as an EIRP, each with the name of its key.
-pub(super) struct Said<'a> {
+pub(super) struct GivenPower<'a> {
     /// Prefix of the keys' names in error messages: the table with a dot, such as `interferer[0].`
     pub(super) table: &'a str,
     pub(super) in_w: (&'a str, Option<f64>),
@@ -607,7 +609,7 @@ pub(super) struct Said<'a> {
     pub(super) gain: (&'a str, Option<f64>),
 }
 
-impl Said<'_> {
+impl GivenPower<'_> {
     fn eirp_w(&self, file: &str, [least, most]: [f64; 2]) -> Result<Option<f64>, ScenarioError> {
         let gain = self.gain.1.map_or(1.0, factor);
         let ((key, given), eirp_w) = match (self.in_w, self.in_dbm, self.eirp) {
@@ -637,43 +639,43 @@ impl Said<'_> {
         ))
     }
 
-    pub(super) fn of_ours(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
+    pub(super) fn chain_eirp_w(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
         self.eirp_w(file, EIRP)
     }
 
-    pub(super) fn of_source(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
+    pub(super) fn source_eirp_w(&self, file: &str) -> Result<Option<f64>, ScenarioError> {
         self.eirp_w(file, SOURCE_EIRP)
     }
 }
 
 pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError> {
     let table = "power.";
-    let tx = Said {
+    let tx = GivenPower {
         table,
         in_w: ("tx_w", raw.tx_w),
         in_dbm: ("tx_dbm", raw.tx_dbm),
         eirp: ("tx_eirp_dbm", raw.tx_eirp_dbm),
         gain: ("tx_gain_dbi", raw.tx_gain_dbi),
     };
-    let uav = Said {
+    let uav = GivenPower {
         table,
         in_w: ("uav_w", raw.uav_w),
         in_dbm: ("uav_dbm", raw.uav_dbm),
         eirp: ("", None),
         gain: ("uav_gain_dbi", raw.uav_gain_dbi),
     };
-    let rx = Said {
+    let rx = GivenPower {
         table,
         in_w: ("rx_w", raw.rx_w),
         in_dbm: ("rx_dbm", raw.rx_dbm),
         eirp: ("", None),
         gain: ("rx_gain_dbi", raw.rx_gain_dbi),
     };
-    let tx_w = tx.of_ours(file)?.unwrap_or_default();
+    let tx_w = tx.chain_eirp_w(file)?.unwrap_or_default();
     Ok(Powers {
         tx_w,
-        rx_w: rx.of_ours(file)?.unwrap_or(tx_w),
-        uav_w: uav.of_ours(file)?.unwrap_or_default(),
+        rx_w: rx.chain_eirp_w(file)?.unwrap_or(tx_w),
+        uav_w: uav.chain_eirp_w(file)?.unwrap_or_default(),
         uav_gain_dbi: raw.uav_gain_dbi.unwrap_or_default(),
         rx_gain_dbi: raw.rx_gain_dbi.unwrap_or_default(),
     })
@@ -682,7 +684,7 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
 /// Largest error of the interference, dB, at which an interferer above or below the ground is accepted.
 ///
 /// The mission has all interferers on the ground. The limit holds at every position that relays or Rx may have.
-const MOST_OFF_DB: f64 = 1.0;
+const MAX_HEIGHT_ERROR_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -698,7 +700,7 @@ pub(super) struct RawSource {
     amsl_m: Option<f64>,
 }
 
-pub(super) struct Room<'a> {
+pub(super) struct RelayArea<'a> {
     pub(super) line: Option<&'a Line>,
     pub(super) distance_m: f64,
     pub(super) altitudes_m: [f64; 2],
@@ -709,19 +711,19 @@ pub(super) struct Room<'a> {
 pub(super) fn sources(
     file: &str,
     raw: &[RawSource],
-    room: &Room,
+    room: &RelayArea,
 ) -> Result<Vec<Source>, ScenarioError> {
     let each = raw.iter().enumerate();
     each.map(|(at, raw)| {
         let table = format!("interferer[{at}].");
-        let said = Said {
+        let said = GivenPower {
             table: &table,
             in_w: ("power_w", raw.power_w),
             in_dbm: ("power_dbm", raw.power_dbm),
             eirp: ("eirp_dbm", raw.eirp_dbm),
             gain: ("gain_dbi", raw.gain_dbi),
         };
-        let power_w = said.of_source(file)?.unwrap_or_default();
+        let power_w = said.source_eirp_w(file)?.unwrap_or_default();
         let (x_m, y_m) = match (raw.lat_deg, raw.lon_deg) {
             (Some(lat), Some(lon)) => on_earth(file, &table, raw, [lat, lon], room)?,
             _ => (raw.x_m.unwrap_or_default(), raw.y_m.unwrap_or_default()),
@@ -740,7 +742,7 @@ fn on_earth(
     table: &str,
     raw: &RawSource,
     [lat_deg, lon_deg]: [f64; 2],
-    room: &Room,
+    room: &RelayArea,
 ) -> Result<(f64, f64), ScenarioError> {
     let key = format!("{table}lat_deg");
     let value = format!("{lat_deg}, lon_deg = {lon_deg}");
@@ -773,14 +775,14 @@ fn on_earth(
     let (x_m, y_m) = (f64::from(x_m), f64::from(y_m));
     if let Some(amsl_m) = raw.amsl_m {
         let above_m = f64::from(altitude_m);
-        let off_db = room.off_by_db(x_m, y_m, above_m);
-        if off_db > MOST_OFF_DB {
+        let off_db = room.height_error_db(x_m, y_m, above_m);
+        if off_db > MAX_HEIGHT_ERROR_DB {
             let value = format!(
                 "{}, {above_m:.1} m above the straight line between the sites,",
                 number(amsl_m)
             );
             let allowed = format!(
-                "a height that changes the interference anywhere by at most {MOST_OFF_DB} dB, and this does by {off_db:.1} dB: \
+                "a height that changes the interference anywhere by at most {MAX_HEIGHT_ERROR_DB} dB, and this does by {off_db:.1} dB: \
                  interferers are on the ground; none, for one there"
             );
             let key = format!("{table}amsl_m");
@@ -796,12 +798,12 @@ fn on_earth(
     Ok((x_m, y_m))
 }
 
-impl Room<'_> {
+impl RelayArea<'_> {
     /// Returns the largest error of the interference, dB, if a source above ground is treated as on it.
     ///
     /// The source is at (`x_m`, `y_m`), `above_m` over the ground, m. For each of 65 altitudes, the error is that at
     /// the nearest position which a relay may have, where it is largest. Rx, on the ground, is one more receiver.
-    fn off_by_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
+    fn height_error_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;
         let ratio_db = |beside_m: f64, h: f64| {
             let beside = beside_m * beside_m;

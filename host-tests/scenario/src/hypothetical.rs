@@ -1,7 +1,7 @@
 //! The hypothetical interferer closest to several. The paper's "Extension to Multiple Sources of Interference".
 //!
 //! Minimises the integral, over [0, D] and the altitude band, of |p_H / ((x - x_H)^2 + y_H^2 + h^2) - the same summed over the
-//! true sources|. The best p_H at a position is a weighted median ([`Raster::weigh`]); the position is searched on a grid, then
+//! true sources|. The best p_H at a position is a weighted median ([`Raster::best_power`]); the position is searched on a grid, then
 //! by simplexes from the grid's best local minima and from the true sources. The global minimum may be missed: a test compares
 //! the result with 20 000 random positions in each of 20 scenes.
 //!
@@ -111,7 +111,7 @@ pub struct Fit {
     /// Lateral distance y_H of the hypothetical interferer from the line, m, >= 0.
     pub y_m: f64,
     /// Best power of an interferer at this position, and the error that remains with it.
-    pub weighed: Weighed,
+    pub best_power: BestPower,
 }
 
 /// Returns the single interferer that best replaces all interferers of `scene`; `None` if it has none.
@@ -122,9 +122,9 @@ pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     let found = fit(scene, &Raster::graded(scene, None, FINE))?;
     let place = (found.x_m, found.y_m);
     let raster = Raster::graded(scene, Some(place), REPORTED);
-    let Weighed { error, .. } = raster.weigh(place.0, place.1);
+    let BestPower { error, .. } = raster.best_power(place.0, place.1);
     Some(Hypothetical {
-        power_w: found.weighed.power_w,
+        power_w: found.best_power.power_w,
         x_m: found.x_m,
         y_m: found.y_m,
         mean_abs_error_w: error / (raster.area() * scene.eta),
@@ -158,7 +158,7 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     Some(Fit {
         x_m,
         y_m,
-        weighed: raster.weigh(x_m, y_m),
+        best_power: raster.best_power(x_m, y_m),
     })
 }
 
@@ -257,7 +257,7 @@ impl Space {
 
     fn error(&self, raster: &Raster, at: (f64, f64)) -> f64 {
         let (x, y) = self.place(at);
-        raster.weigh(x, y).error
+        raster.best_power(x, y).error
     }
 
     /// Returns the grid of the search along x, m. The spacing is D / 16 in the middle between Tx and Rx, and wider
@@ -329,7 +329,7 @@ pub struct Raster {
 
 /// Best power of a hypothetical interferer at a given position, and the error that remains.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Weighed {
+pub struct BestPower {
     /// Best transmit power of the hypothetical interferer at its position, W, > 0.
     pub power_w: f64,
     /// Integral of |p / d^2 - S| over the points, with this interferer's power p and its distance d.
@@ -340,14 +340,14 @@ pub struct Weighed {
 }
 
 /// A coordinate of a quadrature point, and its weight in that direction.
-type Share = (f64, f64);
+type WeightedCoordinate = (f64, f64);
 
 impl Raster {
     /// Creates quadrature points at the centres of `columns` x `rows` equal cells.
     ///
     /// There is one row if the lowest and the highest altitude are equal.
     pub fn even(scene: &Scene, columns: u32, rows: u32) -> Self {
-        let midpoints = |low: f64, high: f64, count: u32| -> Vec<Share> {
+        let midpoints = |low: f64, high: f64, count: u32| -> Vec<WeightedCoordinate> {
             let cell = (high - low) / f64::from(count);
             (0..count)
                 .map(|i| (low + (f64::from(i) + 0.5) * cell, cell))
@@ -415,7 +415,11 @@ impl Raster {
         })
     }
 
-    fn of(scene: &Scene, rows: &[Share], columns: impl Fn(f64) -> Vec<Share>) -> Self {
+    fn of(
+        scene: &Scene,
+        rows: &[WeightedCoordinate],
+        columns: impl Fn(f64) -> Vec<WeightedCoordinate>,
+    ) -> Self {
         let mut nodes = Vec::new();
         for &(h, height) in rows {
             for (x, width) in columns(h) {
@@ -450,7 +454,7 @@ impl Raster {
     }
 
     /// Returns the integral of the sum of p / distance^2 over the true sources. The unit is that of
-    /// [`Weighed::error`].
+    /// [`BestPower::error`].
     pub fn total(&self) -> f64 {
         self.total
     }
@@ -460,7 +464,7 @@ impl Raster {
     /// The error is the integral of |p g - S|, where g = 1 / distance^2 is the effect of the interferer per watt, p
     /// its power, and S the same from the true sources. The best p is the median of S / g, weighted by g. The time is
     /// linear in the number of points.
-    pub fn weigh(&self, x: f64, y: f64) -> Weighed {
+    pub fn best_power(&self, x: f64, y: f64) -> BestPower {
         let shape = |node: &Node| {
             let dx = node.x - x;
             1.0 / (dx * dx + y * y + node.h_squared)
@@ -480,7 +484,7 @@ impl Raster {
         let each = ratios
             .iter()
             .map(|ratio| ratio.weight * (power_w - ratio.value).abs());
-        Weighed {
+        BestPower {
             power_w,
             error: each.sum(),
         }
@@ -489,7 +493,7 @@ impl Raster {
 
 /// Returns two Gauss points, with weights, in each cell between neighbouring `ends`. They integrate cubic functions
 /// exactly.
-fn gauss(ends: &[f64]) -> Vec<Share> {
+fn gauss(ends: &[f64]) -> Vec<WeightedCoordinate> {
     let cells = ends.iter().zip(ends.iter().skip(1));
     cells
         .flat_map(|(low, high)| {
@@ -670,7 +674,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bottom_of_a_bent_valley_is_found() {
+    fn the_minimum_of_a_curved_valley_is_found() {
         let valley = |(x, y): (f64, f64)| 1.0 + (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2);
         let found = minimise(valley, (-1.2, 1.0), (0.1, 0.1), 1e-15, 500);
         assert!(

@@ -269,7 +269,7 @@ impl Key {
     }
 
     /// Returns the keys that the table may have in place of this required key. `keys` are all keys of the table.
-    pub(super) fn instead(
+    pub(super) fn alternatives(
         &self,
         keys: impl IntoIterator<Item = &'static Key>,
     ) -> impl Iterator<Item = &'static Key> {

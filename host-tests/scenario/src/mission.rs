@@ -164,7 +164,7 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
 }
 
 /// Returns an error line if the scenario describes a relay beyond a chain of `uavs`. Otherwise `None`.
-pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
+pub fn undescribed_relay_error(scenario: &Scenario, uavs: u16) -> Option<String> {
     let (index, _) = scenario.relays.last_key_value()?;
     (*index > uavs).then(|| {
         format!("[[relay]] index = {index}: there is no such relay in a chain of {uavs}; allowed: 1 to {uavs}")
@@ -172,7 +172,7 @@ pub fn left_out(scenario: &Scenario, uavs: u16) -> Option<String> {
 }
 
 /// Returns the indices, from 1, of relays up to `uavs` for which the scenario sets a fixed altitude.
-pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
+pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
     scenario
         .relays
         .iter()
@@ -186,7 +186,7 @@ pub fn held(scenario: &Scenario, uavs: u16) -> Vec<u16> {
 /// Upsilon, the mean of the inverse interference in 1/W, is that at Rx. Missions without a field are returned
 /// unchanged.
 #[must_use]
-pub fn told_of_an_even_field(mission: &Mission) -> Mission {
+pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();
     let uav_relay::Interference::Field(field) = config.interference else {
         return *mission;

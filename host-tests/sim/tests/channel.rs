@@ -66,7 +66,7 @@ fn agree_and_hold(relays: u16, loss: f64, seeds: u64) {
 }
 
 #[test]
-fn up_to_twenty_agree_and_hold_even_where_30_percent_are_lost() {
+fn twenty_relays_agree_with_30_percent_loss() {
     for relays in [2, 8, 20] {
         for loss in [0.0, 0.3] {
             agree_and_hold(relays, loss, 4);
@@ -75,19 +75,19 @@ fn up_to_twenty_agree_and_hold_even_where_30_percent_are_lost() {
 }
 
 #[test]
-fn a_hundred_agree_and_hold() {
+fn a_hundred_relays_agree_and_hold() {
     agree_and_hold(100, 0.0, 1);
 }
 
 #[test]
-fn fifty_agree_and_hold_even_where_30_percent_are_lost() {
+fn fifty_relays_agree_with_30_percent_loss() {
     agree_and_hold(50, 0.3, 4);
 }
 
 /// Fails at present: after the agreement, the relays' own requests fill the channel.
 #[test]
 #[ignore = "fails"]
-fn a_hundred_agree_and_hold_even_where_30_percent_are_lost() {
+fn a_hundred_relays_agree_with_30_percent_loss() {
     agree_and_hold(100, 0.3, 2);
 }
 
@@ -123,7 +123,7 @@ const MOST: f64 = 1.5;
 ///
 /// 30 % of the frames are lost, 15 % corrupted, 10 % duplicated and 10 % delayed.
 #[test]
-fn on_a_bad_day_time_and_messages_grow_as_n_log_n() {
+fn with_faults_time_and_messages_grow_as_n_log_n() {
     println!("| N | links | settled | time, median | worst | messages, median | most |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     let mut shares = Vec::new();

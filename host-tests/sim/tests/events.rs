@@ -34,7 +34,7 @@ fn of(outcome: &Outcome, what: fn(TimelineEvent) -> bool) -> Vec<(u16, Option<u1
 
 /// Checks that relays report a lost neighbour by its number, and the next neighbour by its own number.
 #[test]
-fn who_is_lost_and_who_is_found_is_told_by_its_number() {
+fn lost_and_found_relays_are_reported_by_index() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(200));
     setup.kills = vec![(3, at(60))];
     let outcome = run(setup).unwrap();
@@ -56,7 +56,7 @@ fn who_is_lost_and_who_is_found_is_told_by_its_number() {
 ///
 /// Relay 3 does not receive relay 2, but relay 2 receives relay 3. It must learn why they are no neighbours.
 #[test]
-fn a_relay_that_is_not_heard_is_told_by_whom() {
+fn a_relay_that_is_not_received_is_reported() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
     setup.deaf = vec![OneWayFailure {
         by: 3,
@@ -75,7 +75,7 @@ fn a_relay_that_is_not_heard_is_told_by_whom() {
 ///
 /// Such reports would be of nodes that do not receive, of wrong keys, or of old epochs.
 #[test]
-fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
+fn a_bad_channel_causes_no_false_reports() {
     for seed in 1..=3 {
         let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(300));
         setup.faults.loss = 0.3;
@@ -101,7 +101,7 @@ fn a_bad_channel_has_nobody_told_of_what_is_not_so() {
 ///
 /// Two of five relays are too few for a quorum.
 #[test]
-fn a_quorum_lost_is_told_once_until_a_view_is_agreed_on() {
+fn a_lost_quorum_is_reported_once() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(600));
     setup.kills = vec![(1, at(60)), (2, at(60)), (3, at(60))];
     let outcome = run(setup).unwrap();
@@ -283,7 +283,7 @@ fn count() -> u64 {
 ///
 /// Runs as many chains for each loss rate as the variable `COUNT` says.
 #[test]
-fn the_later_of_two_relays_with_one_number_has_no_set_point_and_both_are_told() {
+fn the_later_of_two_duplicates_gets_no_setpoint() {
     for loss in [0.0, 0.3, 0.5] {
         for seed in 0..count() {
             let (mut air, other) = joined(loss, seed);
@@ -307,7 +307,7 @@ fn the_later_of_two_relays_with_one_number_has_no_set_point_and_both_are_told() 
 }
 
 #[test]
-fn the_later_one_takes_part_once_the_other_is_gone() {
+fn a_duplicate_joins_when_the_other_one_is_gone() {
     for by_hand in [false, true] {
         let (mut air, other) = joined(0.0, 1);
         air.run(10);
@@ -330,7 +330,7 @@ fn the_later_one_takes_part_once_the_other_is_gone() {
 ///
 /// The other one is passive.
 #[test]
-fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
+fn one_of_two_simultaneous_duplicates_flies() {
     for seed in 0..6 {
         let mission = mission(4);
         let mut air = Air::of(&mission, |_| None, 0.1 * (seed % 3) as f64);
@@ -350,7 +350,7 @@ fn of_two_that_are_switched_on_together_one_flies_in_the_end() {
 ///
 /// The other one becomes passive and reports the duplicate.
 #[test]
-fn with_a_key_the_one_with_the_larger_epoch_stays() {
+fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {
         let mission = mission(5);
         let mut air = Air::of(&mission, |_| auth(KEY, 5), 0.0);
@@ -371,7 +371,7 @@ fn with_a_key_the_one_with_the_larger_epoch_stays() {
 
 /// Checks that an attacker without the key can cause a report of a duplicate, but no passive relay.
 #[test]
-fn forged_frames_have_nobody_stand_down() {
+fn forged_frames_make_no_relay_passive() {
     let mission = mission(3);
     let mut air = Air::of(&mission, |_| auth(KEY, 1), 0.0);
     air.run(60);
@@ -395,7 +395,7 @@ fn forged_frames_have_nobody_stand_down() {
 
 /// Checks that a relay with another key and its neighbours report each other once.
 #[test]
-fn another_key_is_told_with_the_node() {
+fn a_key_mismatch_is_reported_with_the_node() {
     for loss in [0.0, 0.3] {
         let key = |index| if index == 2 { [1; 32] } else { KEY };
         let mut air = Air::of(&mission(3), |index| auth(key(index), 1), loss);
@@ -430,7 +430,7 @@ fn two_forged_handshakes_are_noise() {
 ///
 /// A newer epoch is accepted without a report.
 #[test]
-fn an_epoch_that_went_back_is_told_with_the_node() {
+fn an_epoch_that_went_back_is_reported_with_the_node() {
     for (loss, again, back) in [(0.0, 1, true), (0.3, 1, true), (0.3, 6, false)] {
         let mission = mission(3);
         let epoch = |index| if index == 2 { 5 } else { 1 };
@@ -452,7 +452,7 @@ fn an_epoch_that_went_back_is_told_with_the_node() {
 /// With the larger random claim it takes part at once. With the smaller one it reports that its number is taken, and
 /// gets no setpoint until its neighbours have received nothing of the larger claim for `dead_after`.
 #[test]
-fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() {
+fn with_a_reused_epoch_a_relay_joins_or_reports_and_waits() {
     let mut waited = 0;
     for seed in 1..=12 {
         let mission = mission(3);
@@ -480,7 +480,7 @@ fn with_the_epoch_that_it_had_a_relay_takes_part_at_once_or_reports_and_waits() 
 
 /// Checks that a relay with neighbours of the same number at both of its ports reports a duplicate.
 #[test]
-fn a_neighbour_that_is_heard_at_both_ports_is_told() {
+fn a_neighbour_received_at_both_ports_is_reported() {
     let mission = mission(3);
     let of = |index| {
         let identity = Identity { network: 7, index };
@@ -558,7 +558,7 @@ fn begin_upload(air: &mut Air, base: &Mission, epoch: u32) {
 ///
 /// They accept a new upload afterwards.
 #[test]
-fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same() {
+fn a_withheld_offer_is_refused_and_the_new_one_flown() {
     let after = Settings::default().dead_after.times(2).as_micros() / 1_000_000;
     for (wait, loss) in [(after + 2, 0.0), (3_600, 0.0), (after + 2, 0.3)] {
         let base = mission(4);
@@ -601,7 +601,7 @@ fn an_offer_that_was_withheld_is_refused_and_the_true_one_is_flown_all_the_same(
 
 /// Checks that a withheld offer is accepted if the attacker sends it within the time limit of offers.
 #[test]
-fn an_offer_that_comes_at_once_is_taken() {
+fn an_offer_without_delay_is_accepted() {
     let base = mission(4);
     let (mut air, offers) = caught(&base, 0.0);
     air.run(10);

@@ -116,7 +116,7 @@ fn dying(loss: f64, seeds: u64) -> (f64, usize, f64, f64) {
 }
 
 #[test]
-fn without_losses_a_death_is_got_over_within_a_minute() {
+fn without_losses_the_chain_recovers_within_a_minute() {
     let (_, never, _, worst) = dying(0.0, number("COUNT", 50));
     assert_eq!(never, 0);
     assert!(worst < 60.0, "{worst}");
@@ -125,7 +125,7 @@ fn without_losses_a_death_is_got_over_within_a_minute() {
 /// Prints the recovery times after the loss of a relay on bad channels, and the seeds without recovery.
 #[test]
 #[ignore = "prints a table"]
-fn deaths_on_bad_channels() {
+fn the_chain_recovers_on_bad_channels() {
     println!("| loss | median | worst | seeds in which it was not got over |");
     println!("| --- | --- | --- | --- |");
     for loss in [0.0, 0.5, 0.7] {
@@ -179,7 +179,7 @@ fn joined(outcome: &Outcome, healed: Instant) -> Option<Instant> {
 }
 
 #[test]
-fn after_two_cuts_all_come_back_into_one_view() {
+fn after_two_cuts_all_relays_return_to_one_view() {
     let cases = cuts();
     assert_eq!(cases.len(), 84);
     let ends = run_all(&cases, |setup, outcome| {
@@ -239,7 +239,7 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
 ///
 /// All relays but one of the two at the link have to hold positions in one view, without recent changes.
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
-    let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.seen).collect();
+    let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.observed).collect();
     let agreements = groups(&seen);
     if agreements != 1 {
         return Some(format!("{agreements} agreements"));
@@ -272,7 +272,7 @@ fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
 }
 
 #[test]
-fn in_the_end_all_but_one_of_those_that_hear_each_other_have_one_agreement() {
+fn all_but_one_linked_relays_share_an_agreement() {
     let first = number("SEED", 1);
     let cases: Vec<_> = (first..first + number("COUNT", 1))
         .flat_map(one_way_links)
@@ -439,7 +439,7 @@ fn judge(setups: &[Setup]) {
 }
 
 #[test]
-fn whatever_happens_one_group_flies_at_most() {
+fn at_most_one_group_flies() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
@@ -448,7 +448,7 @@ fn whatever_happens_one_group_flies_at_most() {
 /// A view that only the last relay had accepted was followed by one without the relays that had voted for it and held
 /// its lease.
 #[test]
-fn what_was_decided_and_not_heard_of_ends_no_lease() {
+fn an_unheard_decision_ends_no_lease() {
     let mut sequence = sequence(6_450);
     sequence.boots.clear();
     judge(&[sequence]);
@@ -456,7 +456,7 @@ fn what_was_decided_and_not_heard_of_ends_no_lease() {
 
 #[test]
 #[ignore = "takes some minutes"]
-fn in_ten_thousand_sequences_one_group_flies_at_most() {
+fn at_most_one_group_flies_in_10000_sequences() {
     fly(number("SEED", 1_000), number("COUNT", 10_000));
 }
 
@@ -532,7 +532,7 @@ impl Soaked {
 }
 
 #[test]
-fn the_mean_of_ten_chains_is_right_for_as_long_as_is_asked() {
+fn the_mean_availability_of_ten_chains_is_high_enough() {
     for (loss, burst, asked) in ASKED {
         let soaked = soak(loss, burst, 10, at(600));
         let (mean, (seed, least)) = (soaked.mean(), soaked.least());
@@ -551,7 +551,7 @@ fn the_mean_of_ten_chains_is_right_for_as_long_as_is_asked() {
 
 #[test]
 #[ignore = "prints a table"]
-fn an_hour_on_bad_channels() {
+fn availability_in_an_hour_on_bad_channels() {
     let seeds = number("COUNT", 200);
     println!(
         "| loss, mean length of a run | asked for | mean | least (seed) | below what is asked for | never | first agreement, median | worst | \

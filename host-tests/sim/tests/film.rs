@@ -14,7 +14,7 @@ fn setup(uavs: u16) -> Setup {
 }
 
 #[test]
-fn an_agreement_is_filmed_from_nothing_to_the_places_it_ends_with() {
+fn an_animation_shows_an_agreement_from_start_to_end() {
     let plain = run(setup(8)).unwrap();
     let filmed = run(Setup {
         film: true,
@@ -43,7 +43,7 @@ fn an_agreement_is_filmed_from_nothing_to_the_places_it_ends_with() {
 }
 
 #[test]
-fn a_relay_that_falls_silent_and_comes_back_is_filmed_as_that() {
+fn an_animation_shows_a_relay_go_silent_and_return() {
     let (off, on) = (Instant::from_millis(20_000), Instant::from_millis(60_000));
     let mut setup = Setup {
         film: true,

@@ -72,7 +72,7 @@ fn every_row_of_a_table_is_displayed_in_a_table() {
 }
 
 #[test]
-fn the_readme_spells_sir_out_where_it_comes_first_and_stays_short() {
+fn the_readme_spells_sir_out_first_and_stays_short() {
     let text = read("README.md");
     let first = text.find("SIR").unwrap();
     let before = text[..first].trim_end_matches('(').trim_end();
@@ -103,7 +103,7 @@ fn the_pictures_of_the_readme_are_there_and_one_is_of_the_page() {
 
 /// Checks that the README's row about a lost relay has the times that the command in that row prints.
 #[test]
-fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
+fn the_readme_has_the_commands_figures_of_a_lost_relay() {
     let text = read("README.md");
     let row = (text.lines())
         .find(|line| line.starts_with("| relay 4 of 8 falls silent"))
@@ -136,7 +136,7 @@ fn the_readme_has_the_figures_of_a_lost_relay_that_the_command_prints() {
 
 /// Checks that RESULTS.md denies no measurement that FIRMWARE.md or LINUX.md describes.
 #[test]
-fn the_limits_do_not_deny_what_the_guides_describe() {
+fn stated_limits_do_not_contradict_the_guides() {
     let limits = read("examples/RESULTS.md");
     assert!(read("examples/FIRMWARE.md").contains("**Estimate the interferer.**"));
     assert!(read("examples/LINUX.md").contains("interference measured at its end"));

@@ -32,7 +32,7 @@ fn the_distance_follows_from_the_sites() {
 }
 
 #[test]
-fn what_is_wrong_with_sites_is_named() {
+fn errors_of_sites_are_named() {
     let near = SITES.replace("47.41", "47.40").replace("8.55", "8.54");
     let far = SITES.replace("47.41", "48.41");
     let off = SITES.replace("47.41", "97.41");

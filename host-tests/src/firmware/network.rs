@@ -183,7 +183,7 @@ mod tests {
     use uav_relay_sim::simulator::faults::{Faults, LinkSpec};
 
     #[test]
-    fn a_frame_begun_before_is_carried_whole() {
+    fn a_frame_in_transit_is_carried_to_its_end() {
         let (mut ends, mut ports) = (Vec::new(), Vec::new());
         for _ in 0..2 {
             let (end, port) = UnixStream::pair().unwrap();
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_port_that_nobody_reads_holds_up_no_other() {
+    fn an_unread_port_delays_no_other_port() {
         let (mut drones, mut ports) = (Vec::new(), Vec::new());
         for _ in 0..3 {
             let (drone, port) = UnixStream::pair().unwrap();

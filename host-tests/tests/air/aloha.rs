@@ -56,7 +56,7 @@ fn pure_aloha_has_its_throughput() {
 }
 
 #[test]
-fn frames_that_begin_in_common_slots_have_twice_that() {
+fn slotted_aloha_has_twice_that_throughput() {
     for (offered, says) in [(0.5, 0.3033), (1.0, 0.3679)] {
         let bench = crowd(Access::Aloha, false, 1);
         let share = throughput(bench, offered, 100_000, true);
@@ -66,7 +66,7 @@ fn frames_that_begin_in_common_slots_have_twice_that() {
 }
 
 #[test]
-fn carrier_sense_carries_more_where_all_hear_each_other() {
+fn carrier_sense_has_more_throughput_without_hidden_nodes() {
     let frames = 5_000;
     let near = throughput(crowd(Access::Csma, true, 1), 0.5, frames, false);
     let hidden = throughput(crowd(Access::Csma, false, 1), 0.5, frames, false);

@@ -7,7 +7,7 @@ use uav_relay_sim::simulator::faults::Bursts;
 const FRAMES: usize = 1_000_000;
 
 #[test]
-fn the_mean_share_and_the_mean_run_are_what_was_asked_for() {
+fn mean_loss_and_mean_burst_length_are_as_requested() {
     for (share, length) in [
         (0.1, 5.0),
         (0.3, 20.0),
@@ -34,7 +34,7 @@ fn the_mean_share_and_the_mean_run_are_what_was_asked_for() {
 }
 
 #[test]
-fn runs_are_geometric_and_each_direction_is_by_itself() {
+fn burst_lengths_are_geometric_for_each_direction() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut bursts = Bursts::new(0.4, 10.0);
     let (mut both, mut one, mut long, mut runs) = (0, 0, 0, 0);

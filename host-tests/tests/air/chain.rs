@@ -10,7 +10,7 @@ use uav_relay_sim::simulator::setup::Setup;
 use super::*;
 
 #[test]
-fn a_chain_takes_the_same_places_by_any_channel() {
+fn a_chain_agrees_on_the_same_positions_on_any_channel() {
     let ideal = run(Setup::on_shared_channel(mission(8))).unwrap();
     assert_eq!(ideal.air, AirCounts::default());
     for access in [Access::Aloha, Access::Csma] {
@@ -30,7 +30,7 @@ fn a_chain_takes_the_same_places_by_any_channel() {
 }
 
 #[test]
-fn a_deaf_relay_receives_nothing_until_it_hears_again() {
+fn a_deaf_relay_receives_nothing_until_the_failure_ends() {
     for access in [Access::Ideal, Access::Aloha, Access::Csma] {
         let mut setup = Setup::on_air(mission(2), access);
         setup.deaf = vec![OneWayFailure {
@@ -60,7 +60,7 @@ fn a_deaf_relay_receives_nothing_until_it_hears_again() {
 }
 
 #[test]
-fn a_wire_can_be_deaf_in_one_direction_too() {
+fn a_wire_can_fail_in_one_direction() {
     let mut setup = Setup::new(mission(3));
     setup.deaf = vec![OneWayFailure {
         by: 3,
@@ -74,7 +74,7 @@ fn a_wire_can_be_deaf_in_one_direction_too() {
 }
 
 #[test]
-fn what_a_timing_is_made_of_is_known_in_one_place() {
+fn the_setup_determines_the_channel_parameters() {
     let mut setup = Setup::on_air(mission(20), Access::Csma);
     setup.link.baud = 4_800;
     let channel = setup.channel();

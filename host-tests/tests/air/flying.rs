@@ -1,11 +1,11 @@
 //! Number of groups that fly different agreements.
 
 use uav_relay::{Phase, ViewId};
-use uav_relay_sim::simulator::watch::{Seen, groups, has_agreed};
+use uav_relay_sim::simulator::watch::{ObservedState, groups, has_agreed};
 
 /// Returns the state of a flying relay: relay `index` of `relays` relays in membership view `view`.
-fn seen(view: u32, relays: u16, index: u16) -> Seen {
-    Seen {
+fn seen(view: u32, relays: u16, index: u16) -> ObservedState {
+    ObservedState {
         is_on: true,
         phase: Phase::Holding,
         view: ViewId::from_bits(view),
@@ -20,7 +20,7 @@ fn seen(view: u32, relays: u16, index: u16) -> Seen {
 
 #[test]
 fn relays_of_one_view_are_one_group_and_of_two_views_two() {
-    let mut all: Vec<Seen> = (1..=4).map(|index| seen(0, 4, index)).collect();
+    let mut all: Vec<ObservedState> = (1..=4).map(|index| seen(0, 4, index)).collect();
     assert_eq!(groups(&all), 1);
     all[3] = seen(1, 1, 1);
     assert_eq!(groups(&all), 2);
@@ -33,10 +33,10 @@ fn relays_of_one_view_are_one_group_and_of_two_views_two() {
 }
 
 /// Function that changes one field of a relay's observed state, so that the relay counts as not flying.
-type Change = fn(&mut Seen);
+type Change = fn(&mut ObservedState);
 
 #[test]
-fn who_is_off_has_no_place_or_no_lease_flies_nothing() {
+fn without_power_position_or_lease_no_relay_flies() {
     let all = || vec![seen(0, 2, 1), seen(1, 1, 1)];
     let changes: [Change; 3] = [
         |one| one.is_on = false,
@@ -55,7 +55,7 @@ fn who_is_off_has_no_place_or_no_lease_flies_nothing() {
 }
 
 #[test]
-fn all_of_a_view_have_to_hold_their_places_for_one_target() {
+fn an_agreement_needs_all_relays_of_a_view_at_one_target() {
     let all = || vec![seen(0, 2, 1), seen(0, 2, 2)];
     assert!(has_agreed(&all()));
     assert!(!has_agreed(&all()[..1]));

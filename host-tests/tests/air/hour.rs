@@ -40,7 +40,7 @@ fn spread(mut times: Vec<f64>) -> String {
 
 #[test]
 #[ignore = "takes some minutes, and prints a table"]
-fn an_hour_on_a_bad_channel() {
+fn availability_in_an_hour_on_a_bad_channel() {
     let seeds: u64 = std::env::var("SEEDS").map_or(SEEDS, |text| text.parse().unwrap());
     println!(
         "| lost | availability: mean | least | first agreement: shortest / median / 99 % / longest | relay 4 dies, the others at their new places after | groups at once, most |"

@@ -19,7 +19,7 @@ fn a_frame_takes_its_bytes_its_header_and_the_turnaround() {
 }
 
 #[test]
-fn two_frames_that_overlap_are_both_lost_where_both_are_heard() {
+fn overlapping_frames_are_lost_where_both_are_received() {
     // Nodes 0 and 1 do not receive each other: 2 receives both, 3 only 0, 4 only 1.
     let hearers = vec![vec![2, 3], vec![2, 4], vec![], vec![], vec![]];
     for later in [0, 10, micros(50), micros(106) - 1] {
@@ -55,7 +55,7 @@ fn of_three_overlapping_frames_none_is_received() {
 }
 
 #[test]
-fn who_sends_does_not_hear() {
+fn a_sender_receives_nothing() {
     // Node 1 starts to send during 0's frame, which it therefore loses; 2 receives 1 alone.
     let hearers = vec![vec![1], vec![0, 2], vec![]];
     let mut bench = Bench::new(Access::Aloha, hearers.clone(), 1);

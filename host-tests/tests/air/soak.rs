@@ -22,7 +22,7 @@ fn s(at: Instant) -> f64 {
 }
 
 #[test]
-fn a_chain_that_nothing_happens_to_is_right_all_the_time() {
+fn without_faults_the_availability_is_1() {
     for access in [Access::Ideal, Access::Csma] {
         let setup = Setup::on_air(mission(8), access).soaked(seconds(300));
         let (outcome, watched) = watched(setup);
@@ -41,7 +41,7 @@ fn a_chain_that_nothing_happens_to_is_right_all_the_time() {
 }
 
 #[test]
-fn from_a_loss_to_the_new_places_it_is_wrong() {
+fn a_chain_is_unavailable_from_a_loss_to_new_positions() {
     let mut setup = Setup::on_shared_channel(mission(8));
     setup.kills = vec![(4, seconds(50))];
     let mission = setup.mission;
@@ -59,7 +59,7 @@ fn from_a_loss_to_the_new_places_it_is_wrong() {
 }
 
 #[test]
-fn the_optimum_is_that_of_exactly_those_who_are_left() {
+fn the_optimum_is_that_of_the_remaining_relays() {
     let setup = Setup::on_shared_channel(mission(8));
     let seven = run(Setup::new(mission(7))).unwrap();
     let places = undisturbed(&setup, &[1, 2, 3, 5, 6, 7, 8], 0).unwrap();
@@ -91,7 +91,7 @@ fn without_a_quorum_two_groups_fly_at_once() {
 }
 
 #[test]
-fn a_chain_that_never_agrees_is_never_right() {
+fn a_chain_that_never_agrees_has_availability_0() {
     let mut setup = Setup::on_shared_channel(mission(8));
     setup.partitions = (1..8)
         .map(|after| Partition {
@@ -106,7 +106,7 @@ fn a_chain_that_never_agrees_is_never_right() {
 }
 
 #[test]
-fn many_seeds_give_what_each_gives_alone() {
+fn run_seeds_gives_the_same_results_as_single_runs() {
     let mut setup = Setup::on_air(mission(5), Access::Csma).soaked(seconds(60));
     setup.faults = Faults {
         loss: 0.4,

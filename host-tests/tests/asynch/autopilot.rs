@@ -217,7 +217,7 @@ fn relay(relays: u16) -> Relay {
 
 /// State of relay and autopilot that the firmware task of the test has observed.
 #[derive(Default)]
-struct Seen {
+struct Observed {
     events: Vec<AutopilotEvent>,
     setpoint: Option<Placement>,
     flown: bool,
@@ -228,7 +228,7 @@ struct Scene {
     pool: LocalPool,
     vehicle: Rc<Vehicle>,
     from_link: Uart,
-    seen: Rc<RefCell<Seen>>,
+    seen: Rc<RefCell<Observed>>,
 }
 
 impl Scene {
@@ -251,7 +251,7 @@ impl Scene {
             commands: RefCell::default(),
             results: RefCell::default(),
         });
-        let seen = Rc::<RefCell<Seen>>::default();
+        let seen = Rc::<RefCell<Observed>>::default();
         let task = {
             let (time, vehicle, seen) = (time.clone(), Rc::clone(&vehicle), Rc::clone(&seen));
             let (mut rx, mut tx) = (to_link.clone(), from_link.clone());
@@ -308,7 +308,7 @@ impl Scene {
 /// Checks that the autopilot link flies the drone to the position of a single relay. The firmware may or may not pass
 /// the relay's events to the link.
 #[test]
-fn it_is_engaged_and_led_to_its_place() {
+fn the_drone_is_engaged_and_led_to_its_position() {
     for tells in [true, false] {
         let mut scene = Scene::new(tells);
         scene.run(120_000);
@@ -341,7 +341,7 @@ fn it_is_engaged_and_led_to_its_place() {
 
 /// Checks that a silent autopilot makes the relay and the firmware treat the drone as not flown.
 #[test]
-fn it_falls_silent_and_comes_back() {
+fn a_silent_autopilot_is_found_again() {
     let mut scene = Scene::new(true);
     scene.run(30_000);
     assert!(scene.seen.borrow().flown);
@@ -370,7 +370,7 @@ fn it_falls_silent_and_comes_back() {
 
 /// Checks that a blocked writer to the autopilot stops neither the reception of messages nor the relay.
 #[test]
-fn a_stuck_writer_keeps_nobody_from_hearing() {
+fn a_stuck_writer_does_not_stop_the_readers() {
     let mut scene = Scene::new(true);
     scene.run(10_000);
     scene.from_link.0.stuck.set(true);

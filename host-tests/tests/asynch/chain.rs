@@ -13,7 +13,7 @@ use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Instant, Mission, Placement, Port, Relay, Settings, Wiring};
 
 use crate::time::Time;
-use crate::wire::{BAUD, Fate, Heard, Rx, Shared, Tx, line};
+use crate::wire::{BAUD, Rx, Shared, TimedFrame, Tx, WriterFault, line};
 
 /// Creates relay `index` of `relays` in the paper's scenario.
 pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
@@ -26,12 +26,12 @@ pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
 }
 
 /// Fault to inject, if any: index of the relay, its port, and the behaviour of the port's writer.
-pub(crate) type Trouble = Option<(u16, Port, Fate)>;
+pub(crate) type InjectedFault = Option<(u16, Port, WriterFault)>;
 
-fn fate(trouble: Trouble, index: u16, port: Port) -> Fate {
-    match trouble {
-        Some((of, at, fate)) if (of, at) == (index, port) => fate,
-        _ => Fate::Well,
+fn fault_at(injected: InjectedFault, index: u16, port: Port) -> WriterFault {
+    match injected {
+        Some((of, at, fault)) if (of, at) == (index, port) => fault,
+        _ => WriterFault::None,
     }
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct Drone {
 pub(crate) struct Flown {
     pub(crate) drones: Vec<Drone>,
     /// Frames on each serial line: first the lines toward the receiver, then those toward the transmitter.
-    pub(crate) lines: Vec<Vec<Heard>>,
+    pub(crate) lines: Vec<Vec<TimedFrame>>,
 }
 
 /// Simulates a chain until a given time, with a task for every relay and one for its firmware.
@@ -57,7 +57,7 @@ pub(crate) fn fly(
     wiring: Wiring,
     relays: u16,
     capacity: usize,
-    trouble: Trouble,
+    injected: InjectedFault,
     until: Instant,
 ) -> Flown {
     let time = Time::default();
@@ -81,7 +81,7 @@ pub(crate) fn fly(
             line: Rc::clone(&lines[line]),
             end,
             time: time.clone(),
-            fate: fate(trouble, index, port),
+            fault: fault_at(injected, index, port),
         };
         // The sender of every wire is at end 0.
         let task: Pin<Box<dyn Future<Output = ()>>> = match wiring {
@@ -117,7 +117,7 @@ pub(crate) fn fly(
         drones: drones.iter().map(|drone| drone.borrow().clone()).collect(),
         lines: lines
             .iter()
-            .map(|line| line.borrow().heard.clone())
+            .map(|line| line.borrow().frames.clone())
             .collect(),
     }
 }

@@ -11,12 +11,12 @@ use host_tests::bench::agreed;
 use host_tests::fixtures;
 use uav_relay::serial::SerialStats;
 use uav_relay::{Event, Instant, Mission, Port, Side, Wiring};
-use wire::Fate;
+use wire::WriterFault;
 
 const END: Instant = Instant::from_millis(20_000);
 
 #[test]
-fn five_settle_like_bare_relays() {
+fn five_async_relays_settle_like_bare_relays() {
     let expected = agreed(Mission::try_new(fixtures::paper(5)).unwrap());
     for wiring in [Wiring::Pair, Wiring::Shared] {
         for capacity in [1, 16, 1_000] {
@@ -32,7 +32,7 @@ fn five_settle_like_bare_relays() {
 
 /// Checks that each code block of the guide with a file's name is a part of that file. `cargo ci` builds these files.
 #[test]
-fn the_guide_shows_what_is_built() {
+fn the_guide_has_the_code_of_this_test() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
     let guide = read("src/docs/firmware.md");
@@ -91,11 +91,11 @@ fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
 /// Checks that a blocked port of one relay delays no frame of any other port, to the microsecond. The comparison is a
 /// run in which that port loses its bytes.
 #[test]
-fn a_stuck_port_delays_nobody() {
+fn a_stuck_port_delays_no_other_port() {
     let until = Instant::from_millis(60_000);
     for (port, line) in [(Port::Upstream, 5 + 3), (Port::Downstream, 3)] {
-        let [stuck, cut] = [Fate::Stuck, Fate::Cut]
-            .map(|fate| fly(Wiring::Pair, 5, 16, Some((3, port, fate)), until));
+        let [stuck, cut] = [WriterFault::Stuck, WriterFault::Cut]
+            .map(|fault| fly(Wiring::Pair, 5, 16, Some((3, port, fault)), until));
         assert_eq!(differing(&stuck, &cut), [line], "{port:?}");
         assert!(stuck.lines[line].is_empty() && cut.lines[line].len() > 10);
         let frames: usize = stuck.lines.iter().map(Vec::len).sum();
@@ -130,13 +130,13 @@ fn a_stuck_port_delays_nobody() {
 }
 
 #[test]
-fn a_stuck_radio_delays_nobody_who_shares_its_channel() {
+fn a_stuck_radio_delays_no_other_on_its_channel() {
     let until = Instant::from_millis(60_000);
     let stuck = fly(
         Wiring::Shared,
         5,
         16,
-        Some((3, Port::Shared, Fate::Stuck)),
+        Some((3, Port::Shared, WriterFault::Stuck)),
         until,
     );
     assert!(

@@ -16,7 +16,7 @@ use uav_relay::{Instant, Port, Wiring};
 
 use crate::chain::relay;
 use crate::time::Time;
-use crate::wire::{BAUD, BYTE_TIME, Fate, Rx, Tx, line};
+use crate::wire::{BAUD, BYTE_TIME, Rx, Tx, WriterFault, line};
 
 /// Test writer that accepts only part of the bytes of a write, or blocks for ever, or fails.
 #[derive(Default)]
@@ -151,7 +151,7 @@ fn a_frame_that_is_cut_short_is_ended_before_the_next() {
 }
 
 #[test]
-fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
+fn a_failed_write_is_counted_and_the_frame_sent_again() {
     let time = Time::default();
     let down = Taker {
         fails: 23,
@@ -180,7 +180,7 @@ fn a_write_that_fails_is_counted_and_the_frame_sent_whole() {
 
 /// Checks that a port that is always ready, or always fails, lets all other ports run.
 #[test]
-fn a_port_that_is_always_ready_starves_nobody() {
+fn an_always_ready_port_starves_no_other_port() {
     for fails in [false, true] {
         let time = Time::default();
         let down = Taker::until(usize::MAX);
@@ -256,7 +256,7 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
             line: Rc::clone(&air),
             end: 0,
             time: time.clone(),
-            fate: Fate::Well,
+            fault: WriterFault::None,
         };
         let edges = Rc::clone(&pin.edges);
         let task = {
@@ -275,7 +275,7 @@ fn the_pin_is_high_while_bytes_leave_and_little_longer() {
         };
         pool.spawner().spawn_local(task).unwrap();
         time.run(&mut pool, Instant::from_millis(20_000));
-        let (edges, heard) = (edges.borrow(), &air.borrow().heard);
+        let (edges, heard) = (edges.borrow(), &air.borrow().frames);
         assert!(heard.len() > 10, "{}", heard.len());
         assert!(edges.len() > 10, "{capacity}: {edges:?}");
         let (mut latest, mut bursts) = (0, 0);

@@ -19,12 +19,12 @@ pub(crate) const BAUD: u32 = 115_200;
 pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 
 /// Frame with the arrival time of its last byte.
-pub(crate) type Heard = (Instant, Vec<u8>);
+pub(crate) type TimedFrame = (Instant, Vec<u8>);
 
 /// Behaviour of a port's writer: correct or with a fault.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Fate {
-    Well,
+pub(crate) enum WriterFault {
+    None,
     /// Fault: `write` never completes, from the first byte on.
     Stuck,
     /// Fault: bytes take their transmission time, but reach no reader.
@@ -47,7 +47,7 @@ pub(crate) struct Line {
     talker: Option<usize>,
     frame: Vec<u8>,
     /// Completed frames of all ends, with the times at which they arrived.
-    pub(crate) heard: Vec<Heard>,
+    pub(crate) frames: Vec<TimedFrame>,
 }
 
 pub(crate) type Shared = Rc<RefCell<Line>>;
@@ -60,7 +60,7 @@ pub(crate) fn line(ends: usize, capacity: usize) -> Shared {
         capacity,
         talker: None,
         frame: Vec::new(),
-        heard: Vec::new(),
+        frames: Vec::new(),
     }))
 }
 
@@ -74,7 +74,7 @@ pub(crate) struct Tx {
     pub(crate) line: Shared,
     pub(crate) end: usize,
     pub(crate) time: Time,
-    pub(crate) fate: Fate,
+    pub(crate) fault: WriterFault,
 }
 
 impl ErrorType for Rx {
@@ -102,14 +102,14 @@ impl Read for Rx {
             match next {
                 _ if count > 0 => return Ok(count),
                 Some(next) => self.time.sleep_until(next).await,
-                None => self.something().await,
+                None => self.readable().await,
             }
         }
     }
 }
 
 impl Rx {
-    async fn something(&self) {
+    async fn readable(&self) {
         poll_fn(|cx| {
             let inbox = &mut self.line.borrow_mut().inboxes[self.end];
             if inbox.bytes.is_empty() {
@@ -125,7 +125,7 @@ impl Rx {
 
 impl Write for Tx {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
-        if self.fate == Fate::Stuck {
+        if self.fault == WriterFault::Stuck {
             pending::<()>().await;
         }
         loop {
@@ -137,7 +137,8 @@ impl Write for Tx {
                 }
                 let room = line.capacity.saturating_sub(line.leaving.len());
                 if line.talker.is_none_or(|talker| talker == self.end) && room > 0 {
-                    let count = line.put(self.end, &bytes[..room.min(bytes.len())], now, self.fate);
+                    let count =
+                        line.put(self.end, &bytes[..room.min(bytes.len())], now, self.fault);
                     return Ok(count);
                 }
                 line.leaving.front().map_or(now + BYTE_TIME, |left| *left)
@@ -162,7 +163,7 @@ impl Write for Tx {
 
 impl Line {
     /// Sends bytes of end `from`, at most to the end of a frame. Returns the number of bytes sent.
-    fn put(&mut self, from: usize, bytes: &[u8], now: Instant, fate: Fate) -> usize {
+    fn put(&mut self, from: usize, bytes: &[u8], now: Instant, fault: WriterFault) -> usize {
         let mut count = 0;
         for &byte in bytes {
             let left = self.leaving.back().map_or(now, |last| now.max(*last)) + BYTE_TIME;
@@ -171,7 +172,7 @@ impl Line {
             self.talker = (byte != 0).then_some(from);
             count += 1;
             for (_, inbox) in (self.inboxes.iter_mut().enumerate())
-                .filter(|(end, _)| *end != from && fate == Fate::Well)
+                .filter(|(end, _)| *end != from && fault == WriterFault::None)
             {
                 inbox.bytes.push_back((left, byte));
                 if let Some(waits) = inbox.waits.take() {
@@ -180,7 +181,7 @@ impl Line {
             }
             if byte == 0 {
                 let frame = std::mem::take(&mut self.frame);
-                self.heard.push((left, frame));
+                self.frames.push((left, frame));
                 break;
             }
         }

@@ -9,7 +9,7 @@ use uav_relay_scenario::mission::mission as of_scenario;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::setup::Setup;
 
-use super::net::{Deed, KEY, Net};
+use super::net::{KEY, Net, ScheduledEvent};
 
 fn signed(mut setup: Setup) -> Setup {
     setup.settings.auth = Some(Auth {
@@ -20,7 +20,7 @@ fn signed(mut setup: Setup) -> Setup {
 }
 
 #[test]
-fn places_are_the_same_and_only_handshakes_are_added() {
+fn signing_adds_handshakes_and_changes_no_position() {
     for relays in [1, 2, 3, 8, 50, 200] {
         for setup in [
             Setup::new(mission(relays)),
@@ -58,7 +58,7 @@ fn places_are_the_same_and_only_handshakes_are_added() {
 }
 
 #[test]
-fn a_bad_day_moves_nobody() {
+fn faults_on_a_signed_chain_change_no_position() {
     let first = seed(1);
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let mut setup = Setup::new(mission(8));
@@ -81,7 +81,7 @@ fn a_bad_day_moves_nobody() {
 }
 
 #[test]
-fn other_methods_choose_the_same() {
+fn other_methods_give_the_same_positions_when_signed() {
     let scenario = Scenario {
         altitude_max_m: 300.0,
         ..Scenario::default()
@@ -104,14 +104,14 @@ fn other_methods_choose_the_same() {
 
 /// Checks that a rebooted relay, also the leader, rejoins the chain with its next epoch.
 #[test]
-fn whoever_is_rebooted_rejoins() {
-    let deeds = [
-        (3_000, Deed::Reboot(4)),
-        (4_000, Deed::Restart),
-        (8_000, Deed::Reboot(1)),
+fn a_rebooted_relay_rejoins_by_new_handshakes() {
+    let events = [
+        (3_000, ScheduledEvent::Reboot(4)),
+        (4_000, ScheduledEvent::Restart),
+        (8_000, ScheduledEvent::Reboot(1)),
     ];
     for wiring in [Wiring::Pair, Wiring::Shared] {
-        let mut net = Net::new(8, wiring, &deeds);
+        let mut net = Net::new(8, wiring, &events);
         net.run(Instant::from_millis(2_999));
         let places = net.bits();
         assert!(places.iter().all(Option::is_some));
@@ -140,7 +140,7 @@ fn whoever_is_rebooted_rejoins() {
 
 /// Checks that frames of a neighbour with another key, or none, are refused and counted by their cause.
 #[test]
-fn a_stranger_is_not_heard() {
+fn a_relay_with_another_key_is_ignored() {
     let stranger = Key::new([1; 32]);
     for auth in [
         None,

@@ -19,7 +19,7 @@ fn worked(name: &str) -> (Vec<u8>, Vec<u8>) {
 }
 
 #[test]
-fn the_worked_frames_are_what_the_rules_say() {
+fn the_example_frames_follow_the_rules() {
     let (a, b) = (nonce(5, 1), nonce(9, 2));
     let mut heartbeat = Plain::new(NETWORK, 1, 2, SIGNED, 2);
     heartbeat.0.extend([3, 0x3C, 0x5A, 5, 0, 0, 0]);
@@ -45,7 +45,7 @@ fn the_worked_frames_are_what_the_rules_say() {
 /// Checks that a relay accepts the documentation's worked handshake and computes the same tag. The examples are for
 /// relay 2 of 3 and its first nonce toward relay 1.
 #[test]
-fn the_worked_handshake_is_taken_and_tags_are_the_same() {
+fn the_example_handshake_is_accepted_with_equal_tags() {
     let settings = Settings {
         auth: Some(Auth {
             key: Key::new(key()),
@@ -63,7 +63,7 @@ fn the_worked_handshake_is_taken_and_tags_are_the_same() {
 }
 
 #[test]
-fn the_lengths_of_the_document_are_those_of_the_crate() {
+fn the_documents_lengths_are_those_of_the_crate() {
     let (table, wire) = worked("a handshake");
     assert_eq!((table.len(), wire.len()), (10 + 17 + 8, 41));
     assert_eq!(uav_relay::wire::frame::MAX_DECODED, 135);

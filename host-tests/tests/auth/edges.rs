@@ -31,7 +31,7 @@ impl Link {
         link
     }
 
-    fn give(&mut self, frame: &Plain) -> Option<&'static str> {
+    fn deliver(&mut self, frame: &Plain) -> Option<&'static str> {
         let before: Stats = *self.relay.stats();
         self.relay.handle_bytes(NOW, Port::Upstream, &frame.wire());
         raised(&before, self.relay.stats())
@@ -39,21 +39,21 @@ impl Link {
 
     fn handshake(&mut self, counter: u32, nonces: [u64; 2]) -> Option<&'static str> {
         let handshake = handshake((NETWORK, 1, 2), counter, nonces, false);
-        self.give(&handshake.signed(&KEY, nonces))
+        self.deliver(&handshake.signed(&KEY, nonces))
     }
 
     /// Sends a signed heartbeat with the given frame counter. Returns the statistics counter that it increments at
     /// relay 2.
-    fn say(&mut self, counter: u32) -> Option<&'static str> {
+    fn send_with_counter(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
         frame.0.extend([3, 0, 0, 0, 0, 0, 0]);
         let nonces = self.nonces;
-        self.give(&frame.signed(&KEY, nonces))
+        self.deliver(&frame.signed(&KEY, nonces))
     }
 }
 
 #[test]
-fn a_counter_63_behind_is_taken_once_and_64_behind_never() {
+fn a_counter_63_behind_is_accepted_once_and_64_never() {
     let mut link = Link::new();
     for (counter, raises) in [
         (1_000, "received"),
@@ -67,34 +67,34 @@ fn a_counter_63_behind_is_taken_once_and_64_behind_never() {
         (938, "received"),
         (937, "replayed"),
     ] {
-        assert_eq!(link.say(counter), Some(raises), "{counter}");
+        assert_eq!(link.send_with_counter(counter), Some(raises), "{counter}");
     }
 }
 
 #[test]
-fn the_last_counter_is_never_taken_and_nothing_comes_after() {
+fn the_last_counter_is_never_accepted_nor_used() {
     let mut link = Link::new();
-    assert_eq!(link.say(u32::MAX), Some("replayed"));
-    assert_eq!(link.say(u32::MAX - 1), Some("received"));
-    assert_eq!(link.say(u32::MAX), Some("replayed"));
-    assert_eq!(link.say(0), Some("replayed"));
+    assert_eq!(link.send_with_counter(u32::MAX), Some("replayed"));
+    assert_eq!(link.send_with_counter(u32::MAX - 1), Some("received"));
+    assert_eq!(link.send_with_counter(u32::MAX), Some("replayed"));
+    assert_eq!(link.send_with_counter(0), Some("replayed"));
     // A new session starts at 0.
     link.nonces[0] = nonce(10, 1);
     assert_eq!(link.handshake(0, link.nonces), Some("handshakes"));
-    assert_eq!(link.say(1), Some("received"));
+    assert_eq!(link.send_with_counter(1), Some("received"));
 }
 
 #[test]
-fn a_handshake_counts_its_counter_too() {
+fn a_handshakes_counter_is_used_up_too() {
     let mut link = Link::new();
-    assert_eq!(link.say(0), Some("replayed"));
-    assert_eq!(link.say(7), Some("received"));
+    assert_eq!(link.send_with_counter(0), Some("replayed"));
+    assert_eq!(link.send_with_counter(7), Some("received"));
     assert_eq!(link.handshake(7, link.nonces), Some("replayed"));
     assert_eq!(link.handshake(8, link.nonces), Some("handshakes"));
 }
 
 #[test]
-fn nonces_only_rise() {
+fn nonces_only_increase() {
     let mut link = Link::new();
     let own = link.nonces[1];
     for (theirs, raises) in [
@@ -115,7 +115,7 @@ fn nonces_only_rise() {
 }
 
 #[test]
-fn what_is_signed_for_other_nonces_is_forged() {
+fn a_tag_for_other_nonces_counts_as_forged() {
     let mut link = Link::new();
     let [theirs, own] = link.nonces;
     for nonces in [
@@ -126,26 +126,26 @@ fn what_is_signed_for_other_nonces_is_forged() {
         [theirs, 0],
     ] {
         link.nonces = nonces;
-        assert_eq!(link.say(5), Some("forged"), "{nonces:x?}");
+        assert_eq!(link.send_with_counter(5), Some("forged"), "{nonces:x?}");
     }
     link.nonces = [theirs, own];
-    assert_eq!(link.say(5), Some("received"));
+    assert_eq!(link.send_with_counter(5), Some("received"));
 }
 
 /// Checks the warning at `Auth::epoch`: a relay with a reused epoch is ignored, and accepts old frames.
 #[test]
-fn an_epoch_used_twice_is_no_fresh_start() {
+fn a_reused_epoch_is_not_accepted_as_a_restart() {
     let mut link = Link::new();
     for counter in 1..=100 {
-        assert_eq!(link.say(counter), Some("received"));
+        assert_eq!(link.send_with_counter(counter), Some("received"));
     }
     // The same epoch and claim number give the same nonce, but the counter restarts.
     assert_eq!(link.handshake(0, link.nonces), Some("replayed"));
-    assert_eq!(link.say(1), Some("replayed"));
-    assert_eq!(link.say(101), Some("received"));
+    assert_eq!(link.send_with_counter(1), Some("replayed"));
+    assert_eq!(link.send_with_counter(101), Some("received"));
     // Relay 2 restarts with its old epoch: frame 50 is accepted again.
     let mut again = Link::new();
-    assert_eq!(again.say(50), Some("received"));
+    assert_eq!(again.send_with_counter(50), Some("received"));
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn epoch_0_is_refused() {
 
 /// Checks that logs do not show the key.
 #[test]
-fn a_key_is_not_shown() {
+fn debug_output_does_not_show_the_key() {
     let shown = format!("{:?}", relay(3, 2, Wiring::Pair, (4, Instant::ZERO)));
     assert!(shown.contains("Key(..)"));
     assert!(

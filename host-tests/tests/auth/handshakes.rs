@@ -6,37 +6,40 @@ use uav_relay::{Event, Instant, Port, Side, Wiring};
 
 use super::frames::plain;
 use super::kinds::{Attacker, raised};
-use super::net::{Deed, Heard, Net, relay};
+use super::net::{Net, RecordedFrame, ScheduledEvent, relay};
 
-fn is_handshake(heard: &Heard) -> bool {
+fn is_handshake(heard: &RecordedFrame) -> bool {
     plain(&heard.wire).is_handshake()
 }
 
 /// Checks that replayed handshakes change no position, even while relays authenticate each other again.
 #[test]
-fn recorded_handshakes_at_any_time_change_no_place() {
-    let mut deeds = vec![(6_000, Deed::Reboot(4))];
+fn replayed_handshakes_change_no_position() {
+    let mut events = vec![(6_000, ScheduledEvent::Reboot(4))];
     for second in 7..30 {
         let index = 1 + second * 5 % 8;
-        deeds.push((1_000 * second, Deed::Reboot(u16::try_from(index).unwrap())));
+        events.push((
+            1_000 * second,
+            ScheduledEvent::Reboot(u16::try_from(index).unwrap()),
+        ));
     }
-    deeds.push((31_000, Deed::Restart));
+    events.push((31_000, ScheduledEvent::Restart));
     let end = Instant::from_millis(40_000);
     for wiring in [Wiring::Pair, Wiring::Shared] {
-        let mut calm = Net::new(8, wiring, &deeds);
+        let mut calm = Net::new(8, wiring, &events);
         calm.run(end);
-        let mut net = Net::new(8, wiring, &deeds);
+        let mut net = Net::new(8, wiring, &events);
         let mut attacker = Attacker::new(2);
         let (mut answered, mut taken, mut refused) = (0, 0, 0);
         while net.step(end) {
             for _ in 0..20 {
-                let heard = net.heard.choose(&mut attacker.rng).unwrap().clone();
+                let heard = net.recorded.choose(&mut attacker.rng).unwrap().clone();
                 if !is_handshake(&heard) || !net.has_arrived(&heard) {
                     continue;
                 }
-                let Heard { from, to, wire, .. } = heard;
+                let RecordedFrame { from, to, wire, .. } = heard;
                 let before = net.stats(to);
-                let sent = net.give(to, net.port(from, to), &wire);
+                let sent = net.deliver_bytes(to, net.port(from, to), &wire);
                 match raised(&before, &net.stats(to)) {
                     Some("replayed") => {
                         assert_eq!(sent, 0);
@@ -67,15 +70,15 @@ fn recorded_handshakes_at_any_time_change_no_place() {
 
 /// Checks that a booted relay accepts each recorded handshake at most once, and then the genuine one.
 #[test]
-fn recorded_handshakes_are_answered_once_each_and_overtaken() {
+fn replayed_handshakes_are_answered_once_and_superseded() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
-    for life in 2..=9 {
-        net.run(Instant::from_millis(u64::from(life) * 1_000));
-        net.reboot(1, life);
+    for start in 2..=9 {
+        net.run(Instant::from_millis(u64::from(start) * 1_000));
+        net.reboot(1, start);
     }
     net.run(Instant::from_millis(10_000));
     let recorded: Vec<Vec<u8>> = net
-        .heard
+        .recorded
         .iter()
         .filter(|heard| heard.to == 2 && is_handshake(heard))
         .map(|heard| heard.wire.clone())
@@ -85,7 +88,7 @@ fn recorded_handshakes_are_answered_once_each_and_overtaken() {
     for round in 0..100 {
         for wire in &recorded {
             let before = net.stats(2);
-            let sent = net.give(2, Port::Upstream, wire);
+            let sent = net.deliver_bytes(2, Port::Upstream, wire);
             let new = raised(&before, &net.stats(2)) == Some("handshakes");
             assert!(!new || round == 0, "taken twice");
             assert!(sent <= usize::from(new));
@@ -110,11 +113,11 @@ fn recorded_handshakes_are_answered_once_each_and_overtaken() {
 /// Checks that a relay deceived by a replayed handshake authenticates its neighbour all the same. The relay has
 /// answered the replay, and its answer is lost.
 #[test]
-fn a_relay_that_took_a_recorded_handshake_finds_out() {
+fn a_relay_recovers_from_a_replayed_handshake() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
     net.run(Instant::from_millis(1_000));
     let old = net
-        .heard
+        .recorded
         .iter()
         .find(|heard| heard.to == 2 && is_handshake(heard))
         .unwrap()
@@ -128,7 +131,7 @@ fn a_relay_that_took_a_recorded_handshake_finds_out() {
     bench::sent(&mut fresh, start);
     *net.relay(2) = fresh;
     net.genuine[1] = 0;
-    net.lives[1] = 2;
+    net.starts[1] = 2;
     // No messages are due until a relay asks for a sign of life; that leads to handshakes, and the next question to an answer.
     net.run(Instant::from_millis(14_000));
     assert!(net.is_proven(1, 2) && net.is_proven(2, 1));
@@ -137,14 +140,14 @@ fn a_relay_that_took_a_recorded_handshake_finds_out() {
 
 /// Checks that replayed handshakes do not keep a silent neighbour from being declared lost.
 #[test]
-fn a_silent_neighbour_is_lost_whatever_is_played_back() {
+fn a_silent_neighbour_is_lost_despite_replays() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
-    for life in 2..=60 {
-        net.run(Instant::from_millis(u64::from(life) * 1_000));
-        net.reboot(2, life);
+    for start in 2..=60 {
+        net.run(Instant::from_millis(u64::from(start) * 1_000));
+        net.reboot(2, start);
     }
     let mut recorded = net
-        .heard
+        .recorded
         .iter()
         .filter(|heard| heard.to == 1 && is_handshake(heard))
         .map(|heard| heard.wire.clone());

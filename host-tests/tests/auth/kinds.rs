@@ -9,7 +9,7 @@ use uav_relay_decode::vectors::Vectors;
 use uav_relay_oracle::random::seed;
 
 use super::frames::{HANDSHAKE, HEADER, Plain, SIGNED, TAG, handshake, nonce, plain};
-use super::net::{Heard, Net};
+use super::net::{Net, RecordedFrame};
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
@@ -170,11 +170,11 @@ impl Attacker {
     /// Creates an attack of kind `kind`; `None` if no suitable frame has been recorded yet.
     pub(crate) fn attack(&mut self, net: &Net, kind: Kind) -> Option<Attack> {
         let heard = if kind.is_of_an_offer() {
-            &net.heard[*net.offers.choose(&mut self.rng)?]
+            &net.recorded[*net.offers.choose(&mut self.rng)?]
         } else if kind == Kind::RecordedHandshake {
-            &net.heard[*net.handshakes.choose(&mut self.rng)?]
+            &net.recorded[*net.handshakes.choose(&mut self.rng)?]
         } else {
-            net.heard.choose(&mut self.rng)?
+            net.recorded.choose(&mut self.rng)?
         };
         let heard = heard.clone();
         let (from, to, made) = match kind {
@@ -213,25 +213,30 @@ impl Attacker {
     }
 
     /// Returns an attack's frame, and the counter that it increments if its addresses are valid.
-    fn frame(&mut self, net: &Net, kind: Kind, heard: &Heard) -> Option<(Plain, &'static str)> {
-        let Heard {
+    fn frame(
+        &mut self,
+        net: &Net,
+        kind: Kind,
+        heard: &RecordedFrame,
+    ) -> Option<(Plain, &'static str)> {
+        let RecordedFrame {
             from,
             to,
-            lives,
+            epochs: starts,
             wire,
             ..
         } = heard;
         let (from, to) = (*from, *to);
-        let now = (net.life(from), net.life(to));
+        let now = (net.start_count(from), net.start_count(to));
         let recorded = plain(wire);
         let is_handshake = recorded.is_handshake();
         let frame = match kind {
             Kind::Replayed | Kind::FromBefore | Kind::OfferReplayed | Kind::OfferFromBefore => {
                 let since = matches!(kind, Kind::Replayed | Kind::OfferReplayed);
-                let fits = since == (*lives == now);
+                let fits = since == (*starts == now);
                 // Frames in transit have not been accepted yet.
                 let usable = fits && !is_handshake && net.has_arrived(heard);
-                let raises = if net.is_of_now(heard) {
+                let raises = if net.is_of_current_starts(heard) {
                     "replayed"
                 } else {
                     "forged"

@@ -29,11 +29,11 @@ pub(crate) fn newer(base: &Mission, version: u16) -> Upload {
 
 /// Frame that the attacker has recorded.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Heard {
+pub(crate) struct RecordedFrame {
     pub(crate) from: u16,
     pub(crate) to: u16,
     /// Start counts of the sender and of the receiver when the frame was sent.
-    pub(crate) lives: (u32, u32),
+    pub(crate) epochs: (u32, u32),
     /// Index of this frame among all recorded frames.
     pub(crate) number: usize,
     pub(crate) wire: Vec<u8>,
@@ -41,7 +41,7 @@ pub(crate) struct Heard {
 
 /// Scheduled event of the simulation.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Deed {
+pub(crate) enum ScheduledEvent {
     /// Event: the relay of this index reboots without the mission upload that it had stored.
     Reboot(u16),
     /// Event: the relay of this index reboots with the mission upload that it had stored.
@@ -59,9 +59,9 @@ pub(crate) struct Net {
     pub(crate) grounds: [Ground; 2],
     stored: Vec<Option<Upload>>,
     /// Number of starts of each relay, which is also its epoch.
-    pub(crate) lives: Vec<u32>,
+    pub(crate) starts: Vec<u32>,
     pub(crate) now: Instant,
-    pub(crate) heard: Vec<Heard>,
+    pub(crate) recorded: Vec<RecordedFrame>,
     /// Indices of the recorded frames that offer a newer mission.
     pub(crate) offers: Vec<usize>,
     pub(crate) handshakes: Vec<usize>,
@@ -74,15 +74,15 @@ pub(crate) struct Net {
     /// Indices of frames whose sender signed them before it learned of the receiver's last start.
     outdated: BTreeSet<usize>,
     /// Frames in transit: arrival time, and index of the frame.
-    under_way: VecDeque<(Instant, usize)>,
-    pub(crate) deeds: VecDeque<(Instant, Deed)>,
+    in_transit: VecDeque<(Instant, usize)>,
+    pub(crate) events: VecDeque<(Instant, ScheduledEvent)>,
     wiring: Wiring,
-    pub(crate) happenings: u64,
+    pub(crate) events_done: u64,
 }
 
 impl Net {
-    /// Starts `relays` relays at time 0. The events `deeds`, with times in ms, must be in order of time.
-    pub(crate) fn new(relays: u16, wiring: Wiring, deeds: &[(u64, Deed)]) -> Self {
+    /// Starts `relays` relays at time 0. The events `events`, with times in ms, must be in order of time.
+    pub(crate) fn new(relays: u16, wiring: Wiring, events: &[(u64, ScheduledEvent)]) -> Self {
         let mut net = Self {
             relays: (1..=relays)
                 .map(|index| relay(relays, index, wiring, (1, Instant::ZERO)))
@@ -92,22 +92,22 @@ impl Net {
                 Ground::new(&base, end, NETWORK, wiring, proof(1))
             }),
             stored: vec![None; relays.into()],
-            lives: vec![1; relays.into()],
+            starts: vec![1; relays.into()],
             now: Instant::ZERO,
-            heard: Vec::new(),
+            recorded: Vec::new(),
             offers: Vec::new(),
             handshakes: Vec::new(),
             genuine: vec![0; relays.into()],
             proven: BTreeMap::new(),
             learned: BTreeMap::new(),
             outdated: BTreeSet::new(),
-            under_way: VecDeque::new(),
-            deeds: deeds
+            in_transit: VecDeque::new(),
+            events: events
                 .iter()
-                .map(|&(ms, deed)| (Instant::from_millis(ms), deed))
+                .map(|&(ms, event)| (Instant::from_millis(ms), event))
                 .collect(),
             wiring,
-            happenings: 0,
+            events_done: 0,
         };
         for index in 1..=relays {
             net.drain(index);
@@ -124,9 +124,9 @@ impl Net {
     }
 
     /// Returns the number of starts of a node; 1 for a ground station.
-    pub(crate) fn life(&self, node: u16) -> u32 {
+    pub(crate) fn start_count(&self, node: u16) -> u32 {
         if self.is_relay(node) {
-            self.lives[usize::from(node) - 1]
+            self.starts[usize::from(node) - 1]
         } else {
             1
         }
@@ -151,22 +151,25 @@ impl Net {
 
     /// Returns true if both ends of the link have authenticated each other since their last starts.
     pub(crate) fn is_proven(&self, from: u16, to: u16) -> bool {
-        self.proven.get(&(from, to)) == Some(&(self.life(from), self.life(to)))
+        self.proven.get(&(from, to)) == Some(&(self.start_count(from), self.start_count(to)))
     }
 
-    pub(crate) fn has_arrived(&self, heard: &Heard) -> bool {
-        self.under_way
+    pub(crate) fn has_arrived(&self, heard: &RecordedFrame) -> bool {
+        self.in_transit
             .front()
             .is_none_or(|(_, next)| heard.number < *next)
     }
 
     /// Returns true if the receiver still uses the nonces with which a recorded frame was signed.
-    pub(crate) fn is_of_now(&self, heard: &Heard) -> bool {
-        let Heard {
-            from, to, lives, ..
+    pub(crate) fn is_of_current_starts(&self, heard: &RecordedFrame) -> bool {
+        let RecordedFrame {
+            from,
+            to,
+            epochs: starts,
+            ..
         } = heard;
-        lives.1 == self.life(*to)
-            && self.learned.get(&(*from, *to)) == Some(lives)
+        starts.1 == self.start_count(*to)
+            && self.learned.get(&(*from, *to)) == Some(starts)
             && !self.outdated.contains(&heard.number)
     }
 
@@ -175,8 +178,8 @@ impl Net {
         let wake = (1..=self.len())
             .filter_map(|index| Some((self.relay(index).poll_timeout()?, index)))
             .min();
-        let arrives = self.under_way.front().map(|(at, _)| *at);
-        let does = self.deeds.front().map(|(at, _)| *at);
+        let arrives = self.in_transit.front().map(|(at, _)| *at);
+        let does = self.events.front().map(|(at, _)| *at);
         let asks = (0..2)
             .filter_map(|end| Some((self.grounds[end].poll_timeout()?, end)))
             .min();
@@ -191,7 +194,7 @@ impl Net {
             return false;
         };
         self.now = self.now.max(next);
-        self.happenings += 1;
+        self.events_done += 1;
         if does == Some(next) {
             self.act();
         } else if arrives == Some(next) {
@@ -211,22 +214,22 @@ impl Net {
     }
 
     fn act(&mut self) {
-        let Some((_, deed)) = self.deeds.pop_front() else {
+        let Some((_, event)) = self.events.pop_front() else {
             return;
         };
-        match deed {
-            Deed::Reboot(index) => self.reboot(index, self.life(index) + 1),
-            Deed::Resume(index) => {
+        match event {
+            ScheduledEvent::Reboot(index) => self.reboot(index, self.start_count(index) + 1),
+            ScheduledEvent::Resume(index) => {
                 let stored = self.stored[usize::from(index) - 1];
-                self.start(index, self.life(index) + 1, stored);
+                self.start(index, self.start_count(index) + 1, stored);
             }
-            Deed::Upload(side, version) => {
+            ScheduledEvent::Upload(side, version) => {
                 let (now, end) = (self.now, usize::from(side == Side::Downstream));
                 let upload = newer(&mission(self.len()), version);
                 self.grounds[end].upload(now, upload).unwrap();
                 self.drain_ground(end);
             }
-            Deed::Restart => {
+            ScheduledEvent::Restart => {
                 let now = self.now;
                 self.relay(1).restart(now);
                 self.drain(1);
@@ -240,7 +243,7 @@ impl Net {
 
     fn start(&mut self, index: u16, epoch: u32, stored: Option<Upload>) {
         let place = usize::from(index) - 1;
-        self.lives[place] = epoch;
+        self.starts[place] = epoch;
         self.genuine[place] = 0;
         let now = self.now;
         let start = (epoch, now);
@@ -250,25 +253,26 @@ impl Net {
     }
 
     fn deliver(&mut self) {
-        let Some((_, heard)) = self.under_way.pop_front() else {
+        let Some((_, heard)) = self.in_transit.pop_front() else {
             return;
         };
-        let Heard {
+        let RecordedFrame {
             from,
             to,
-            lives,
+            epochs: starts,
             wire,
             number,
             ..
-        } = self.heard[heard].clone();
+        } = self.recorded[heard].clone();
         if !self.is_relay(to) {
             let end = usize::from(to != 0);
             self.grounds[end].handle_bytes(&wire);
             return self.drain_ground(end);
         }
-        self.learned.insert((from, to), (lives.0, self.life(to)));
+        self.learned
+            .insert((from, to), (starts.0, self.start_count(to)));
         let before = self.stats(to);
-        self.give(to, self.port(from, to), &wire);
+        self.deliver_bytes(to, self.port(from, to), &wire);
         let after = self.stats(to);
         if after.forged > before.forged {
             self.outdated.insert(number);
@@ -276,12 +280,13 @@ impl Net {
         let messages = after.received - before.received;
         self.genuine[usize::from(to) - 1] += messages;
         if messages > 0 {
-            self.proven.insert((from, to), (lives.0, self.life(to)));
+            self.proven
+                .insert((from, to), (starts.0, self.start_count(to)));
         }
     }
 
     /// Delivers bytes to a relay. Returns the number of frames that it sends in response.
-    pub(crate) fn give(&mut self, to: u16, port: Port, wire: &[u8]) -> usize {
+    pub(crate) fn deliver_bytes(&mut self, to: u16, port: Port, wire: &[u8]) -> usize {
         let now = self.now;
         self.relay(to).handle_bytes(now, port, wire);
         self.drain(to)
@@ -297,7 +302,7 @@ impl Net {
                 Port::Downstream => index + 1,
                 Port::Shared => super::frames::plain(&wire).destination(),
             };
-            self.say(index, to, wire);
+            self.transmit(index, to, wire);
         }
         while let Some(event) = self.relay(index).poll_event() {
             if event == Event::Uploaded {
@@ -317,25 +322,25 @@ impl Net {
             let wire = frame[..len].to_vec();
             let from = [0, self.len() + 1][end];
             let to = super::frames::plain(&wire).destination();
-            self.say(from, to, wire);
+            self.transmit(from, to, wire);
         }
     }
 
     /// Records a frame from node `from` to node `to`, and puts it in transit.
-    fn say(&mut self, from: u16, to: u16, wire: Vec<u8>) {
-        let lives = (self.life(from), self.life(to));
-        let number = self.heard.len();
-        self.under_way.push_back((self.now + ON_THE_WAY, number));
+    fn transmit(&mut self, from: u16, to: u16, wire: Vec<u8>) {
+        let starts = (self.start_count(from), self.start_count(to));
+        let number = self.recorded.len();
+        self.in_transit.push_back((self.now + ON_THE_WAY, number));
         if super::offers::is_offer(&super::frames::plain(&wire)) {
             self.offers.push(number);
         }
         if super::frames::plain(&wire).is_handshake() {
             self.handshakes.push(number);
         }
-        self.heard.push(Heard {
+        self.recorded.push(RecordedFrame {
             from,
             to,
-            lives,
+            epochs: starts,
             number,
             wire,
         });

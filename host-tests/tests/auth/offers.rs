@@ -9,7 +9,7 @@ use uav_relay::{Instant, Port, Settings, Side, Wiring};
 
 use super::frames::{HEADER, Plain, SIGNED, TAG, nonce, plain};
 use super::kinds::{Attacker, Kind, raised};
-use super::net::{Deed, Heard, Net, newer};
+use super::net::{Net, RecordedFrame, ScheduledEvent, newer};
 
 /// Message type of a mission offer: the first byte of its body.
 const OFFER: u8 = 14;
@@ -50,7 +50,7 @@ impl Attacker {
         &mut self,
         net: &Net,
         kind: Kind,
-        heard: &Heard,
+        heard: &RecordedFrame,
     ) -> Option<(u16, u16, Plain)> {
         let relays = net.len();
         let ends = [0, relays + 1];
@@ -96,7 +96,8 @@ impl Attacker {
                 frame
             }
             _ => {
-                let nonces = [net.life(from), net.life(to)].map(|life| nonce(life, 1));
+                let nonces =
+                    [net.start_count(from), net.start_count(to)].map(|start| nonce(start, 1));
                 frame.signed(&self.rng.random(), nonces)
             }
         };
@@ -106,7 +107,7 @@ impl Attacker {
 
 /// Checks that a chain without a key accepts no mission, neither from the ground nor from neighbours.
 #[test]
-fn a_chain_without_tags_takes_no_mission_from_anybody() {
+fn a_chain_without_tags_accepts_no_offer() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let settings = Settings {
             wiring,
@@ -145,15 +146,15 @@ fn a_chain_without_tags_takes_no_mission_from_anybody() {
 
 /// Checks that recorded, altered or forged answers do not complete an upload at the ground station.
 #[test]
-fn the_ground_is_not_told_lies_either() {
+fn the_ground_station_ignores_forged_frames() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
-        let deeds = [(6_000, Deed::Upload(Side::Upstream, 1))];
-        let mut net = Net::new(8, wiring, &deeds);
+        let events = [(6_000, ScheduledEvent::Upload(Side::Upstream, 1))];
+        let mut net = Net::new(8, wiring, &events);
         net.run(Instant::from_millis(12_000));
         let flown = net.grounds[0].progress();
         assert!(matches!(flown, Progress::Flown { by: 1, .. }), "{flown:?}");
-        let told: Vec<Heard> = net
-            .heard
+        let told: Vec<RecordedFrame> = net
+            .recorded
             .iter()
             .filter(|heard| heard.to == 0)
             .cloned()

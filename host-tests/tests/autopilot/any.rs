@@ -21,7 +21,7 @@ fn number(rng: &mut ChaCha8Rng) -> f32 {
 }
 
 #[test]
-fn no_target_leaves_that_is_not_finite_and_near() {
+fn every_target_sent_is_finite_and_near() {
     let mut sent = 0;
     for seed in 0..RUNS {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -63,7 +63,7 @@ fn no_target_leaves_that_is_not_finite_and_near() {
                 8 => vehicle.armed = true,
                 _ => vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR,
             }
-            let before = vehicle.said.len();
+            let before = vehicle.received.len();
             for _ in 0..25 {
                 let told = vehicle.targets().len();
                 vehicle.step();
@@ -74,8 +74,8 @@ fn no_target_leaves_that_is_not_finite_and_near() {
                     assert!(may, "{state:?}, seed {seed}");
                 }
             }
-            for (_, said) in &vehicle.said[before..] {
-                let Said::Target(target) = said else {
+            for (_, said) in &vehicle.received[before..] {
+                let LinkMessage::Target(target) = said else {
                     continue;
                 };
                 sent += 1;

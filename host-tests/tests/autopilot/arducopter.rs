@@ -4,7 +4,7 @@ use super::vehicle::Mode;
 use super::*;
 
 #[test]
-fn it_is_led_to_its_place_and_then_left_alone() {
+fn the_drone_is_led_to_its_position_and_released() {
     let mut vehicle = Vehicle::engaged(Kind::ArduCopter, 180.0);
     vehicle.run(30_000);
     assert!((vehicle.place.x_m - 180.0).abs() < 0.05);
@@ -21,7 +21,7 @@ fn it_is_led_to_its_place_and_then_left_alone() {
 }
 
 #[test]
-fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
+fn an_ignored_target_is_repeated_and_then_reported() {
     let mut vehicle = Vehicle::flying(Kind::ArduCopter);
     vehicle.takes_targets = false;
     vehicle.setpoint = Some(place(100.0));
@@ -40,7 +40,7 @@ fn a_target_that_is_not_taken_is_told_again_and_then_an_event() {
 
 /// Checks that an autopilot that does not report its target is not taken for one that refuses targets.
 #[test]
-fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
+fn stopped_streams_do_not_count_as_a_refused_target() {
     let mut vehicle = Vehicle::flying(Kind::ArduCopter);
     vehicle.says_targets = false;
     vehicle.setpoint = Some(place(130.0));
@@ -54,7 +54,7 @@ fn an_autopilot_whose_streams_were_stopped_has_refused_nothing() {
 }
 
 #[test]
-fn a_moving_target_that_is_not_taken_is_an_event() {
+fn an_ignored_moving_target_is_reported() {
     let mut vehicle = Vehicle::engaged(Kind::ArduCopter, 500.0);
     vehicle.run(10_000);
     assert!(!vehicle.events.contains(&AutopilotEvent::Refused));
@@ -66,7 +66,7 @@ fn a_moving_target_that_is_not_taken_is_an_event() {
 }
 
 #[test]
-fn back_in_its_mode_the_target_is_told_anew() {
+fn the_target_is_sent_again_after_a_mode_change() {
     let mut vehicle = Vehicle::engaged(Kind::ArduCopter, 120.0);
     vehicle.run(20_000);
     vehicle.mode = Mode::Position;
@@ -84,7 +84,7 @@ fn back_in_its_mode_the_target_is_told_anew() {
 
 /// Checks that the last target of a flight has no velocity, at whatever time the autopilot confirms it.
 #[test]
-fn the_last_target_stands_whenever_it_is_confirmed() {
+fn a_late_confirmation_of_the_last_target_counts() {
     for late in 0..100_u16 {
         let mut vehicle = Vehicle::flying(Kind::ArduCopter);
         vehicle.engage();

@@ -6,7 +6,7 @@ use uav_relay::flight::mavlink::frame::Address;
 use uav_relay::{Event, Side};
 
 use crate::signed::{OTHER, OURS, keyed};
-use crate::vehicle::{SYSTEM, Said, Vehicle};
+use crate::vehicle::{LinkMessage, SYSTEM, Vehicle};
 
 /// MAVLink system and component id of QGroundControl.
 const STATION: [u8; 2] = [255, 190];
@@ -30,9 +30,9 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
 
 /// Returns the results and recipients of all answers to the clearance command, `MAV_CMD_USER_1`.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
-    let said = vehicle.said.iter();
+    let said = vehicle.received.iter();
     said.filter_map(|(_, said)| match said {
-        Said::Ack {
+        LinkMessage::Ack {
             command: 31_010,
             result,
             to,
@@ -53,13 +53,13 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
         let own = [SYSTEM, 191];
         // Commands to the autopilot, another system or a broadcast address are not for this companion.
         for to in [[SYSTEM, 1], [SYSTEM + 1, 191], [0, 0], [SYSTEM, 0]] {
-            vehicle.say_from(STATION, &command(to, [3.0, 0.0], 0));
+            vehicle.send_from(STATION, &command(to, [3.0, 0.0], 0));
         }
         vehicle.run(1_000);
         assert_eq!(answers(&vehicle), []);
         assert_eq!(vehicle.link.poll_cleared(), None);
 
-        vehicle.say_from(STATION, &command(own, [4.0, 0.0], 0));
+        vehicle.send_from(STATION, &command(own, [4.0, 0.0], 0));
         vehicle.run(1_000);
         assert_eq!(answers(&vehicle), [(2, STATION)], "denied");
         assert_eq!(vehicle.link.poll_cleared(), None);
@@ -67,7 +67,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
         let refused = AutopilotEvent::ClearRefused { relays, from: FROM };
         assert!(vehicle.events.contains(&refused), "{:?}", vehicle.events);
 
-        vehicle.say_from(STATION, &command(own, [3.0, 0.0], 0));
+        vehicle.send_from(STATION, &command(own, [3.0, 0.0], 0));
         vehicle.run(1_000);
         assert_eq!(answers(&vehicle)[1..], [(0, STATION)], "accepted");
         assert_eq!(vehicle.link.poll_cleared(), Some(side));
@@ -82,7 +82,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
 
         // The operator's station repeats the command because the answer was lost.
         vehicle.events.clear();
-        vehicle.say_from(STATION, &command(own, [3.0, 0.0], 1));
+        vehicle.send_from(STATION, &command(own, [3.0, 0.0], 1));
         vehicle.run(1_000);
         assert_eq!(answers(&vehicle)[2..], [(0, STATION)], "accepted again");
         assert_eq!(vehicle.link.poll_cleared(), None);
@@ -91,8 +91,8 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
             "relay: denied, name all lost relays of one side",
             "relay: lost relays cleared",
         ] {
-            let text = Said::Text(line.to_owned());
-            let has_said = vehicle.said.iter().any(|(_, said)| *said == text);
+            let text = LinkMessage::Text(line.to_owned());
+            let has_said = vehicle.received.iter().any(|(_, said)| *said == text);
             assert!(has_said, "{line}");
         }
     }
@@ -101,7 +101,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
 /// Checks that of two commands that arrive at once, the second is ignored until it is repeated. A cable or a router
 /// can deliver two commands together.
 #[test]
-fn two_commands_at_once_are_obeyed_one_after_the_other() {
+fn simultaneous_commands_are_obeyed_in_sequence() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
     for (side, node) in [(Side::Upstream, 1), (Side::Downstream, 3)] {
         vehicle
@@ -117,13 +117,13 @@ fn two_commands_at_once_are_obeyed_one_after_the_other() {
         });
         sides.collect::<Vec<_>>()
     };
-    vehicle.say_from(STATION, &command(own, [1.0, 0.0], 0));
-    vehicle.say_from(STATION, &command(own, [3.0, 0.0], 0));
+    vehicle.send_from(STATION, &command(own, [1.0, 0.0], 0));
+    vehicle.send_from(STATION, &command(own, [3.0, 0.0], 0));
     vehicle.run(1_000);
     assert_eq!(answers(&vehicle), [(0, STATION)]);
     assert_eq!(vehicle.link.poll_cleared(), Some(Side::Upstream));
     assert_eq!(cleared(&vehicle), [Side::Upstream]);
-    vehicle.say_from(STATION, &command(own, [3.0, 0.0], 1));
+    vehicle.send_from(STATION, &command(own, [3.0, 0.0], 1));
     vehicle.run(1_000);
     assert_eq!(answers(&vehicle)[1..], [(0, STATION)]);
     assert_eq!(vehicle.link.poll_cleared(), Some(Side::Downstream));
@@ -134,8 +134,8 @@ fn two_commands_at_once_are_obeyed_one_after_the_other() {
     vehicle
         .link
         .handle_event(Event::NeighbourLost { side, node: 3 });
-    vehicle.say_from(STATION, &command(own, [3.0, 0.0], 0));
-    vehicle.say_from(STATION, &command(own, [4.0, 0.0], 0));
+    vehicle.send_from(STATION, &command(own, [3.0, 0.0], 0));
+    vehicle.send_from(STATION, &command(own, [4.0, 0.0], 0));
     vehicle.run(1_000);
     assert_eq!(cleared(&vehicle)[2..], [side]);
     assert_eq!(vehicle.link.poll_cleared(), Some(side));
@@ -155,14 +155,14 @@ fn with_a_key_only_a_signed_command_clears_a_relay() {
     for wrong in [None, Some(OTHER)] {
         vehicle.key = wrong.map(crate::signed::Key::new);
         let before = vehicle.link.refused();
-        vehicle.say_from(STATION, &right);
+        vehicle.send_from(STATION, &right);
         assert_eq!(vehicle.link.refused(), before + 1, "{wrong:?}");
         assert_eq!(vehicle.link.poll_cleared(), None);
     }
     vehicle.key = key;
     vehicle.run(1_000);
     assert_eq!(answers(&vehicle), [], "nobody is answered");
-    vehicle.say_from(STATION, &right);
+    vehicle.send_from(STATION, &right);
     vehicle.run(1_000);
     assert_eq!(answers(&vehicle), [(0, STATION)]);
     assert_eq!(vehicle.link.poll_cleared(), Some(side));

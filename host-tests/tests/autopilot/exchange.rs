@@ -51,7 +51,7 @@ fn told_again(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
 fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
     let mut positions = Vec::new();
     for _ in 0..ms / 20 {
-        vehicle.step_alone();
+        vehicle.step_without_exchange();
         let now = vehicle.now;
         if relay.poll_timeout().is_some_and(|at| at <= now) {
             relay.handle_timeout(now);
@@ -107,9 +107,9 @@ fn an_engaged_drone_flies_to_its_relays_setpoint() {
             "{place:?}, {agreed:?}"
         );
         let value = |of: &str| {
-            let mut newest = vehicle.said.iter().rev();
+            let mut newest = vehicle.received.iter().rev();
             newest.find_map(|(_, said)| match said {
-                Said::Value { name, value } if name == of => Some(*value),
+                LinkMessage::Value { name, value } if name == of => Some(*value),
                 _ => None,
             })
         };
@@ -170,14 +170,14 @@ fn the_yaw_points_an_antenna_to_the_neighbour() {
 /// Checks that the autopilot link passes the radio's noise sample to the relay. A relay that does not measure
 /// interference counts the sample as rejected.
 #[test]
-fn a_relay_is_handed_what_the_radio_hears() {
+fn exchange_passes_the_radios_noise_to_the_relay() {
     let (mut vehicle, mut relay) = flies(Kind::ArduCopter, Settings::default());
     assert_eq!(relay.stats().samples_rejected, 0);
     let said = RADIO_STATUS_DATA {
         noise: 100,
         ..RADIO_STATUS_DATA::DEFAULT
     };
-    vehicle.say_from([b'3', b'D'], &MavMessage::RADIO_STATUS(said));
+    vehicle.send_from([b'3', b'D'], &MavMessage::RADIO_STATUS(said));
     assert!(vehicle.link.exchange(&mut relay, vehicle.now).0);
     assert_eq!(relay.stats().samples_rejected, 1);
 }
@@ -203,7 +203,7 @@ fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_si
 }
 
 #[test]
-fn a_relay_is_handed_the_side_that_an_operator_clears() {
+fn exchange_passes_an_operators_clearance_to_the_relay() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.armed = true;
@@ -237,7 +237,7 @@ fn a_relay_is_handed_the_side_that_an_operator_clears() {
         ..COMMAND_LONG_DATA::DEFAULT
     });
     let before = first.clone();
-    vehicle.say_from([255, 190], &command);
+    vehicle.send_from([255, 190], &command);
     assert!(vehicle.link.exchange(&mut first, vehicle.now).0);
     // The guard forgets where the second drone may be.
     let mut expected = before.clone();
@@ -277,7 +277,7 @@ fn bearings_lead_to_the_neighbours_agreed_position() {
 
 /// Checks that a drone on the wrong side of its neighbour cannot come under setpoint control.
 #[test]
-fn a_drone_out_of_order_cannot_be_engaged() {
+fn a_drone_out_of_sequence_cannot_be_engaged() {
     let [mut first, mut second] = [1, 2].map(|index| of(2, index, Settings::default()));
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.armed = true;

@@ -26,7 +26,7 @@ const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 enum Fault {
     None,
     /// Fault: the cable keeps all bytes, and delivers them at once when the fault ends.
-    Keeps,
+    Withhold,
     Cut,
     /// Fault: the cable delays the bytes by the given time in µs.
     Delay(u64),
@@ -55,13 +55,13 @@ impl Cable {
         }
         match self.fault {
             Fault::Cut => {}
-            Fault::Keeps => self.kept.push((now, bytes)),
-            Fault::None => self.push(now, now, bytes),
-            Fault::Delay(us) => self.push(now + Duration::from_micros(us), now, bytes),
+            Fault::Withhold => self.kept.push((now, bytes)),
+            Fault::None => self.enqueue(now, now, bytes),
+            Fault::Delay(us) => self.enqueue(now + Duration::from_micros(us), now, bytes),
         }
     }
 
-    fn push(&mut self, at: Instant, sent: Instant, bytes: Vec<u8>) {
+    fn enqueue(&mut self, at: Instant, sent: Instant, bytes: Vec<u8>) {
         let last = self.waiting.back().map_or(at, |(at, ..)| *at);
         self.waiting.push_back((at.max(last), sent, bytes));
     }
@@ -69,7 +69,7 @@ impl Cable {
     fn set(&mut self, now: Instant, fault: Fault) {
         self.fault = fault;
         for (sent, bytes) in core::mem::take(&mut self.kept) {
-            self.push(now, sent, bytes);
+            self.enqueue(now, sent, bytes);
         }
     }
 
@@ -103,7 +103,7 @@ struct Flight {
     gps_until: Instant,
     setpoint: Option<Placement>,
     /// Time at which the pilot last chose OFFBOARD or GUIDED. The next field is the last flight in it.
-    given_at: Option<Instant>,
+    handed_over_at: Option<Instant>,
     flown_at: Instant,
     texts: Vec<(Instant, String)>,
     engaged: u32,
@@ -137,7 +137,7 @@ impl Flight {
             mends_at: now,
             gps_until: now,
             setpoint: None,
-            given_at: None,
+            handed_over_at: None,
             flown_at: now,
             texts: Vec::new(),
             engaged: 0,
@@ -158,16 +158,16 @@ impl Flight {
         });
     }
 
-    fn note(&mut self, what: &str) {
+    fn log_event(&mut self, what: &str) {
         let at = self.now.as_micros() as f64 / 1e6 - 1_000.0;
         self.log.push(format!("{at:.2} {what}"));
     }
 
-    fn soon(&mut self, least_ms: u64, most_ms: u64) -> Instant {
+    fn random_time(&mut self, least_ms: u64, most_ms: u64) -> Instant {
         self.now + Duration::from_millis(self.rng.random_range(least_ms..=most_ms))
     }
 
-    fn happen(&mut self) {
+    fn apply_due_events(&mut self) {
         match self.rng.random_range(0..12) {
             0..=3 => self.choose(Mode::Companion),
             4 => self.choose(Mode::Hold),
@@ -176,13 +176,13 @@ impl Flight {
                 // Without TIMESYNC answers a constant delay and a slow clock look the same.
                 let kinds = if self.real.echoes { 3 } else { 2 };
                 let fault = match self.rng.random_range(0..kinds) {
-                    0 => Fault::Keeps,
+                    0 => Fault::Withhold,
                     1 => Fault::Cut,
                     _ => Fault::Delay(self.rng.random_range(100_000..8_000_000)),
                 };
                 let ways = self.rng.random_range(1..=3_u8);
-                self.mends_at = self.soon(300, 9_000);
-                self.note(&format!("cable {fault:?} {ways} until {:?}", self.mends_at));
+                self.mends_at = self.random_time(300, 9_000);
+                self.log_event(&format!("cable {fault:?} {ways} until {:?}", self.mends_at));
                 if ways & 1 != 0 {
                     self.to.set(self.now, fault);
                 }
@@ -192,27 +192,27 @@ impl Flight {
             }
             7 => {
                 self.companion = None;
-                let at = self.soon(20, 15_000);
+                let at = self.random_time(20, 15_000);
                 self.starts_at = Some(at);
-                self.note(&format!("companion killed until {at:?}"));
+                self.log_event(&format!("companion killed until {at:?}"));
             }
             8 => {
-                self.paused_until = self.soon(50, 4_000);
-                self.note(&format!("companion paused until {:?}", self.paused_until));
+                self.paused_until = self.random_time(50, 4_000);
+                self.log_event(&format!("companion paused until {:?}", self.paused_until));
             }
             9 => {
                 self.real.lose_gps(self.now);
-                self.gps_until = self.soon(1_000, 20_000);
-                self.note(&format!("gps lost until {:?}", self.gps_until));
+                self.gps_until = self.random_time(1_000, 20_000);
+                self.log_event(&format!("gps lost until {:?}", self.gps_until));
             }
             10 if self.rng.random_bool(0.5) => {
-                let until = self.soon(500, 6_000);
+                let until = self.random_time(500, 6_000);
                 self.real.restart(until);
-                self.note(&format!("autopilot restarts until {until:?}"));
+                self.log_event(&format!("autopilot restarts until {until:?}"));
             }
             _ => {
                 self.real.lost_us += self.rng.random_range(-1_500_000..=1_500_000_i64);
-                self.note(&format!("clock {}", self.real.lost_us));
+                self.log_event(&format!("clock {}", self.real.lost_us));
             }
         }
     }
@@ -220,9 +220,9 @@ impl Flight {
     fn choose(&mut self, mode: Mode) {
         let taken = self.real.choose(self.now, mode);
         if taken && mode == Mode::Companion {
-            self.given_at = Some(self.now);
+            self.handed_over_at = Some(self.now);
         }
-        self.note(&format!("pilot {mode:?} {taken}"));
+        self.log_event(&format!("pilot {mode:?} {taken}"));
     }
 
     fn step(&mut self) {
@@ -241,7 +241,7 @@ impl Flight {
             self.flown_at = now;
         }
         while let Some((sent, frame)) = self.to.take(now) {
-            let answer = self.real.hear(now, sent, &frame);
+            let answer = self.real.handle_frame(now, sent, &frame);
             self.from.put(now, answer);
         }
         if self.starts_at.is_some_and(|at| at <= now) {
@@ -278,7 +278,7 @@ impl Flight {
                     .push(format!("engaged by what was long ago at {now:?}"));
             }
             // The pilot's choice must be later than the companion's start.
-            if self.given_at.is_none_or(|at| at < self.started) {
+            if self.handed_over_at.is_none_or(|at| at < self.started) {
                 self.wrong
                     .push(format!("engaged without a pilot at {now:?}"));
             }
@@ -309,7 +309,7 @@ impl Flight {
         while link.poll_event().is_some() {}
         assert!(link.poll_timeout(now) > now, "it would spin");
         if became != before {
-            self.note(&format!("link {became:?}, {:?}", self.real.mode));
+            self.log_event(&format!("link {became:?}, {:?}", self.real.mode));
         }
         engages
     }
@@ -332,7 +332,7 @@ impl Flight {
         }
         if before != runner.is_flown() {
             let what = format!("async, flown {}, {:?}", !before, self.real.mode);
-            self.note(&what);
+            self.log_event(&what);
         }
         engages
     }
@@ -373,7 +373,7 @@ fn fly(seed: u64) -> (Vec<String>, u32, bool) {
             flight.real.take_off();
         }
         if i > 400 && flight.rng.random_bool(0.004) {
-            flight.happen();
+            flight.apply_due_events();
         }
         if flight.rng.random_bool(0.002) {
             flight.setpoint();
@@ -388,7 +388,7 @@ fn fly(seed: u64) -> (Vec<String>, u32, bool) {
 }
 
 #[test]
-fn nothing_is_engaged_without_a_pilots_choice() {
+fn setpoint_control_needs_the_pilots_choice() {
     let first = uav_relay_oracle::random::seed(1);
     let count = std::env::var("COUNT").ok();
     let count: u64 = count.and_then(|text| text.parse().ok()).unwrap_or(1_000);

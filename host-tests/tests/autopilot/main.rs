@@ -16,10 +16,10 @@ mod vehicle;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::{AutopilotEvent, Kind};
 use uav_relay::{Instant, Placement};
-use vehicle::{Mode, Said, Vehicle, place};
+use vehicle::{LinkMessage, Mode, Vehicle, place};
 
 #[test]
-fn an_autopilot_is_found_and_asked_for_its_messages() {
+fn an_autopilot_is_found_and_its_messages_requested() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut vehicle = Vehicle::new(kind);
         vehicle.run(2_000);
@@ -33,17 +33,16 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
             (87, usize::from(!is_px4)),
             (162, usize::from(!is_px4)),
         ] {
-            let asked = vehicle
-                .said
-                .iter()
-                .filter(|(_, said)| matches!(said, Said::Interval { id: of, .. } if *of == id));
+            let asked = vehicle.received.iter().filter(
+                |(_, said)| matches!(said, LinkMessage::Interval { id: of, .. } if *of == id),
+            );
             assert_eq!(asked.count(), times, "{id}");
         }
         assert!(
             vehicle
-                .said
+                .received
                 .iter()
-                .any(|(_, said)| matches!(said, Said::Heartbeat))
+                .any(|(_, said)| matches!(said, LinkMessage::Heartbeat))
         );
         assert!(
             vehicle
@@ -58,7 +57,7 @@ fn an_autopilot_is_found_and_asked_for_its_messages() {
 
 /// Checks that polling at the last representable instants yields few frames, so that a poll loop ends.
 #[test]
-fn the_frames_of_one_instant_end_at_the_last_instant_too() {
+fn poll_transmit_ends_at_the_latest_instant_too() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         for before_us in [0, 1, 1_000_000] {
             let mut vehicle = Vehicle::new(kind);
@@ -75,7 +74,7 @@ fn the_frames_of_one_instant_end_at_the_last_instant_too() {
 }
 
 #[test]
-fn messages_that_come_too_seldom_are_asked_for_again() {
+fn infrequent_messages_are_requested_again() {
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.run(6_000);
     let before = vehicle.intervals(33);
@@ -90,7 +89,7 @@ fn messages_that_come_too_seldom_are_asked_for_again() {
 }
 
 #[test]
-fn heartbeats_of_others_are_not_the_mode() {
+fn heartbeats_of_other_systems_do_not_set_the_mode() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.engage();
     vehicle.run(3_000);
@@ -107,7 +106,7 @@ fn heartbeats_of_others_are_not_the_mode() {
 }
 
 #[test]
-fn a_plane_is_no_copter() {
+fn a_plane_is_not_taken_for_a_copter() {
     // Mode 4 of an ArduPlane is ACRO.
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.mute = true;
@@ -120,7 +119,7 @@ fn a_plane_is_no_copter() {
 }
 
 #[test]
-fn positions_are_as_old_as_the_autopilot_says() {
+fn the_age_of_a_position_is_that_of_the_autopilots_clock() {
     let mut vehicle = Vehicle::new(Kind::Px4);
     vehicle.run(3_000);
     vehicle.late_ms = 130;
@@ -151,7 +150,7 @@ fn without_a_position_the_last_target_is_kept() {
             assert_eq!((target.lat_e7, target.lon_e7), (last.lat_e7, last.lon_e7));
             assert!(!target.has_velocity());
         }
-        assert!(vehicle.heard("relay: no position, keeps last target"));
+        assert!(vehicle.has_text("relay: no position, keeps last target"));
         vehicle.position_every_ms = 200;
         vehicle.run(800);
         assert_eq!(
@@ -165,7 +164,7 @@ fn without_a_position_the_last_target_is_kept() {
 }
 
 #[test]
-fn an_autopilot_that_is_switched_off_and_on_is_asked_anew() {
+fn a_restarted_autopilot_is_sent_its_requests_again() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut vehicle = Vehicle::flying(kind);
         vehicle.engage();
@@ -187,7 +186,7 @@ fn an_autopilot_that_is_switched_off_and_on_is_asked_anew() {
 }
 
 #[test]
-fn numbers_for_the_operator_come_once_a_second() {
+fn operator_values_are_sent_once_a_second() {
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.run(2_000);
     vehicle
@@ -201,10 +200,10 @@ fn numbers_for_the_operator_come_once_a_second() {
         ("relay_h", 20.0),
     ] {
         let values: Vec<f32> = vehicle
-            .said
+            .received
             .iter()
             .filter_map(|(_, said)| match said {
-                Said::Value { name: of, value } if of == name => Some(*value),
+                LinkMessage::Value { name: of, value } if of == name => Some(*value),
                 _ => None,
             })
             .collect();
@@ -217,11 +216,11 @@ fn numbers_for_the_operator_come_once_a_second() {
     }
     assert!(vehicle.link.say("a line of a relay"));
     vehicle.run(100);
-    assert!(vehicle.heard("a line of a relay"));
+    assert!(vehicle.has_text("a line of a relay"));
 }
 
 #[test]
-fn the_setpoint_of_before_is_forgotten_on_none() {
+fn a_withdrawn_setpoint_is_not_flown_again() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.setpoint = Some(Placement::on_line(900.0, 20.0));
     vehicle.engage();
@@ -240,7 +239,7 @@ fn the_setpoint_of_before_is_forgotten_on_none() {
 
 /// Checks that a setpoint that is not finite or too far away does not end the stream of targets.
 #[test]
-fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
+fn a_drone_without_a_setpoint_holds_until_the_next_one() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut vehicle = Vehicle::engaged(kind, 110.0);
         for wrong in [f32::NAN, f32::INFINITY, 1e9] {
@@ -258,7 +257,7 @@ fn a_setpoint_that_is_none_holds_and_the_next_one_is_flown() {
 
 /// Checks that targets have no yaw if the bearing to be pointed at is not a valid angle.
 #[test]
-fn a_bearing_that_is_none_is_left_out() {
+fn a_bearing_of_none_is_left_out() {
     use uav_relay::pointing::Bearing;
 
     let mut vehicle = Vehicle::engaged(Kind::Px4, 110.0);
@@ -305,13 +304,13 @@ fn a_relay_that_is_not_ready_streams_nothing_in_standby() {
 
 /// Checks that a new membership view or mission is reported to the operator once. Only drones in flight report it.
 #[test]
-fn the_operator_reads_of_a_view_and_a_mission_once() {
+fn a_view_and_a_mission_are_reported_to_the_operator_once() {
     use uav_relay::Event;
     use uav_relay::HoldReason::Unheard;
 
     let texts_since = |vehicle: &Vehicle, from: Instant| -> Vec<String> {
-        let texts = vehicle.said.iter().filter_map(|(at, said)| match said {
-            Said::Text(text) if *at >= from => Some(text.clone()),
+        let texts = vehicle.received.iter().filter_map(|(at, said)| match said {
+            LinkMessage::Text(text) if *at >= from => Some(text.clone()),
             _ => None,
         });
         texts.collect()
@@ -361,7 +360,7 @@ fn the_operator_reads_of_a_view_and_a_mission_once() {
 
 /// Checks that the operator is not told of reasons to wait that change while an agreement spreads.
 #[test]
-fn a_reason_that_does_not_last_is_not_told() {
+fn a_short_hold_reason_is_not_reported() {
     use uav_relay::HoldReason::Close;
 
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
@@ -372,16 +371,16 @@ fn a_reason_that_does_not_last_is_not_told() {
         vehicle.link.handle_hold(vehicle.now, [reason, None]);
         vehicle.run(20);
     }
-    assert!(!vehicle.heard("relay: waits, too close to the previous drone"));
+    assert!(!vehicle.has_text("relay: waits, too close to the previous drone"));
     for _ in 0..200 {
         vehicle.link.handle_hold(vehicle.now, [Some(Close), None]);
         vehicle.run(20);
     }
-    assert!(vehicle.heard("relay: waits, too close to the previous drone"));
+    assert!(vehicle.has_text("relay: waits, too close to the previous drone"));
 }
 
 #[test]
-fn the_operator_reads_why_the_guard_holds_the_relay_back() {
+fn the_operator_gets_the_guards_hold_reason() {
     use uav_relay::HoldReason::{Order, Unheard};
 
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
@@ -389,7 +388,7 @@ fn the_operator_reads_why_the_guard_holds_the_relay_back() {
     vehicle.run(2_000);
     vehicle.link.handle_hold(vehicle.now, [None, Some(Order)]);
     vehicle.run(1_000);
-    assert!(!vehicle.heard(order), "on the ground nobody asks");
+    assert!(!vehicle.has_text(order), "on the ground nobody asks");
     vehicle.fly_off();
     for i in 0..3_000 {
         // The reasons last 4 s and 3.5 s in turn.
@@ -397,8 +396,8 @@ fn the_operator_reads_why_the_guard_holds_the_relay_back() {
         vehicle.link.handle_hold(vehicle.now, [None, Some(reason)]);
         vehicle.run(20);
     }
-    let told = vehicle.said.iter().filter_map(|(at, said)| match said {
-        Said::Text(text) if text == order => Some(*at),
+    let told = vehicle.received.iter().filter_map(|(at, said)| match said {
+        LinkMessage::Text(text) if text == order => Some(*at),
         _ => None,
     });
     let told: Vec<Instant> = told.collect();

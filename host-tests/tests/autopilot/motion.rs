@@ -89,7 +89,7 @@ impl Rig {
                 }
                 _ => {}
             }
-            let answer = self.real.hear(self.now, self.now, &frame);
+            let answer = self.real.handle_frame(self.now, self.now, &frame);
             self.link.handle_bytes(self.now, &answer);
         }
         while self.link.poll_position().is_some() {}
@@ -109,7 +109,7 @@ impl Rig {
 
 /// Checks the PX4 model: if a 5 m/s target stops dead, it overshoots by 2.1 to 2.7 m like a real PX4.
 #[test]
-fn the_models_px4_flies_past_a_dead_stop_like_the_real_one() {
+fn the_simulated_px4_overshoots_a_stop_like_a_real_one() {
     let mut body = Body::default();
     let mut most: f64 = 0.0;
     for i in 0..3_000 {
@@ -127,7 +127,7 @@ fn the_models_px4_flies_past_a_dead_stop_like_the_real_one() {
 }
 
 #[test]
-fn what_was_set_is_the_most_that_is_flown() {
+fn the_set_speed_and_position_are_not_exceeded() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut rig = Rig::new(kind);
         assert!(rig.choose(Mode::Companion));
@@ -202,7 +202,7 @@ fn a_drone_has_stopped_after_the_stopping_time() {
 /// Checks that a restarted companion takes over no drone that is in OFFBOARD, GUIDED or a failsafe. The pilot must
 /// choose another mode first.
 #[test]
-fn a_restarted_companion_engages_nothing_that_it_finds() {
+fn a_restarted_companion_engages_no_drone() {
     for (kind, away_ms) in [
         (Kind::Px4, 97_000),
         (Kind::Px4, 200),
@@ -238,7 +238,7 @@ fn a_restarted_companion_engages_nothing_that_it_finds() {
 
 /// Checks a GPS outage of 30 s: the PX4 lands, and does not return to OFFBOARD afterwards.
 #[test]
-fn a_px4_whose_gps_is_back_resumes_nothing() {
+fn a_px4_with_gps_again_does_not_resume_its_flight() {
     let mut rig = Rig::new(Kind::Px4);
     assert!(rig.choose(Mode::Companion));
     rig.run(5_000);
@@ -255,7 +255,7 @@ fn a_px4_whose_gps_is_back_resumes_nothing() {
 /// Checks an autopilot clock that is 1 % slow or loses 1.5 s. The autopilot link has no valid position then, but for
 /// seconds at most.
 #[test]
-fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
+fn a_wrong_clock_stops_positions_for_seconds_at_most() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         for echoes in [true, false] {
             for (slow, lost_us) in [(0.01, 0), (0.0, 1_000_000), (0.0, 1_500_000)] {
@@ -272,7 +272,7 @@ fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
                 rig.events.clear();
                 rig.texts.clear();
                 rig.real.lost_us = lost_us;
-                rig.real.runs_slow(rig.now, slow);
+                rig.real.slow_clock(rig.now, slow);
                 rig.run(120_000);
                 let states = rig
                     .events
@@ -297,7 +297,7 @@ fn a_clock_that_is_wrong_blinds_for_seconds_at_most() {
 
 /// Checks that setpoint control continues if the simulator pauses for 1.5 s and loses that time.
 #[test]
-fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
+fn a_short_pause_of_the_autopilot_ends_no_flight() {
     for echoes in [true, false] {
         let mut rig = Rig::new(Kind::ArduCopter);
         rig.real.echoes = echoes;
@@ -327,7 +327,7 @@ fn an_autopilot_that_stops_for_a_moment_is_flown_on() {
 
 /// Checks that messages that never arrive are requested only a few times in ten minutes of flight.
 #[test]
-fn messages_that_never_come_are_not_requested_for_ever() {
+fn requests_of_absent_messages_end() {
     for (kind, most) in [(Kind::Px4, 2), (Kind::ArduCopter, 9)] {
         let mut rig = Rig::new(kind);
         assert!(rig.choose(Mode::Companion));
@@ -344,7 +344,7 @@ fn messages_that_never_come_are_not_requested_for_ever() {
 
 /// Checks a target outside the fence: the ArduCopter flies on, and the link reports refusal and return.
 #[test]
-fn a_fence_that_a_moving_target_leaves_is_named() {
+fn a_fence_breach_by_a_moving_target_is_named() {
     let mut rig = Rig::new(Kind::ArduCopter);
     rig.real.fence_x_m = 150.0;
     assert!(rig.choose(Mode::Companion));
@@ -363,12 +363,12 @@ fn a_fence_that_a_moving_target_leaves_is_named() {
 
 /// Checks a drone whose pilot hands over at full speed: it overshoots, stops, and flies on from there.
 #[test]
-fn a_drone_that_is_given_back_at_full_speed_stops() {
+fn a_drone_handed_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut rig = Rig::new(kind);
         rig.run(2_000);
         for _ in 0..500 {
-            rig.real.push([10.0, 0.0, 0.0]);
+            rig.real.shove([10.0, 0.0, 0.0]);
             rig.step();
         }
         let given = rig.at()[0];
@@ -386,7 +386,7 @@ fn a_drone_that_is_given_back_at_full_speed_stops() {
 
 /// Checks that positions half a second older than stated do not make the drone exceed its speed limit.
 #[test]
-fn late_positions_do_no_harm_to_the_flight() {
+fn late_positions_do_not_disturb_the_flight() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut rig = Rig::new(kind);
         rig.real.hidden_lag = 25;
@@ -406,7 +406,7 @@ fn late_positions_do_no_harm_to_the_flight() {
 /// Checks a drone that drifts while the autopilot link has no position. The next targets begin at the drone's new
 /// position.
 #[test]
-fn a_drone_that_drifts_while_blind_is_led_from_where_it_is() {
+fn a_drone_that_drifted_is_led_from_its_true_position() {
     let mut rig = Rig::new(Kind::ArduCopter);
     assert!(rig.choose(Mode::Companion));
     rig.run(4_000);

@@ -30,7 +30,7 @@ fn no_target_is_sent_on_the_ground_or_during_take_off() {
 }
 
 #[test]
-fn in_the_air_its_own_position_is_streamed_in_standby() {
+fn in_standby_the_drones_own_position_is_streamed() {
     let mut vehicle = Vehicle::flying(Kind::Px4);
     vehicle.setpoint = Some(place(500.0));
     let from = vehicle.now;
@@ -46,7 +46,7 @@ fn in_the_air_its_own_position_is_streamed_in_standby() {
 }
 
 #[test]
-fn it_is_led_to_its_place_and_held_there() {
+fn the_drone_is_led_to_its_position_and_held_there() {
     let mut vehicle = Vehicle::engaged(Kind::Px4, 180.0);
     let from = vehicle.now;
     assert_eq!(vehicle.link.state(), State::Engaged);
@@ -83,13 +83,13 @@ fn it_is_led_to_its_place_and_held_there() {
 }
 
 #[test]
-fn the_pilot_takes_it_and_nothing_is_taken_back() {
+fn the_pilots_takeover_is_final() {
     let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     vehicle.run(5_000);
     vehicle.mode = Mode::Position;
     vehicle.run(1_100);
     assert_eq!(vehicle.link.state(), State::Standby);
-    assert!(vehicle.heard("relay: released, manual mode"));
+    assert!(vehicle.has_text("relay: released, manual mode"));
     let from = vehicle.now;
     vehicle.place = place(140.0);
     vehicle.run(10_000);
@@ -104,7 +104,7 @@ fn the_pilot_takes_it_and_nothing_is_taken_back() {
 }
 
 #[test]
-fn a_failsafe_is_not_ended_by_the_link() {
+fn the_link_does_not_end_a_failsafe() {
     let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     vehicle.run(3_000);
     // The cable breaks until after the autopilot has started its return.
@@ -125,7 +125,7 @@ fn a_failsafe_is_not_ended_by_the_link() {
 }
 
 #[test]
-fn landing_for_a_moment_is_still_flying() {
+fn a_short_landed_report_does_not_end_the_flight() {
     let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     let from = vehicle.now;
     vehicle.run(2_000);
@@ -138,7 +138,7 @@ fn landing_for_a_moment_is_still_flying() {
 }
 
 #[test]
-fn after_a_landing_it_is_quiet_though_the_mode_says_otherwise() {
+fn after_a_landing_no_targets_are_sent_in_any_mode() {
     let mut vehicle = Vehicle::engaged(Kind::Px4, 500.0);
     vehicle.run(2_000);
     vehicle.mode = Mode::Hold;

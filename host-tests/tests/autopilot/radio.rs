@@ -26,7 +26,7 @@ fn hears(vehicle: &mut Vehicle, noise: u8) -> Option<Sample> {
 }
 
 #[test]
-fn a_radio_in_the_air_tells_what_is_heard_there() {
+fn an_airborne_radios_noise_reaches_the_relay() {
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.run(2_000);
     assert_eq!(hears(&mut vehicle, 100), None, "on the ground");

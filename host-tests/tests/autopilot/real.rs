@@ -133,8 +133,8 @@ pub(crate) struct Real {
     /// x beyond which an ArduCopter ignores targets, m.
     pub(crate) fence_x_m: f64,
     pub(crate) is_breached: bool,
-    told: Option<SentTarget>,
-    told_at: Option<Instant>,
+    target: Option<SentTarget>,
+    last_target_at: Option<Instant>,
     stream_since: Instant,
     /// Point at which the drone hovers in the autopilot's own modes.
     hold: Point,
@@ -182,8 +182,8 @@ impl Real {
             gps_lost_at: now,
             fence_x_m: f64::INFINITY,
             is_breached: false,
-            told: None,
-            told_at: None,
+            target: None,
+            last_target_at: None,
             stream_since: now,
             hold: at,
             began: now,
@@ -218,7 +218,7 @@ impl Real {
         if self.away_until.is_some() || !self.in_air {
             return false;
         }
-        let streamed = self.told_at.is_some_and(|at| now.since(at) <= LOST);
+        let streamed = self.last_target_at.is_some_and(|at| now.since(at) <= LOST);
         if self.kind == Kind::Px4 && mode == Mode::Companion && !(streamed && self.gps) {
             return false;
         }
@@ -226,7 +226,7 @@ impl Real {
             return false;
         }
         if self.mode != mode {
-            self.told = None;
+            self.target = None;
         }
         self.chosen = mode;
         self.body.sum = [0.0; 3];
@@ -258,7 +258,7 @@ impl Real {
         self.away_until = Some(until);
         self.chosen = Mode::Hold;
         self.fall(Mode::Hold, false);
-        (self.told, self.told_at) = (None, None);
+        (self.target, self.last_target_at) = (None, None);
     }
 
     /// Advances the simulation by one time step. Returns the bytes that the autopilot sends.
@@ -293,7 +293,7 @@ impl Real {
     fn decide(&mut self, now: Instant) {
         match self.kind {
             Kind::Px4 => {
-                let streamed = self.told_at.is_some_and(|at| now.since(at) <= LOST);
+                let streamed = self.last_target_at.is_some_and(|at| now.since(at) <= LOST);
                 if !streamed {
                     self.stream_since = now;
                 }
@@ -338,10 +338,13 @@ impl Real {
             Kind::Px4 => &PX4,
             Kind::ArduCopter => &ARDUCOPTER,
         };
-        match (self.mode, &mut self.told) {
+        match (self.mode, &mut self.target) {
             (Mode::Companion, Some(told)) => {
                 if self.kind == Kind::ArduCopter {
-                    if self.told_at.is_some_and(|at| now.since(at) > VELOCITY) {
+                    if self
+                        .last_target_at
+                        .is_some_and(|at| now.since(at) > VELOCITY)
+                    {
                         told.velocity = [0.0; 3];
                     }
                     // The target continues with its velocity.
@@ -361,13 +364,13 @@ impl Real {
     }
 
     /// Flies by the pilot's sticks for one step. The drone has the velocity at once, m/s.
-    pub(crate) fn push(&mut self, velocity: Point) {
+    pub(crate) fn shove(&mut self, velocity: Point) {
         self.body.fly_at(velocity, &PX4);
         self.hold = self.body.at;
     }
 
     /// Makes the autopilot's clock run slow by the fraction `slow` from `now` on.
-    pub(crate) fn runs_slow(&mut self, now: Instant, slow: f64) {
+    pub(crate) fn slow_clock(&mut self, now: Instant, slow: f64) {
         self.slow = slow;
         self.slow_since = now;
     }
@@ -419,7 +422,7 @@ impl Real {
             }
             245 => payload.extend([0, if self.in_air { 2 } else { 1 }]),
             87 if self.kind == Kind::ArduCopter && self.mode == Mode::Companion => {
-                let at = self.point(self.told?.to)?;
+                let at = self.point(self.target?.to)?;
                 payload.extend(self.boot_ms(now).to_le_bytes());
                 payload.extend(at.lat_e7.to_le_bytes());
                 payload.extend(at.lon_e7.to_le_bytes());
@@ -452,7 +455,7 @@ impl Real {
     }
 
     /// Receives a frame that was sent at `sent_at`. Returns the bytes of its answer.
-    pub(crate) fn hear(&mut self, now: Instant, sent_at: Instant, frame: &[u8]) -> Vec<u8> {
+    pub(crate) fn handle_frame(&mut self, now: Instant, sent_at: Instant, frame: &[u8]) -> Vec<u8> {
         if self.away_until.is_some() {
             return Vec::new();
         }
@@ -476,7 +479,7 @@ impl Real {
             }
             86 => {
                 self.sent_at = sent_at;
-                self.take(now, &payload, long, float);
+                self.handle_target(now, &payload, long, float);
                 Vec::new()
             }
             111 if self.echoes => {
@@ -488,7 +491,7 @@ impl Real {
         }
     }
 
-    fn take(
+    fn handle_target(
         &mut self,
         now: Instant,
         payload: &[u8],
@@ -515,16 +518,16 @@ impl Real {
                 -ned[2],
             ];
         }
-        if self.told_at.is_none_or(|at| now.since(at) > LOST) {
+        if self.last_target_at.is_none_or(|at| now.since(at) > LOST) {
             self.stream_since = now;
         }
         if self.mode == Mode::Companion && to[0] <= self.fence_x_m {
-            self.told = Some(SentTarget { to, velocity });
-            self.told_at = Some(now);
+            self.target = Some(SentTarget { to, velocity });
+            self.last_target_at = Some(now);
         } else if self.kind == Kind::Px4 {
             // A PX4 in its failsafe flies to the target once it resumes.
-            self.told = Some(SentTarget { to, velocity });
-            self.told_at = Some(now);
+            self.target = Some(SentTarget { to, velocity });
+            self.last_target_at = Some(now);
         }
     }
 }

@@ -96,7 +96,7 @@ pub(crate) fn keyed(kind: Kind, ours: Option<[u8; 32]>, theirs: Option<[u8; 32]>
 }
 
 #[test]
-fn with_one_key_it_flies_to_its_place() {
+fn with_a_common_key_the_drone_flies_to_its_position() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         let mut vehicle = keyed(kind, Some(OURS), Some(OURS));
         vehicle.fly_off();
@@ -105,14 +105,14 @@ fn with_one_key_it_flies_to_its_place() {
         vehicle.run(20_000);
         assert_eq!(vehicle.link.state(), State::Engaged);
         assert!((vehicle.place.x_m - 150.0).abs() < 0.1, "{kind:?}");
-        assert!(vehicle.heard("relay: engaged, flies to position"));
+        assert!(vehicle.has_text("relay: engaged, flies to position"));
         assert_eq!(mistrust(&vehicle), []);
         assert_eq!(vehicle.link.refused(), 0);
     }
 }
 
 #[test]
-fn a_key_that_does_not_fit_is_told_once_and_there_is_no_flight() {
+fn a_wrong_key_is_reported_once_and_prevents_the_flight() {
     use Mistrust::{NoKey, OtherKey, Unsigned};
     for (ours, theirs, why, is_heard) in [
         (None, Some(OURS), NoKey, true),
@@ -134,7 +134,7 @@ fn a_key_that_does_not_fit_is_told_once_and_there_is_no_flight() {
 
 /// Checks that two mismatched heartbeats, of another vehicle or by noise, raise no event.
 #[test]
-fn one_frame_that_does_not_fit_is_no_event() {
+fn a_single_frame_with_a_wrong_signature_is_no_event() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));
     vehicle.run(3_000);
     for _ in 0..5 {
@@ -153,7 +153,7 @@ fn one_frame_that_does_not_fit_is_no_event() {
 }
 
 #[test]
-fn a_clock_that_goes_back_is_told_of_and_not_believed() {
+fn a_clock_that_goes_back_is_reported_and_ignored() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));
     vehicle.fly_off();
     vehicle.setpoint = Some(place(150.0));
@@ -169,7 +169,7 @@ fn a_clock_that_goes_back_is_told_of_and_not_believed() {
 
 /// Checks that frames recorded in flight and replayed on the ground do not start setpoint control.
 #[test]
-fn what_was_recorded_is_refused() {
+fn replayed_frames_are_refused() {
     let mut vehicle = keyed(Kind::ArduCopter, Some(OURS), Some(OURS));
     vehicle.fly_off();
     vehicle.mode = Mode::Companion;
@@ -197,7 +197,7 @@ fn what_was_recorded_is_refused() {
 
 /// Checks that RADIO_STATUS of a SiK radio is accepted unsigned, because the radio has no key.
 #[test]
-fn what_a_radio_says_needs_no_signature() {
+fn radio_status_needs_no_signature() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));
     vehicle.run(2_000);
     let mut frame = vec![0xFD, 9, 0, 0, 0, b'3', b'D', 109, 0, 0];

@@ -39,7 +39,7 @@ pub(crate) fn axis() -> Axis {
 
 /// Message from the link, as the simulated vehicle decodes it.
 #[derive(Clone, PartialEq, Debug)]
-pub(crate) enum Said {
+pub(crate) enum LinkMessage {
     Heartbeat,
     Interval {
         id: u32,
@@ -122,7 +122,7 @@ pub(crate) struct Vehicle {
     number: u8,
     /// Signing key; with a key, unsigned frames are ignored.
     pub(crate) key: Option<Key>,
-    pub(crate) said: Vec<(Instant, Said)>,
+    pub(crate) received: Vec<(Instant, LinkMessage)>,
     pub(crate) systems: Vec<u8>,
     pub(crate) events: Vec<AutopilotEvent>,
     pub(crate) positions: Vec<(Instant, Position)>,
@@ -151,7 +151,7 @@ impl Vehicle {
             late_ms: 0,
             number: 0,
             key: None,
-            said: Vec::new(),
+            received: Vec::new(),
             systems: Vec::new(),
             events: Vec::new(),
             positions: Vec::new(),
@@ -204,12 +204,12 @@ impl Vehicle {
     }
 
     pub(crate) fn step(&mut self) {
-        self.step_alone();
+        self.step_without_exchange();
         self.drive();
     }
 
     /// Flies for one step and sends messages to the link. The link answers in [`drive`](Self::drive) or [`answer`](Self::answer).
-    pub(crate) fn step_alone(&mut self) {
+    pub(crate) fn step_without_exchange(&mut self) {
         self.now = Instant::from_micros(self.now.as_micros() + STEP_MS * 1_000);
         let ms = self.now.as_micros() / 1_000;
         self.fly();
@@ -218,14 +218,14 @@ impl Vehicle {
                 self.heartbeat();
             }
             if ms.is_multiple_of(500) {
-                self.say(&MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
+                self.send_message(&MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
                     landed_state: self.landed,
                     ..EXTENDED_SYS_STATE_DATA::DEFAULT
                 }));
-                self.say_target();
+                self.send_target();
             }
             if self.position_every_ms != u64::MAX && ms.is_multiple_of(self.position_every_ms) {
-                self.say_position();
+                self.send_position();
             }
         }
     }
@@ -245,7 +245,7 @@ impl Vehicle {
     /// Receives the frames and events of the autopilot link.
     pub(crate) fn answer(&mut self) {
         while let Some(frame) = self.link.poll_transmit(self.now) {
-            self.hear(&frame);
+            self.receive(&frame);
         }
         while let Some(event) = self.link.poll_event() {
             self.events.push(event);
@@ -324,9 +324,9 @@ impl Vehicle {
         self.send(frame);
     }
 
-    fn say_position(&mut self) {
+    fn send_position(&mut self) {
         let point = axis().point(self.place).unwrap();
-        self.say(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        self.send_message(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
             time_boot_ms: self.boot_ms(),
             lat: point.lat_e7,
             lon: point.lon_e7,
@@ -336,12 +336,12 @@ impl Vehicle {
     }
 
     /// Reports the current target to the link, as an ArduCopter does in GUIDED and a PX4 does not.
-    fn say_target(&mut self) {
+    fn send_target(&mut self) {
         if self.kind == Kind::Px4 || self.mode != Mode::Companion || !self.says_targets {
             return;
         }
         if let Some(goal) = self.goal.or_else(|| self.own_goal()) {
-            self.say(&MavMessage::POSITION_TARGET_GLOBAL_INT(
+            self.send_message(&MavMessage::POSITION_TARGET_GLOBAL_INT(
                 POSITION_TARGET_GLOBAL_INT_DATA {
                     lat_int: goal.lat_e7,
                     lon_int: goal.lon_e7,
@@ -368,12 +368,12 @@ impl Vehicle {
         })
     }
 
-    fn say(&mut self, message: &MavMessage) {
-        self.say_from([SYSTEM, 1], message);
+    fn send_message(&mut self, message: &MavMessage) {
+        self.send_from([SYSTEM, 1], message);
     }
 
     /// Sends the link a message with the address of a ground station or of another component.
-    pub(crate) fn say_from(&mut self, [system, component]: [u8; 2], message: &MavMessage) {
+    pub(crate) fn send_from(&mut self, [system, component]: [u8; 2], message: &MavMessage) {
         let header = MavHeader {
             system_id: system.into(),
             component_id: component,
@@ -393,7 +393,7 @@ impl Vehicle {
         self.link.handle_bytes(self.now, &frame);
     }
 
-    fn hear(&mut self, frame: &[u8]) {
+    fn receive(&mut self, frame: &[u8]) {
         let key = self.key.as_mut();
         if key.is_some_and(|key| !key.believes(frame)) {
             return;
@@ -404,36 +404,40 @@ impl Vehicle {
             .unwrap();
         self.systems.push(header.system_id as u8);
         let said = match message {
-            MavMessage::HEARTBEAT(_) => Said::Heartbeat,
+            MavMessage::HEARTBEAT(_) => LinkMessage::Heartbeat,
             MavMessage::COMMAND_LONG(command) => {
                 assert_eq!(command.command as u32, 511);
                 if !self.mute {
                     let command = command.command;
-                    self.say(&MavMessage::COMMAND_ACK(COMMAND_ACK_DATA {
+                    self.send_message(&MavMessage::COMMAND_ACK(COMMAND_ACK_DATA {
                         command,
                         ..COMMAND_ACK_DATA::DEFAULT
                     }));
                 }
-                Said::Interval {
+                LinkMessage::Interval {
                     id: command.param1 as u32,
                 }
             }
-            MavMessage::COMMAND_ACK(ack) => Said::Ack {
+            MavMessage::COMMAND_ACK(ack) => LinkMessage::Ack {
                 command: ack.command as u32,
                 result: ack.result as u32,
                 // The recipient is an extension field, which the decoder does not read.
                 to: frame[18..20].try_into().unwrap(),
             },
-            MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => Said::Target(self.told(&target)),
-            MavMessage::STATUSTEXT(text) => Said::Text(text.text.to_str().unwrap().to_owned()),
-            MavMessage::NAMED_VALUE_FLOAT(value) => Said::Value {
+            MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => {
+                LinkMessage::Target(self.decode_target(&target))
+            }
+            MavMessage::STATUSTEXT(text) => {
+                LinkMessage::Text(text.text.to_str().unwrap().to_owned())
+            }
+            MavMessage::NAMED_VALUE_FLOAT(value) => LinkMessage::Value {
                 name: value.name.to_str().unwrap().to_owned(),
                 value: value.value,
             },
             MavMessage::TIMESYNC(sync) => {
                 assert_eq!(sync.tc1, 0, "a question");
                 if !self.mute && self.echoes {
-                    self.say(&MavMessage::TIMESYNC(TIMESYNC_DATA {
+                    self.send_message(&MavMessage::TIMESYNC(TIMESYNC_DATA {
                         tc1: self.now.as_micros().cast_signed() * 1_000,
                         ts1: sync.ts1,
                     }));
@@ -442,10 +446,10 @@ impl Vehicle {
             }
             other => panic!("it does not say {other:?}"),
         };
-        self.said.push((self.now, said));
+        self.received.push((self.now, said));
     }
 
-    fn told(&mut self, target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Target {
+    fn decode_target(&mut self, target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Target {
         assert_eq!((target.target_system, target.target_component), (SYSTEM, 1));
         assert_eq!(target.coordinate_frame as u32, 5);
         let target = Target {
@@ -463,9 +467,9 @@ impl Vehicle {
     }
 
     pub(crate) fn targets(&self) -> Vec<(Instant, Target)> {
-        let all = self.said.iter();
+        let all = self.received.iter();
         all.filter_map(|(at, said)| match said {
-            Said::Target(target) => Some((*at, *target)),
+            LinkMessage::Target(target) => Some((*at, *target)),
             _ => None,
         })
         .collect()
@@ -479,15 +483,15 @@ impl Vehicle {
 
     /// Returns the number of requests for a message.
     pub(crate) fn intervals(&self, id: u32) -> usize {
-        let asked = self.said.iter();
+        let asked = self.received.iter();
         asked
-            .filter(|(_, said)| *said == Said::Interval { id })
+            .filter(|(_, said)| *said == LinkMessage::Interval { id })
             .count()
     }
 
-    pub(crate) fn heard(&self, text: &str) -> bool {
-        self.said
+    pub(crate) fn has_text(&self, text: &str) -> bool {
+        self.received
             .iter()
-            .any(|(_, said)| *said == Said::Text(text.to_owned()))
+            .any(|(_, said)| *said == LinkMessage::Text(text.to_owned()))
     }
 }

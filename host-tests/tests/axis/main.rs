@@ -151,7 +151,7 @@ fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
 
 /// Compares the crate, and the port of GeographicLib, with points computed by GeographicLib itself.
 #[test]
-fn the_points_that_geographiclib_made() {
+fn points_agree_with_geographiclib() {
     let mut reader = csv::Reader::from_reader(&include_bytes!("points.csv")[..]);
     let points: Vec<Beside> = reader.deserialize().map(Result::unwrap).collect();
     assert_eq!(points.len(), 300);
@@ -172,7 +172,7 @@ fn the_points_that_geographiclib_made() {
 }
 
 #[test]
-fn places_agree_with_geodesics() {
+fn positions_agree_with_geodesics() {
     for (length, allowed) in ALLOWED {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut worst = [0.0_f64; 3];
@@ -194,7 +194,7 @@ fn places_agree_with_geodesics() {
 }
 
 #[test]
-fn there_and_back_is_within_one_unit() {
+fn the_round_trip_of_a_position_is_exact_to_one_unit() {
     for (length, _) in ALLOWED {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         for _ in 0..LINES {
@@ -286,7 +286,7 @@ fn distances_agree_with_geodesics() {
 /// Checks the distance of a drone that is too far away for coordinates on the line. Examples are swapped latitude and
 /// longitude, and the other side of the earth.
 #[test]
-fn a_point_that_has_no_place_has_a_distance() {
+fn a_point_too_far_for_a_position_has_a_distance() {
     let site = |lat, lon| Geodetic::from_degrees(lat, lon, 420.0).unwrap();
     let (tx, rx) = (site(8.54, 47.40), site(8.55, 47.41));
     let axis = Axis::try_new(tx, rx).unwrap();

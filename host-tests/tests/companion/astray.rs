@@ -105,18 +105,18 @@ const fn with_height([lat, lon, _]: Site, amsl: f64) -> Site {
 }
 
 #[test]
-fn a_px4_far_from_a_swapped_line_is_told_of() {
+fn a_px4_far_from_a_swapped_line_is_reported() {
     is_off_a_swapped_line("px4");
 }
 
 #[test]
-fn an_arducopter_far_from_a_swapped_line_is_told_of() {
+fn an_arducopter_far_from_a_swapped_line_is_reported() {
     is_off_a_swapped_line("arducopter");
 }
 
 /// Checks that the report of a drone in another valley suggests no cause, as no sites are swapped.
 #[test]
-fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
+fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     let moved = |[lat, lon, amsl]: Site| [lat - 0.1, lon, amsl];
     let mut apart = Apart::start("px4", moved(TX), moved(RX));
     let line = apart
@@ -135,7 +135,7 @@ fn a_drone_far_from_its_line_is_told_of_without_a_guess() {
 
 /// Checks that a drone outside the geofence but near the line is reported, and may be controlled.
 #[test]
-fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
+fn a_drone_outside_the_geofence_is_reported_in_the_air() {
     // 380 m along a line that starts 500 m farther on.
     let shifted = |site: Site| {
         let [lat, lon, amsl] = on_earth(500.0, 0.0);
@@ -168,7 +168,7 @@ fn a_drone_outside_the_geofence_is_told_of_in_the_air() {
 }
 
 #[test]
-fn a_drone_at_its_line_is_not_told_of() {
+fn a_drone_at_its_line_is_not_reported() {
     let mut flight = Flight::found("arducopter", "");
     flight.takes_off();
     flight.is_engaged();

@@ -60,7 +60,7 @@ fn said(lines: &[String], event: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_later_upload_keeps_what_is_flown_and_shows_each_change() {
+fn a_later_upload_is_based_on_the_flown_mission() {
     let mut bench = Bench::new();
     let before = bench.agreed();
     let moved = "--new-site-rx 47.412,8.552,433 --yes";
@@ -119,7 +119,7 @@ fn a_later_upload_keeps_what_is_flown_and_shows_each_change() {
 }
 
 #[test]
-fn what_leaves_the_geofence_is_refused_before_it_is_sent() {
+fn an_upload_outside_the_geofence_is_refused_before_sending() {
     let mut bench = Bench::new();
     bench.agreed();
     let more = "--new-altitude 50 --new-band 50,50 --yes";
@@ -160,7 +160,7 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
 /// Checks `--from-loaded`, which uploads the relays' loaded mission with the given changes. The ground station shows
 /// every earlier change that this upload reverts.
 #[test]
-fn an_upload_from_the_loaded_values_shows_what_goes_back() {
+fn an_upload_based_on_loaded_values_shows_reverted_keys() {
     let mut bench = Bench::new();
     bench.agreed();
     let moved = "--new-interferer 80,700,-300 --yes";

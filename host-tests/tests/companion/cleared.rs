@@ -112,7 +112,7 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
 
 /// Checks that a client that sends nothing, or half a command, is answered at once.
 #[test]
-fn a_client_that_sends_a_part_of_a_command_is_answered() {
+fn an_incomplete_command_is_answered() {
     let files = Files::new();
     let socket = files.text("status");
     let mut relay = Relay::start(&format!("--index 1 --of 1 --status-socket {socket}"));

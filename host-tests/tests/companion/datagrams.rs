@@ -80,19 +80,19 @@ fn is_heard_again(address: &str, ports: Ports) {
 }
 
 #[test]
-fn a_companion_that_restarts_is_heard_at_the_ports_of_px4() {
+fn a_restarted_companion_is_received_at_the_ports_of_px4() {
     let ports = Ports::of_px4();
     is_heard_again(&format!("udp:127.0.0.1:{}", ports.port), ports);
 }
 
 #[test]
-fn a_companion_that_restarts_is_heard_at_any_other_port() {
+fn a_restarted_companion_is_received_at_any_other_port() {
     let ports = Ports::apart(1_000);
     is_heard_again(&format!("udp:127.0.0.1:{}", ports.port), ports);
 }
 
 #[test]
-fn a_companion_that_restarts_is_heard_at_its_local_port() {
+fn a_restarted_companion_is_received_at_its_local_port() {
     let ports = Ports::apart(7);
     let address = format!("udp:localhost:{}@{}", ports.port, ports.local);
     is_heard_again(&address, ports);
@@ -100,7 +100,7 @@ fn a_companion_that_restarts_is_heard_at_its_local_port() {
 
 /// Checks that a companion that restarts in the air finds the autopilot and its flight state.
 #[test]
-fn a_companion_that_restarts_in_the_air_is_heard() {
+fn a_companion_restarted_in_the_air_is_received() {
     let ports = Ports::apart(1_000);
     let address = format!("udp:127.0.0.1:{}", ports.port);
     let mut drone = ports.drone(ports.local);
@@ -137,7 +137,7 @@ fn an_autopilot_that_restarts_is_found_again() {
 
 /// Checks that the error line names the occupied local port and the option to choose another one.
 #[test]
-fn a_local_port_that_cannot_be_had_is_named() {
+fn an_unavailable_local_port_is_named() {
     let ports = Ports::apart(1_000);
     let Ports { port, local } = ports;
     let taken = UdpSocket::bind(("0.0.0.0", local)).unwrap();

@@ -43,7 +43,7 @@ fn start(file: impl AsRef<Path>, more: &str) -> Relay {
 }
 
 #[test]
-fn three_with_one_file_settle_where_the_simulated_chain_does() {
+fn three_relays_with_one_file_settle_like_the_simulation() {
     let folder = Files::new();
     let channel = Medium::new(3, QUIET);
     let text = format!(
@@ -93,7 +93,7 @@ fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
 }
 
 #[test]
-fn what_is_wrong_with_the_file_is_named() {
+fn errors_of_the_file_are_named() {
     let folder = Files::new();
     let mut all = String::new();
     for sections in [
@@ -131,7 +131,7 @@ fn what_is_wrong_with_the_file_is_named() {
 
 /// Checks that options override the file, and that the log reports each overridden value once.
 #[test]
-fn what_the_command_line_says_otherwise_is_said_once() {
+fn overrides_by_the_command_line_are_logged_once() {
     let folder = Files::new();
     let sections =
         "[network]\nid = 4711\nrelays = 1\nbaud = 57600\n[companion]\nupstream = \"away\"\n";

@@ -188,12 +188,12 @@ fn falls_silent(flight: &mut Flight) {
 const KEY: Option<&str> = Some("c0ffee0123456789abcdef00112233445566778899aabbccddeeff0102030405");
 
 #[test]
-fn an_arducopter_is_led_to_its_place_and_let_go() {
+fn an_arducopter_is_led_to_its_position_and_released() {
     an_arducopter(None);
 }
 
 #[test]
-fn an_arducopter_that_signs_is_led_to_its_place_and_let_go() {
+fn a_signing_arducopter_is_led_to_its_position_and_released() {
     an_arducopter(KEY);
 }
 
@@ -236,7 +236,7 @@ fn an_arducopter(key: Option<&str>) {
 
 /// Checks that the relay reports an ArduCopter that refuses a target, as outside its fence.
 #[test]
-fn an_arducopter_that_refuses_is_told_of() {
+fn an_arducopter_that_refuses_targets_is_reported() {
     let mut flight = Flight::found("arducopter", "");
     flight.takes_off();
     flight.drone.order("refuse");
@@ -247,12 +247,12 @@ fn an_arducopter_that_refuses_is_told_of() {
 }
 
 #[test]
-fn a_px4_is_led_to_its_place_and_let_go() {
+fn a_px4_is_led_to_its_position_and_released() {
     a_px4(None);
 }
 
 #[test]
-fn a_px4_that_signs_is_led_to_its_place_and_let_go() {
+fn a_signing_px4_is_led_to_its_position_and_released() {
     a_px4(KEY);
 }
 

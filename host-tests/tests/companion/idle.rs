@@ -20,7 +20,7 @@ fn a_settled_relay_sleeps() {
 }
 
 #[test]
-fn a_tty_that_takes_nothing_is_waited_for_asleep() {
+fn the_process_sleeps_while_a_tty_accepts_no_bytes() {
     let pty = Pty::new();
     pty.stuff();
     let path = pty.path().display();

@@ -15,7 +15,7 @@ const LISTENING: &str = "--listen --interferer unknown --listen-every 0.5";
 
 /// Checks that a relay finds the interferer from positions and powers that its FIFO delivers.
 #[test]
-fn one_finds_the_interferer_by_its_fifo() {
+fn a_relay_locates_the_interferer_by_samples_from_a_fifo() {
     let scene = Scene::new(&Scenario::default(), 1).unwrap();
     let files = Files::new();
     let fifo = files.fifo("positions");
@@ -54,7 +54,7 @@ fn one_finds_the_interferer_by_its_fifo() {
 
 /// Checks that a relay uses a radio's noise measurements in the air. It plans to move, to measure at other positions.
 #[test]
-fn a_radio_on_the_autopilots_link_is_heard() {
+fn noise_of_a_radio_on_the_autopilots_link_is_used() {
     let mut flight = Flight::found("arducopter", LISTENING);
     flight.takes_off();
     flight.drone.order("noise 150");

@@ -55,7 +55,7 @@ fn with_source(power_w: f64, x_m: f64, y_m: f64) -> Scenario {
 }
 
 #[test]
-fn three_processes_settle_where_the_simulated_chain_does() {
+fn three_processes_settle_like_the_simulation() {
     let mut chain = Chain::start(3, "");
     assert_eq!(chain.settled(), simulated(&Scenario::default(), 3));
     for (relay, signal) in chain
@@ -118,7 +118,7 @@ fn three_processes_choose_the_altitudes_of_the_simulated_chain() {
 }
 
 #[test]
-fn three_in_a_field_settle_where_the_simulated_chain_does() {
+fn three_relays_in_a_field_settle_like_the_simulation() {
     // Upsilon is (1 + beta) / I_max for alpha = 2.
     let beta = [(-50.0, 1.5), (400.0, 1.0), (1000.0, 3.0)];
     let beta = beta.map(|(x_m, beta)| BetaPoint {
@@ -155,7 +155,7 @@ fn the_tty_is_set_to_the_speed_asked_for() {
 type Media = fn(Noise) -> Chain;
 
 #[test]
-fn over_noisy_media_they_settle_at_the_same_places() {
+fn over_noisy_media_the_positions_are_the_same() {
     let expected = simulated(&Scenario::default(), 3);
     let kinds: [(Media, &[Noise]); 2] = [
         (
@@ -212,7 +212,7 @@ fn a_killed_process_is_noticed_and_comes_back() {
 }
 
 #[test]
-fn neighbours_with_different_missions_say_so() {
+fn neighbours_with_different_missions_report_it() {
     let chain = Chain::on_wires(2, QUIET);
     let mut first = chain.relay(1, "");
     let mut second = chain.relay(2, "--altitude 21");

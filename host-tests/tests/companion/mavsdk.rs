@@ -5,7 +5,7 @@ use crate::flying::ASKED;
 use crate::peer::{Heard, Peer, agreed, apart_m, on_earth, relay};
 
 #[test]
-fn mavsdk_is_led_to_its_place_and_let_go() {
+fn mavsdk_is_led_to_its_position_and_released() {
     let place = agreed();
     let port = Ports::apart(1_000).port;
     let address = format!("udpin://127.0.0.1:{port}");

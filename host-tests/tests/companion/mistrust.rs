@@ -9,7 +9,7 @@ const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788
 /// Checks a drone and a relay with different signing keys, or with only one key. The relay logs the mismatch, does
 /// not use the drone's frames, and never logs a key.
 #[test]
-fn keys_that_do_not_fit_are_told_of_and_nothing_is_heard() {
+fn different_mavlink_keys_are_reported_and_frames_ignored() {
     let unsigned = "signs its frames and ignores unsigned ones: give --autopilot-key-file";
     let other = "signs with another key than that of --autopilot-key-file; its frames are ignored";
     let plain = "does not sign its frames, which are ignored";

@@ -15,7 +15,7 @@ const MOVED: Site = [47.4095, 8.5535, 440.0];
 const STANDS: Duration = Duration::from_millis(2_500);
 
 #[test]
-fn a_drone_stays_where_it_is_and_then_flies_along_the_new_line() {
+fn a_drone_waits_and_then_flies_along_the_new_line() {
     for kind in ["arducopter", "px4"] {
         let (before, after) = (agreed(), agreed_toward(MOVED));
         assert!(apart_m(before, after) > 20.0, "it has some way to go");

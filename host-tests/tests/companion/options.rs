@@ -115,7 +115,7 @@ fn wrong_options_of_an_autopilot_are_named() {
 
 /// Checks the error of a start with an autopilot link that cannot be opened: it names the link.
 #[test]
-fn an_autopilot_that_is_not_there_at_the_start_is_a_mistake() {
+fn an_absent_autopilot_at_the_start_is_an_error() {
     for (autopilot, why) in [
         ("/nowhere/tty", "--autopilot /nowhere/tty: No such file"),
         ("/dev/null", "--autopilot /dev/null: is not a tty"),

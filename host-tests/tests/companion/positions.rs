@@ -10,7 +10,7 @@ use crate::process::{LIMIT, Relay, bits};
 /// Checks relays that receive their drones' positions. Their first setpoints are these positions, and the last ones
 /// are those of a chain without motion guards.
 #[test]
-fn two_that_know_where_they_are_make_room_for_each_other() {
+fn two_relays_with_positions_keep_apart_by_their_guards() {
     let mut free = Chain::start(2, "");
     free.lines("unguarded: no --positions: drones are not kept apart while they move");
     let expected = free.settled();
@@ -59,7 +59,7 @@ fn two_that_know_where_they_are_make_room_for_each_other() {
 }
 
 #[test]
-fn lines_that_are_no_position_are_counted_and_said_once() {
+fn invalid_position_lines_are_counted_and_logged_once() {
     let files = Files::new();
     let fifo = files.fifo("positions");
     let mut relay = Relay::start(&format!("--index 1 --of 1 --positions {fifo}"));
@@ -88,7 +88,7 @@ fn lines_that_are_no_position_are_counted_and_said_once() {
 }
 
 #[test]
-fn what_is_no_fifo_is_refused() {
+fn a_path_that_is_not_a_fifo_is_refused() {
     let files = Files::new();
     let file = files.write("file", "1 2 3\n");
     for (path, why) in [

@@ -22,7 +22,7 @@ fn start(chain: &Chain, index: usize, key: &str) -> Relay {
 /// Checks that relays with signed frames agree on the simulated chain's positions. The wires are with and without
 /// noise, and a relay reboots.
 #[test]
-fn three_that_sign_settle_where_the_simulated_chain_does() {
+fn three_signing_relays_settle_like_the_simulation() {
     for noise in [QUIET, Noise::bad(3)] {
         let mut chain = Chain::on_wires(3, noise);
         chain.files.write("epoch2", "41\n");
@@ -51,7 +51,7 @@ fn three_that_sign_settle_where_the_simulated_chain_does() {
 }
 
 #[test]
-fn one_with_another_key_is_not_heard() {
+fn a_relay_with_a_different_key_is_ignored() {
     let chain = Chain::on_wires(2, QUIET);
     let (mut one, _other) = (start(&chain, 1, "key"), start(&chain, 2, "other"));
     one.line("lost: relay 2 downstream does not reply");
@@ -120,7 +120,7 @@ fn a_bad_key_or_epoch_is_named() {
 
 /// Checks a restart with an older epoch file: the neighbour logs how to repair this, and that works.
 #[test]
-fn an_epoch_that_goes_back_is_told_of_with_the_remedy() {
+fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     let mut chain = Chain::on_wires(2, QUIET);
     chain.files.write("epoch2", "41\n");
     chain.relays = [1, 2].map(|index| start(&chain, index, "key")).into();
@@ -141,7 +141,7 @@ fn an_epoch_that_goes_back_is_told_of_with_the_remedy() {
 
 /// Checks that every program refuses a key file that other users of the computer can read.
 #[test]
-fn a_key_that_others_can_read_is_refused() {
+fn a_key_file_readable_by_others_is_refused() {
     let files = Files::new();
     let (key, epoch) = (files.text("key"), files.text("epoch"));
     let others = std::fs::Permissions::from_mode(0o644);
@@ -161,7 +161,7 @@ fn a_key_that_others_can_read_is_refused() {
 }
 
 #[test]
-fn without_a_key_it_says_so() {
+fn a_missing_key_is_reported() {
     let line = Relay::start("--index 1 --of 1").line("unsigned: ");
     assert!(line.contains("anybody in range can send frames"), "{line}");
 }

@@ -114,7 +114,7 @@ fn said_once_a_round(said: &[String], parts: [&str; 3], rounds: usize) {
 }
 
 #[test]
-fn three_stay_in_the_air_whatever_happens_to_ports_and_disks() {
+fn faults_of_ports_and_disks_end_no_relay() {
     let seconds = std::env::var("COMPANION_SECONDS").map_or(60, |text| text.parse().unwrap());
     let chain = Chain::on_channel(3, Medium::pluggable(3)).with(QUICK);
     let sockets = [1, 2, 3].map(|index| chain.files.path(&format!("status{index}")));

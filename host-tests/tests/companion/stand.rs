@@ -70,7 +70,7 @@ fn write_until(level: &str, power_w: f64, mut is_so: impl FnMut() -> bool) {
 }
 
 #[test]
-fn three_relays_know_what_both_stations_measure() {
+fn the_relays_know_the_measurements_of_both_stations() {
     let begun = Instant::now();
     let field = Chain::on_channel(3, Medium::pluggable(5));
     let status = |tty: usize| field.files.path(&format!("status{tty}"));
@@ -152,7 +152,7 @@ fn three_relays_know_what_both_stations_measure() {
 }
 
 #[test]
-fn options_of_a_station_that_are_wrong_are_named() {
+fn wrong_options_of_a_station_are_named() {
     let files = Files::new();
     let (signed, tty) = (files.signed("key", "ground"), crate::pty::Pty::new());
     let folder = files.text("");
@@ -194,7 +194,7 @@ fn options_of_a_station_that_are_wrong_are_named() {
 
 /// Checks that `linux_ground --stand` uploads a mission, reports the result and continues to run.
 #[test]
-fn a_station_that_stands_uploads_and_stands_on() {
+fn a_running_station_uploads_and_keeps_running() {
     let chain = Chain::with_ground(1, QUIET);
     let files = &chain.files;
     let mut relay = chain.relay(1, &files.signed("key", "relay"));

@@ -17,7 +17,7 @@ use crate::process::{LIMIT, Relay, wait_until, words};
 use crate::pty::Pty;
 
 #[test]
-fn a_port_that_vanishes_comes_back_and_the_other_one_goes_on() {
+fn a_vanished_port_returns_and_the_other_one_goes_on() {
     let (hub, other, files) = (Medium::pluggable(2), Pty::new(), Files::new());
     let socket = files.text("status");
     let ports = format!(
@@ -82,12 +82,12 @@ fn goes_on_where_nobody_reads(program: &Path, options: &str) {
 }
 
 #[test]
-fn nobody_who_reads_is_no_reason_to_leave_the_air() {
+fn an_unread_output_does_not_end_a_relay() {
     goes_on_where_nobody_reads(companion(), "--index 1 --of 1");
 }
 
 #[test]
-fn nobody_who_reads_is_no_reason_to_leave_the_post() {
+fn an_unread_output_does_not_end_a_station() {
     let (files, tty) = (Files::new(), Pty::new());
     let (tty, signed) = (tty.path().display(), files.signed("key", "ground"));
     let stand = format!("--stand --end rx --of 1 --tty {tty} {signed}");
@@ -116,7 +116,7 @@ fn a_closed_standard_error_is_no_panic() {
 
 /// Checks that clients of the status socket that do not read, or that send data, do not block others.
 #[test]
-fn the_socket_answers_one_object_whoever_else_is_stuck() {
+fn the_socket_answers_despite_stuck_clients() {
     let files = Files::new();
     let socket = files.text("status");
     let options = format!("--index 1 --of 1 --status-socket {socket}");
@@ -146,7 +146,7 @@ fn the_socket_answers_one_object_whoever_else_is_stuck() {
 }
 
 #[test]
-fn the_log_is_moved_away_and_opened_again_at_a_hang_up() {
+fn the_log_is_reopened_on_sighup() {
     let files = Files::new();
     let (log, moved) = (files.text("log"), files.text("log.1"));
     let relay = Relay::start(&format!("--index 1 --of 1 --json --log-file {log}"));
@@ -200,7 +200,7 @@ fn of_two(chain: &Chain, index: usize, more: &str) -> Relay {
 }
 
 #[test]
-fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
+fn a_full_disk_is_reported_once_and_ends_no_relay() {
     let chain = Chain::on_channel(2, Medium::pluggable(2));
     let start = |index: usize| {
         let views = chain.files.text(&format!("view{index}"));
@@ -237,7 +237,7 @@ fn a_full_disk_is_said_once_and_the_relay_stays_in_the_air() {
 /// Checks that a blocked disk delays the frames that a relay sends, but nothing else. The new view file is a FIFO
 /// that is not read.
 #[test]
-fn a_slow_disk_holds_up_what_is_sent_and_nothing_else() {
+fn a_slow_disk_delays_only_its_own_frames() {
     let chain = Chain::on_channel(2, Medium::pluggable(2));
     let (views, slow) = (chain.files.text("views1"), chain.files.fifo("views1.new"));
     let mut first = of_two(&chain, 1, &format!("--view-file {views}"));

@@ -15,7 +15,7 @@ fn root() -> &'static Path {
 }
 
 #[test]
-fn the_unit_is_one_that_systemd_takes() {
+fn systemd_accepts_the_unit() {
     let unit = root().join("examples/linux_companion/uav-relay@.service");
     let text = std::fs::read_to_string(unit).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -47,7 +47,7 @@ fn the_unit_is_one_that_systemd_takes() {
 
 /// Checks that the program accepts the unit's options and the example file.
 #[test]
-fn the_example_file_is_whole() {
+fn the_example_file_is_complete() {
     let file = root().join("examples/drone.toml");
     // The only mistake is the missing key.
     let line = Relay::start(&format!("--config {} --index 2", file.display())).refused(2);
@@ -57,7 +57,7 @@ fn the_example_file_is_whole() {
 }
 
 #[test]
-fn it_says_that_it_is_ready_and_alive() {
+fn readiness_and_watchdog_are_notified() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("notify");
     let socket = UnixDatagram::bind(&name).unwrap();

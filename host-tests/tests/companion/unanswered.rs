@@ -70,7 +70,7 @@ fn seconds(line: &str) -> f64 {
 }
 
 #[test]
-fn a_udp_port_at_which_nobody_listens_is_said_once() {
+fn an_unreachable_udp_port_is_logged_once() {
     let ports = Ports::apart(1_000);
     let mut unanswered = Unanswered::at(ports);
     let (at, local) = (
@@ -106,7 +106,7 @@ fn a_udp_port_at_which_nobody_listens_is_said_once() {
 /// Checks that a relay reports once that an autopilot at a UDP port does not answer it. A PX4 that answers only
 /// another program behaves so.
 #[test]
-fn a_udp_port_that_does_not_answer_is_said_once() {
+fn a_silent_udp_port_is_logged_once() {
     let ports = Ports::apart(1_000);
     let silent = UdpSocket::bind(("127.0.0.1", ports.port)).unwrap();
     let mut unanswered = Unanswered::at(ports);
@@ -123,7 +123,7 @@ fn a_udp_port_that_does_not_answer_is_said_once() {
 }
 
 #[test]
-fn a_tty_that_does_not_answer_is_said_once() {
+fn a_silent_tty_is_logged_once() {
     let pty = Pty::new();
     let path = pty.path().to_str().unwrap();
     let mut unanswered = Unanswered::start(path);
@@ -133,7 +133,7 @@ fn a_tty_that_does_not_answer_is_said_once() {
 
 /// Checks the report on bytes that are not MAVLink 2, as at a wrong baud rate.
 #[test]
-fn noise_is_told_from_silence() {
+fn noise_is_distinguished_from_silence() {
     let ports = Ports::apart(1_000);
     let noisy = UdpSocket::bind(("127.0.0.1", ports.port)).unwrap();
     let mut unanswered = Unanswered::at(ports);
@@ -150,7 +150,7 @@ fn noise_is_told_from_silence() {
 
 /// Checks the report on frames of a ground station, a radio or a plane. The companion can control none of them.
 #[test]
-fn others_are_told_from_an_autopilot() {
+fn other_systems_are_distinguished_from_an_autopilot() {
     let ports = Ports::apart(1_000);
     let mut drone = ports.drone(ports.local);
     drone.order("stranger");

@@ -77,7 +77,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
 /// Checks an upload from the receiver on one channel. A relay that restarts without an upload file receives the
 /// mission again.
 #[test]
-fn on_a_shared_channel_a_relay_that_forgets_is_handed_it_again() {
+fn a_relay_without_its_upload_is_offered_it_again() {
     let uploaded = simulated(&new(), 2);
     let mut chain = Chain::on_channel(2, Medium::new(3, QUIET));
     let station = chain.media[0].tty(2).to_owned();
@@ -134,7 +134,7 @@ fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
 /// Checks that the ground station reports one relay on the new mission until all fly it. The wire between relays 2
 /// and 3 is cut as soon as relay 3 has decided on the view with the mission.
 #[test]
-fn the_ground_tells_of_one_relay_that_flies_it_until_all_do() {
+fn the_ground_reports_progress_until_all_relays_fly() {
     let state = Arc::new(Mutex::new(Wire::Open));
     let mut chain = Chain::on_wires(3, QUIET);
     chain.media[1] = cut_by_a_decision(&state);
@@ -193,7 +193,7 @@ fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
 }
 
 #[test]
-fn a_file_that_is_of_no_use_is_named_and_not_used() {
+fn a_useless_upload_file_is_named_and_ignored() {
     let files = Files::new();
     let (file, signed) = (files.text("upload"), files.signed("key", "epoch"));
     let (loaded, uploaded) = (simulated(&Scenario::default(), 1), simulated(&new(), 1));
@@ -239,7 +239,7 @@ fn a_file_that_is_of_no_use_is_named_and_not_used() {
 }
 
 #[test]
-fn the_ground_gives_up_in_time_where_nobody_answers() {
+fn the_ground_gives_up_after_its_time_limit() {
     let (files, wire) = (Files::new(), Medium::new(1, QUIET));
     let more = format!("--end tx --tty {} --timeout 2", wire.tty(0));
     let line = ground(&files, "7", &more).refused(1);
@@ -328,7 +328,7 @@ fn refusal(options: &str) -> String {
 }
 
 #[test]
-fn an_upload_that_does_not_fit_what_is_flown_is_named() {
+fn an_upload_that_does_not_fit_the_flown_mission_is_named() {
     // Relays 1 of 2 over 1000 m, and over the distance of the sites.
     let chains = ["", "--distance 1343.795"].map(|distance| {
         let (mut chain, spare) = (Chain::with_ground(1, QUIET), Pty::new());

@@ -47,7 +47,7 @@ const STANDS_BY: &str = "restored: this relay's earlier votes on views were read
 /// Checks that relays killed in a view (membership) of two and restarted form a chain of three. No view number is
 /// used twice.
 #[test]
-fn three_that_are_started_again_stand_by_what_they_said() {
+fn restarted_relays_keep_their_votes() {
     let expected = simulated(&Scenario::default(), 3);
     let mut chain = channel();
     chain.relays = (1..=3).map(|index| start(&chain, index)).collect();
@@ -81,7 +81,7 @@ fn three_that_are_started_again_stand_by_what_they_said() {
 const NOT_RETRIED: i32 = 2;
 
 #[test]
-fn the_unit_does_not_retry_what_a_restart_cannot_mend() {
+fn the_unit_does_not_restart_after_permanent_errors() {
     let unit = include_str!("../../../examples/linux_companion/uav-relay@.service");
     let setting = format!("RestartPreventExitStatus={NOT_RETRIED}");
     assert!(unit.lines().any(|line| line == setting), "{unit}");
@@ -90,7 +90,7 @@ fn the_unit_does_not_retry_what_a_restart_cannot_mend() {
 /// Checks that two of three relays do not fly if their stored membership view does not include them. Without that
 /// view they would have a quorum.
 #[test]
-fn two_that_remember_a_view_without_them_do_not_fly() {
+fn two_relays_that_recall_a_view_without_them_do_not_fly() {
     let mut chain = channel();
     let said = voted(digest(&loaded()), 1, 40, false);
     for index in [1, 2] {
@@ -108,7 +108,7 @@ fn two_that_remember_a_view_without_them_do_not_fly() {
 }
 
 #[test]
-fn a_file_that_is_of_no_use_is_named_and_nothing_is_flown() {
+fn a_useless_view_file_is_named_and_prevents_the_flight() {
     let chain = channel();
     let file = chain.files.path("views1");
     let good = store(&file, &voted(digest(&loaded()), 3, 40, true));

@@ -31,7 +31,7 @@ fn a_mistyped_option_or_number_is_named() {
 }
 
 #[test]
-fn a_port_that_cannot_be_opened_says_why() {
+fn the_reason_why_a_port_cannot_be_opened_is_logged() {
     let (files, pty) = (Files::new(), Pty::new());
     let secret = files.write("tty", "");
     std::fs::set_permissions(&secret, std::fs::Permissions::from_mode(0o0)).unwrap();
@@ -57,7 +57,7 @@ fn a_port_that_cannot_be_opened_says_why() {
 
 /// Checks the log line about refused frames, for two relays on one wire that differ in one option.
 #[test]
-fn frames_that_are_refused_say_why() {
+fn reasons_of_rejected_frames_are_logged() {
     let files = Files::new();
     for (one, other, why) in [
         ("", "--network 8", "are of another network number"),
@@ -98,7 +98,7 @@ const QUICK: &str = "--probe-after-ms 300 --dead-after-ms 900";
 /// Checks the likely reasons that a ground station on a wire gives for a failed upload. Relays do not answer
 /// strangers there, so that only the relays' logs have the true reason.
 #[test]
-fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
+fn on_a_wire_the_ground_names_the_likely_cause() {
     let chain = Chain::with_ground(1, QUIET).with(QUICK);
     let files = &chain.files;
     let mut relay = chain.relay(1, &files.signed("key", "relay"));
@@ -129,7 +129,7 @@ fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
 /// Checks the likely reasons that a ground station on a shared channel gives for a failed upload. It receives the
 /// frames of all relays there.
 #[test]
-fn on_a_channel_the_ground_says_what_most_likely_is_wrong() {
+fn on_a_channel_the_ground_names_the_likely_cause() {
     let chain = Chain::on_channel(2, Medium::new(3, QUIET)).with(QUICK);
     let (files, tty) = (&chain.files, chain.media[0].tty(2));
     let relay = |index: usize| chain.relay(index, &files.signed("key", &format!("relay{index}")));

@@ -4,7 +4,7 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::{log_uniform, seed};
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 
 use super::off;
 
@@ -34,7 +34,7 @@ fn short(upsilon: Vec<(f64, f64)>) -> StochasticLink {
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: 10.0,
             power_w: 1.0,
         }],
@@ -50,7 +50,7 @@ fn evenly(got: &[f64], first: f64, step: f64) {
 }
 
 #[test]
-fn algorithm_4_takes_the_steps_of_a_separate_program() {
+fn algorithm_4_takes_the_steps_of_the_reference_program() {
     let twenty = paper(20).algorithm4(0.1).unwrap();
     assert!(off(twenty.gamma, 0.2) < 1e-12);
     assert_eq!((twenty.iterations, twenty.places.len()), (7, 20));
@@ -70,7 +70,7 @@ fn algorithm_4_takes_the_steps_of_a_separate_program() {
 }
 
 #[test]
-fn the_fewest_relays_are_those_of_a_separate_program() {
+fn the_fewest_relays_are_those_of_the_reference_program() {
     let low = paper(1).fewest(0.2, 100).unwrap();
     assert_eq!(low.iterations, 17);
     evenly(&low.places, 325.358_983_848_622_4, 40.0);
@@ -88,7 +88,7 @@ fn the_fewest_relays_are_those_of_a_separate_program() {
 }
 
 #[test]
-fn algorithm_3_takes_the_steps_of_a_separate_program() {
+fn algorithm_3_takes_the_steps_of_the_reference_program() {
     let link = short(vec![(0.0, 4.0)]);
     let printed = link.algorithm3_printed(1e-4).unwrap();
     assert!(off(printed.x_m, 77.297_916_056_347_92) < 1e-6);
@@ -102,7 +102,7 @@ fn algorithm_3_takes_the_steps_of_a_separate_program() {
 }
 
 #[test]
-fn the_first_target_that_is_met_is_not_the_best() {
+fn the_first_feasible_target_is_not_the_optimum() {
     // The field is quiet from 90 m on, and loud before.
     let link = short(vec![(0.0, 0.1), (90.0 - 1e-9, 0.1), (90.0, 100.0)]);
     let printed = link.algorithm3_printed(1e-5).unwrap();
@@ -117,7 +117,7 @@ fn the_first_target_that_is_met_is_not_the_best() {
 /// Draws a chain of identical relays with constant interference along the line.
 fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
     let distance_m = log_uniform(rng, 10.0, 1e5);
-    let station = Station {
+    let station = Relay {
         altitude_m: (log_uniform(rng, 0.002, 0.2) * distance_m).clamp(1.0, 5000.0),
         power_w: log_uniform(rng, 0.01, 100.0),
     };
@@ -133,7 +133,7 @@ fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
 }
 
 #[test]
-fn under_constant_interference_all_optima_are_one() {
+fn constant_interference_gives_equal_optima() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
     let mut capped = 0;
     for _ in 0..150 {
@@ -168,7 +168,7 @@ fn under_constant_interference_all_optima_are_one() {
 }
 
 #[test]
-fn one_relay_in_any_field_is_found_by_going_backward() {
+fn one_relay_in_any_field_is_placed_by_backward_search() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(2));
     for _ in 0..100 {
         let mut link = random_chain(&mut rng);
@@ -204,7 +204,7 @@ fn one_relay_in_any_field_is_found_by_going_backward() {
 }
 
 #[test]
-fn expected_sirs_follow_power_over_distance_and_upsilon() {
+fn the_expected_sir_is_power_over_distance_and_upsilon() {
     let link = StochasticLink {
         distance_m: 100.0,
         tx_w: 8.0,
@@ -212,11 +212,11 @@ fn expected_sirs_follow_power_over_distance_and_upsilon() {
         eta: 4.0,
         upsilon: vec![(0.0, 1.0), (100.0, 11.0)],
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 3.0,
                 power_w: 10.0,
             },
-            Station {
+            Relay {
                 altitude_m: 6.0,
                 power_w: 13.0,
             },

@@ -72,7 +72,7 @@ fn upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf() {
 
 /// Checks the integral for Upsilon = E[1/I] against distributions with a known E[1/I].
 #[test]
-fn the_integral_finds_what_is_known_of_other_distributions() {
+fn the_integral_gives_known_values_of_distributions() {
     let constant = |level: f64| upsilon_by_mgf(move |t| (t * level).exp()).unwrap();
     for level in [1e-12, 3.0, 2e5] {
         assert!(off(constant(level), 1.0 / level) < 1e-12, "{level}");
@@ -104,7 +104,7 @@ fn the_integral_finds_what_is_known_of_other_distributions() {
 }
 
 #[test]
-fn the_closed_form_has_the_values_of_a_separate_program() {
+fn the_closed_form_agrees_with_the_reference_program() {
     assert!(off(FieldPoint::beta_upsilon(2.0, 2.0, 1.0).unwrap(), 3.0) < 1e-12);
     let found = FieldPoint::beta_upsilon(1.5, 2.0, 3.476_175_5e-7).unwrap();
     assert!(off(found, 14_383_623.611_638_71) < 1e-12);
@@ -113,7 +113,7 @@ fn the_closed_form_has_the_values_of_a_separate_program() {
 }
 
 #[test]
-fn where_there_is_no_mean_there_is_none() {
+fn without_a_finite_mean_there_is_no_upsilon() {
     for (alpha, beta, i_max_w) in [
         (1.0, 2.0, 1.0),
         (0.5, 2.0, 1.0),

@@ -88,7 +88,7 @@ fn ten_thousand_samples_give_upsilon_within_five_percent() {
 }
 
 #[test]
-fn the_standard_error_holds() {
+fn the_standard_error_covers_the_error() {
     let first = seed(2);
     let mut covered = 0;
     let pairs = grid([1.5, 2.0, 2.5]);
@@ -105,7 +105,7 @@ fn the_standard_error_holds() {
 }
 
 #[test]
-fn it_holds_for_few_samples_too() {
+fn the_standard_error_covers_the_error_of_few_samples() {
     let first = seed(3);
     let (mut made, mut covered) = (0, 0);
     for samples in [Estimator::MIN_SAMPLES, 1_000] {
@@ -131,7 +131,7 @@ fn it_holds_for_few_samples_too() {
 }
 
 #[test]
-fn where_upsilon_is_infinite_there_is_hardly_ever_an_estimate() {
+fn an_infinite_upsilon_hardly_ever_gives_an_estimate() {
     let first = seed(4);
     for (alpha, most) in [(0.5, 0), (0.9, 0), (1.0, 8)] {
         for beta in [0.5, 20.0] {

@@ -50,7 +50,7 @@ fn bad_samples_are_counted_and_left_out() {
 }
 
 #[test]
-fn cleared_it_is_as_new() {
+fn a_cleared_estimator_is_as_new() {
     let mut estimator = filled(4.0, 3.0, 1e-6, 500);
     estimator.push(f32::NAN);
     assert!(estimator.estimate().is_some());
@@ -93,7 +93,7 @@ fn scaled(mean_w: f32) -> Option<Estimate> {
 }
 
 #[test]
-fn a_bound_that_is_none_takes_no_sample() {
+fn an_invalid_bound_accepts_no_sample() {
     for (i_max_w, taken) in [
         (1e-30, true),
         (1e6, true),
@@ -115,7 +115,7 @@ fn a_bound_that_is_none_takes_no_sample() {
 
 /// Checks the estimate from two million samples around one value, where f32 sums would lose accuracy.
 #[test]
-fn many_samples_close_together_lose_nothing() {
+fn many_similar_samples_lose_no_precision() {
     let mut estimator = Estimator::new(1.0);
     for _ in 0..1_000_000 {
         estimator.push(0.7);

@@ -46,7 +46,7 @@ fn a_field_is_a_constant_of_the_firmware() {
 }
 
 #[test]
-fn the_same_everywhere_is_known_as_that() {
+fn a_field_of_equal_values_is_constant() {
     const ONE: Field = Field::new(&[at(5.0, 7.0)]);
     const TWO: Field = Field::new(&[at(5.0, 7.0), at(6.0, 7.0)]);
     for field in [ONE, TWO] {
@@ -64,7 +64,7 @@ fn field(points: Vec<FieldPoint>) -> Result<Field, FieldError> {
 }
 
 #[test]
-fn every_number_is_checked_at_both_ends_and_for_nan() {
+fn every_number_is_checked_at_its_limits_and_for_nan() {
     let with = |x_m, upsilon| field(vec![at(x_m, upsilon)]).map(|_| ());
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert_eq!(with(bad, 1.0), Err(FieldError::Place));

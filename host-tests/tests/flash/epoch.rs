@@ -28,7 +28,7 @@ fn the_epoch_rises_at_every_start_through_full_sectors() {
 }
 
 #[test]
-fn after_the_last_epoch_there_is_none() {
+fn no_epoch_follows_the_last_one() {
     let mut flash = Ram::blank(7 * ENTRY, 1);
     let last = u32::MAX - 1;
     assert_eq!(start(&mut flash, last), Some((last, true)));
@@ -65,7 +65,7 @@ fn no_epoch_comes_twice_whenever_power_fails() {
 
 /// Checks that a flash that cannot be written does not set the epoch back.
 #[test]
-fn a_write_that_fails_never_puts_the_epoch_back() {
+fn a_failed_write_never_decreases_the_epoch() {
     for worn in 0..=5 {
         let mut flash = Ram::blank(40 * ENTRY, 1);
         for _ in 0..10 {

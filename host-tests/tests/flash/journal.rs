@@ -23,7 +23,7 @@ fn entry(number: u32) -> Vec<u32> {
 }
 
 #[test]
-fn records_fill_both_sectors_and_the_newest_counts() {
+fn records_fill_both_sectors_and_the_newest_is_read() {
     // The sector has spare words that hold no record.
     let mut flash = Ram::blank(4 * RECORD + 3, 1);
     log(&mut flash).tidy();
@@ -49,7 +49,7 @@ fn records_fill_both_sectors_and_the_newest_counts() {
 
 /// Checks that a full journal erases the sector without the newest record, and so frees a full sector.
 #[test]
-fn a_full_log_goes_on_in_the_sector_with_the_older_records() {
+fn a_full_log_continues_in_the_older_sector() {
     let mut flash = Ram::blank(4 * RECORD, 1);
     for number in 1..=40 {
         assert!(log(&mut flash).keep(&entry(number), WhenFull::Erase));
@@ -59,7 +59,7 @@ fn a_full_log_goes_on_in_the_sector_with_the_older_records() {
 }
 
 #[test]
-fn a_record_with_any_bit_changed_is_none() {
+fn a_record_with_any_changed_bit_is_ignored() {
     let mut flash = Ram::blank(4 * RECORD, 1);
     assert!(log(&mut flash).keep(&entry(1), WhenFull::Refuse));
     assert!(log(&mut flash).keep(&entry(2), WhenFull::Refuse));
@@ -76,7 +76,7 @@ fn a_record_with_any_bit_changed_is_none() {
 }
 
 #[test]
-fn another_key_forgets_and_a_start_makes_room() {
+fn records_of_another_key_are_erased_at_a_start() {
     let mut flash = Ram::blank(4 * RECORD, 1);
     for number in 1..=6 {
         assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
@@ -89,7 +89,7 @@ fn another_key_forgets_and_a_start_makes_room() {
 }
 
 #[test]
-fn a_place_that_is_worn_is_passed_over() {
+fn worn_flash_is_skipped() {
     for worn in 0..=5 {
         let mut flash = Ram::blank(20 * RECORD, 1);
         assert!(log(&mut flash).keep(&entry(1), WhenFull::Erase));
@@ -109,7 +109,7 @@ fn a_place_that_is_worn_is_passed_over() {
 /// Checks that a power failure at any moment neither loses stored records nor creates others. It may happen during an
 /// erase, a record or a word.
 #[test]
-fn nothing_is_lost_whenever_power_fails() {
+fn no_record_is_lost_at_any_power_failure() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(37));
     let (mut cut, mut erases_cut, mut whole) = (0, 0, 0);
     for run in 0..300 {

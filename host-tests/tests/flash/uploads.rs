@@ -16,7 +16,7 @@ fn version(number: u16) -> Upload {
 }
 
 #[test]
-fn as_many_are_kept_in_a_flight_as_the_firmware_says() {
+fn the_stated_number_of_uploads_is_stored_in_a_flight() {
     let mut flash = Ram::blank(SECTOR, 1);
     let mut log = Journal::new(&mut flash, WORDS, 7);
     assert_eq!(SECTOR / (WORDS + AROUND), 1_092);
@@ -27,7 +27,7 @@ fn as_many_are_kept_in_a_flight_as_the_firmware_says() {
 }
 
 #[test]
-fn what_is_no_upload_is_none() {
+fn invalid_bytes_are_no_upload() {
     assert_eq!(upload(&kept(&version(77))), Some(version(77)));
     assert_eq!(upload(&[]), None);
     assert_eq!(upload(&[u32::MAX; WORDS]), None);

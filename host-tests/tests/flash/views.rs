@@ -14,7 +14,7 @@ fn found(log: &mut Journal<&mut Ram>) -> Option<ViewRecord> {
 }
 
 #[test]
-fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
+fn the_stated_number_of_views_is_stored_before_an_erase() {
     assert_eq!(SECTORS[1] - SECTORS[0], 16 * 1024);
     let mut flash = Ram::blank(SECTOR, 1);
     for number in 1..=1_000 {
@@ -33,7 +33,7 @@ fn as_many_are_kept_before_an_erase_as_the_firmware_says() {
 /// Checks a power failure while a vote is recorded. The previous record stays valid, because the new vote was not
 /// sent.
 #[test]
-fn of_a_record_that_is_torn_the_one_before_holds() {
+fn after_a_torn_record_the_previous_one_is_read() {
     for written in 1..WORDS + AROUND {
         let mut flash = Ram::blank(SECTOR, written as u64);
         let mut log = Journal::new(&mut flash, WORDS, 7);
@@ -50,7 +50,7 @@ fn of_a_record_that_is_torn_the_one_before_holds() {
 }
 
 #[test]
-fn what_is_no_record_is_none() {
+fn invalid_bytes_are_no_view_record() {
     assert_eq!(record(&[]), None);
     assert_eq!(record(&[u32::MAX; WORDS]), None);
     let other_format = 2;

@@ -6,7 +6,7 @@ use uav_relay::planning::fleet::{self, Fewest};
 use uav_relay::{Mission, MissionConfig, Placement, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, count, log_uniform};
-use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::{ROUNDING, chain, round};
@@ -18,7 +18,7 @@ pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink 
         mu_los: 1.0,
         eta: 1.0,
         upsilon,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: h,
             power_w: 1.0,
         }],
@@ -96,7 +96,7 @@ fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> us
 }
 
 #[test]
-fn as_few_as_on_a_grid_of_places_in_a_field() {
+fn the_fewest_in_a_field_are_those_of_a_grid_search() {
     const MOST: usize = 150;
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(604));
     let (mut same, mut between, mut none, mut fewer, mut largest) = (0, 0, 0, 0, 0);
@@ -155,7 +155,7 @@ fn as_few_as_on_a_grid_of_places_in_a_field() {
 
 /// Checks the best target SIR of N identical relays against the closed form and Algorithm 4.
 #[test]
-fn the_best_of_equals_in_a_field() {
+fn identical_relays_in_a_field_are_optimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));
     let (mut above, mut gain) = (0, 0.0_f64);
     for round in 0..600 {
@@ -199,7 +199,7 @@ fn the_best_of_equals_in_a_field() {
 /// Checks that the number of relays with different powers in a field is not called proven. It is found by Algorithm
 /// 4.
 #[test]
-fn what_differs_in_a_field_is_not_proven() {
+fn different_relays_in_a_field_are_not_called_proven() {
     let link = field(1000.0, 20.0, vec![(0.0, 3e6), (1000.0, 5e6)]);
     let mission = of_stochastic_link(&link, 4.0).unwrap();
     let common = mission.config().common;

@@ -62,7 +62,7 @@ fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
 }
 
 #[test]
-fn as_few_as_an_exhaustive_count() {
+fn the_fewest_are_those_of_an_exhaustive_search() {
     const MOST: usize = 300;
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(601));
     let (mut met, mut none, mut ties, mut largest, mut fewer) = (0, 0, 0, 0, 0);
@@ -127,7 +127,7 @@ fn as_few_as_an_exhaustive_count() {
 }
 
 #[test]
-fn with_a_separation_what_is_proven_is_the_fewest() {
+fn with_a_separation_a_proven_number_is_the_fewest() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(602));
     let (mut proven, mut not, mut none) = (0, 0, 0);
     for _ in 0..count(10_000) / 5 {
@@ -172,7 +172,7 @@ fn with_a_separation_what_is_proven_is_the_fewest() {
 /// Checks the highest target SIR of any number of relays: it is met, and a slightly higher one is not. The second
 /// claim holds only without a least separation.
 #[test]
-fn the_most_is_what_no_number_of_relays_exceeds() {
+fn no_number_of_relays_exceeds_the_reported_maximum() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(603));
     let (mut met, mut exceeded) = (0, 0);
     for _ in 0..300 {

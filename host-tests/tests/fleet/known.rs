@@ -4,7 +4,7 @@ use uav_relay::planning::fleet::Fewest;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 
 use super::chain;
 use super::field::field;
@@ -39,7 +39,7 @@ fn the_reference_cases_hold() {
             mu_los: params.mu_los,
             eta: params.eta,
             upsilon: vec![(0.0, case.arg("upsilon").unwrap())],
-            relays: vec![Station {
+            relays: vec![Relay {
                 altitude_m: params.h,
                 power_w: params.p_u,
             }],

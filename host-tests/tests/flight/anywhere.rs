@@ -220,7 +220,7 @@ fn judged(seed: u64) -> Judged {
 }
 
 #[test]
-fn drones_handed_over_anywhere_come_no_nearer_than_they_may() {
+fn drones_handed_over_anywhere_keep_their_separation() {
     let first = uav_relay_oracle::random::seed(1);
     let count = number("COUNT", 100);
     let begun = std::time::Instant::now();

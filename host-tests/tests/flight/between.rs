@@ -21,7 +21,7 @@ fn undisturbed(setup: &Setup) -> Vec<f32> {
 /// Checks that a relay that was off returns to its position although its neighbours have closed up. They close up
 /// only as far as its silent drone permits.
 #[test]
-fn a_relay_that_returns_between_two_others_gets_its_place() {
+fn a_relay_returning_between_two_others_gets_its_position() {
     for silent in 1..=8 {
         for off in [17, 60, 200] {
             let seed = u64::from(silent) * 1_000 + off;
@@ -49,7 +49,7 @@ fn a_relay_that_returns_between_two_others_gets_its_place() {
 
 /// Checks that all drones stay while two neighbours are in each other's position. The others do not know of the swap.
 #[test]
-fn while_two_are_in_the_wrong_order_all_stay() {
+fn while_two_drones_are_in_the_wrong_order_all_stay() {
     for first in 0..7 {
         let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(first as u64));
         let flight = setup.flight.as_mut().unwrap();

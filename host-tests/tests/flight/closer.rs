@@ -18,7 +18,7 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
 /// Checks that drones reach agreed positions closer along x than the least separation. It flies the chains with such
 /// positions among 200 random scenes.
 #[test]
-fn drones_get_to_places_that_are_closer_along_x() {
+fn drones_get_to_positions_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));
     let (mut scenes, mut closer, mut far) = (0, 0, Vec::new());
     let mut least = f64::INFINITY;

@@ -19,7 +19,7 @@ fn pairs() -> impl Iterator<Item = (u16, u16)> {
 /// Checks that all relays are in one membership view soon after two overlapping cuts of the chain. Times are start,
 /// end, start, end, s; in the last set the cuts heal a second apart.
 #[test]
-fn all_are_in_one_view_soon_after_two_cuts() {
+fn all_relays_are_in_one_view_soon_after_two_cuts() {
     let all = [
         [20, 120, 60, 160],
         [20, 60, 40, 90],

@@ -137,7 +137,7 @@ fn judged(seed: u64) -> (Option<String>, f64, f64) {
 }
 
 #[test]
-fn nobody_comes_too_close_whoever_flies() {
+fn drones_keep_apart_whoever_controls_them() {
     let first = uav_relay_oracle::random::seed(1);
     let count = std::env::var("COUNT").ok();
     let count: u64 = count.and_then(|text| text.parse().ok()).unwrap_or(60);

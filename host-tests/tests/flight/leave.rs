@@ -36,7 +36,7 @@ fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
 }
 
 #[test]
-fn a_box_has_room_for_relays_that_leave_if_it_was_asked_for() {
+fn relays_outside_the_chain_step_aside_if_room_was_requested() {
     let on_line = [[0.0, 20.0]; 8];
     let mut beside = on_line;
     beside[..3].fill([-30.0, 45.0]);

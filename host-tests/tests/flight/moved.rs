@@ -121,7 +121,7 @@ fn judged(seed: u64) -> (Option<String>, f64) {
 }
 
 #[test]
-fn drones_fly_to_a_receiver_that_moves_and_none_comes_too_close() {
+fn drones_follow_a_moved_receiver_and_keep_apart() {
     let first = uav_relay_oracle::random::seed(1);
     let count = number("COUNT", 40);
     let all: Vec<_> = (first..first + count).into_par_iter().map(judged).collect();

@@ -81,7 +81,7 @@ fn storm(seed: u64) -> Setup {
 }
 
 #[test]
-fn drones_keep_apart_whatever_happens_to_their_relays() {
+fn drones_keep_apart_in_storms_of_relay_faults() {
     let first = seed(1);
     let count = number("COUNT", 300);
     let storms = (first..first + count).into_par_iter().map(|seed| {

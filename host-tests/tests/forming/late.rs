@@ -9,7 +9,7 @@ use host_tests::bench::Bench;
 /// Checks that no relay follows a leader's first pass if that is delayed beyond the leader's reboot. It arrives
 /// during the last round of the next agreement by Algorithm 2.
 #[test]
-fn a_sweep_of_a_life_before_does_not_spoil_an_agreement() {
+fn a_sweep_from_before_a_reboot_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {
         rounds: 50,
         explore_m: 30.0,
@@ -48,11 +48,11 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
     chain.until(5_000, Bench::holds).unwrap();
     chain.reboot(1, 3);
-    let calls = |chain: &Bench| {
+    let requests_view = |chain: &Bench| {
         let mut flying = chain.flying.iter();
         flying.any(|frame| frame.to == 3 && frame.is(|m| matches!(m, Message::Proposal(_))))
     };
-    chain.until(10_000, calls).unwrap();
+    chain.until(10_000, requests_view).unwrap();
     // The lost request is repeated; relay 2 then reboots once more for a second view.
     let late = chain.bench.flying.pop_back().unwrap();
     chain.until(10_000, Bench::holds).unwrap();
@@ -76,7 +76,7 @@ fn a_proposal_of_an_old_view_changes_nothing() {
 /// Checks that a relay requests a membership view when a neighbour reports a newer one. That neighbour refuses the
 /// relay's frames.
 #[test]
-fn a_relay_that_hears_of_a_newer_view_than_its_own_calls() {
+fn a_relay_that_learns_of_a_newer_view_requests_one() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
     chain.until(5_000, Bench::holds).unwrap();
     chain.reboot(1, 3);

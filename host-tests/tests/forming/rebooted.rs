@@ -8,7 +8,7 @@ use host_tests::bench::Bench;
 /// Checks that a rebooted leader agrees with its neighbour within a second, at a `hop_time` of 30 ms. Each seed gives
 /// it another number for its first pass.
 #[test]
-fn a_rebooted_leader_is_answered_whatever_its_seed() {
+fn a_rebooted_leader_is_answered_for_any_seed() {
     // With prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
     for predict in [true, false] {
         let settings = Settings {
@@ -36,7 +36,7 @@ fn a_rebooted_leader_is_answered_whatever_its_seed() {
 /// Checks that a relay that reboots during the leader's second pass gets a position by a new view. The view is a new
 /// agreement on the members of the chain.
 #[test]
-fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
+fn a_relay_rebooted_in_a_pass_gets_a_position_in_a_new_view() {
     let settings = Settings {
         predict: false,
         ..Settings::default()
@@ -62,7 +62,7 @@ fn a_relay_rebooted_during_a_pass_gets_a_place_by_a_new_view() {
 /// Checks that a relay that reboots in a settled chain gets a position by a new membership view. It requests the view
 /// at the first lease renewal that it does not know, or on its own.
 #[test]
-fn a_relay_rebooted_later_gets_a_place_by_a_new_view() {
+fn a_relay_rebooted_later_gets_a_position_in_a_new_view() {
     for rebooted in 1..4 {
         let mut chain = Chain::new(4, 20.0, LOW, Settings::default());
         chain.until(5_000, Bench::holds).unwrap();

@@ -3,7 +3,7 @@
 use uav_relay_fuzz::heap::{asked, without};
 
 #[test]
-fn what_is_asked_of_the_heap_is_counted() {
+fn heap_allocations_are_counted() {
     let before = asked();
     let mut kept = Box::new(1);
     assert_eq!(asked() - before, 1);
@@ -17,7 +17,7 @@ fn what_is_asked_of_the_heap_is_counted() {
 }
 
 #[test]
-fn work_that_asks_for_memory_is_caught() {
+fn work_that_allocates_is_detected() {
     assert_eq!(without(|| 6 * 7), 42);
     let caught = std::panic::catch_unwind(|| without(|| vec![1_u8; 7]));
     assert!(caught.is_err());

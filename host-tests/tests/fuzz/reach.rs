@@ -29,7 +29,7 @@ fn counted<'a>(relays: impl IntoIterator<Item = &'a Watched>) -> [u64; 23] {
 
 #[test]
 #[cfg_attr(miri, ignore = "takes too long there")]
-fn relays_of_the_corpus_count_everything_and_hold_places_of_every_method() {
+fn the_relay_corpus_reaches_every_counter_and_method() {
     let relays: Vec<Watched> = corpus("relay")
         .iter()
         .filter_map(|(_, bytes)| relay::flown(bytes))
@@ -65,7 +65,7 @@ fn relays_of_the_corpus_count_everything_and_hold_places_of_every_method() {
 
 #[test]
 #[cfg_attr(miri, ignore = "takes too long there")]
-fn chains_of_the_corpus_agree_by_every_method_over_bad_links() {
+fn the_chain_corpus_agrees_by_every_method() {
     let chains: Vec<Vec<Watched>> = corpus("chain")
         .iter()
         .filter_map(|(_, bytes)| chain::flown(bytes))

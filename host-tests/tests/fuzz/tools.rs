@@ -8,7 +8,7 @@ use uav_relay_fuzz::input::Input;
 proptest! {
     #[test]
     #[cfg_attr(miri, ignore = "nothing of the crate runs here")]
-    fn what_a_published_encoder_stuffs_is_read_by_the_definition(
+    fn the_reference_decoder_reads_a_published_encoder(
         plain in vec(prop_oneof![Just(0), 1..=u8::MAX], 0..900),
         runs in vec(252..257_usize, 0..4),
     ) {
@@ -25,7 +25,7 @@ proptest! {
 }
 
 #[test]
-fn numbers_reach_both_ends_and_zeros_follow_the_bytes() {
+fn fuzz_input_reaches_both_ends_and_ends_in_zeros() {
     let (low, high) = (0.1_f32, 1e5_f32);
     assert_eq!(Input::new(&[0, 0]).scaled(low, high), low);
     assert_eq!(Input::new(&[255, 255]).scaled(low, high), high);

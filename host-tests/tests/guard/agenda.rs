@@ -15,8 +15,8 @@ pub(crate) const FASTEST: f64 = 40.0;
 
 /// Random event of a flight. The first field is the index of the drone.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum What {
-    Hear(usize, Point),
+pub(crate) enum FlightEvent {
+    Setpoint(usize, Point),
     Off(usize),
     On(usize),
     Mute(usize),
@@ -30,31 +30,31 @@ pub(crate) enum What {
     Speed(usize, f64),
     /// Event: the drone's pilot takes control; the guard is informed. The next events move the drone and give control
     /// back.
-    Take(usize),
-    Hears(usize),
+    PilotTakesOver(usize),
+    GuardLearnsOfPilot(usize),
     Aside(usize, (usize, bool, f64)),
     Along(usize, f64),
-    Give(usize),
+    PilotHandsBack(usize),
 }
 
-pub(crate) fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, What)> {
+pub(crate) fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, FlightEvent)> {
     let mut plan = Vec::new();
     for _ in 0..rng.random_range(0..=6) {
         let at_s = rng.random_range(0.0..ROUGH_S - 60.0);
-        let mut confines = world.confines;
+        let mut config = world.config;
         if rng.random_bool(0.2) {
-            confines.separation_m *= rng.random_range(0.0..=1.0);
+            config.separation_m *= rng.random_range(0.0..=1.0);
         }
-        let mut agreed = places(rng, &confines, world.drones.len());
+        let mut agreed = places(rng, &config, world.drones.len());
         if rng.random_bool(0.5) {
             let wild = rng.random_bool(0.3);
-            agreed = closer(rng, &world.confines, agreed, wild);
+            agreed = closer(rng, &world.config, agreed, wild);
         }
         for (k, at) in agreed.into_iter().enumerate() {
             if rng.random_bool(0.8) {
                 plan.push((
                     at_s + 60.0 * rng.random_range(0.0..=1.0_f64).powi(3),
-                    What::Hear(k, at),
+                    FlightEvent::Setpoint(k, at),
                 ));
             }
         }
@@ -62,7 +62,7 @@ pub(crate) fn agreements(rng: &mut ChaCha8Rng, world: &World) -> Vec<(f64, What)
     plan
 }
 
-pub(crate) fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
+pub(crate) fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, FlightEvent)> {
     let mut plan = Vec::new();
     for k in 0..relays {
         let mut at_s = 0.0;
@@ -72,7 +72,7 @@ pub(crate) fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
             } else {
                 FASTEST.powf(rng.random_range(0.0..=1.0))
             };
-            plan.push((at_s, What::Speed(k, speed)));
+            plan.push((at_s, FlightEvent::Speed(k, speed)));
             at_s += rng.random_range(1.0..=40.0);
         }
     }
@@ -80,15 +80,15 @@ pub(crate) fn speeds(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
 }
 
 /// Plans reboots, silent relays and removed drones. Of three relays in a row, at most one falls silent or is removed.
-pub(crate) fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> {
+pub(crate) fn failures(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, FlightEvent)> {
     let mut plan = Vec::new();
     let mut left_out = 0;
     for k in 0..relays {
         let at_s = rng.random_range(5.0..ROUGH_S - 90.0);
         match rng.random_range(0..10) {
             0..=3 => {
-                plan.push((at_s, What::Off(k)));
-                plan.push((at_s + rng.random_range(0.0..=15.0), What::On(k)));
+                plan.push((at_s, FlightEvent::Off(k)));
+                plan.push((at_s + rng.random_range(0.0..=15.0), FlightEvent::On(k)));
             }
             kind @ 4..=6 if relays > 2 && left_out < k => {
                 left_out = k + 2;
@@ -104,8 +104,8 @@ pub(crate) fn troubles(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, What)> 
 pub(crate) fn pilots(
     rng: &mut ChaCha8Rng,
     relays: usize,
-    troubles: &[(f64, What)],
-) -> Vec<(f64, What)> {
+    troubles: &[(f64, FlightEvent)],
+) -> Vec<(f64, FlightEvent)> {
     let mut plan = Vec::new();
     if rng.random_bool(0.5) {
         return plan;
@@ -113,32 +113,32 @@ pub(crate) fn pilots(
     for k in 0..relays {
         let beside_gone = troubles
             .iter()
-            .any(|(_, what)| matches!(what, What::Vanish(gone) if gone.abs_diff(k) <= 1));
+            .any(|(_, what)| matches!(what, FlightEvent::Vanish(gone) if gone.abs_diff(k) <= 1));
         if beside_gone || rng.random_bool(0.7) {
             continue;
         }
         let mut at_s = rng.random_range(1.0..ROUGH_S - 20.0);
         for _ in 0..rng.random_range(1..=2) {
-            plan.push((at_s, What::Take(k)));
+            plan.push((at_s, FlightEvent::PilotTakesOver(k)));
             let told_s = at_s + rng.random_range(0.0..=1.5);
-            plan.push((told_s, What::Hears(k)));
+            plan.push((told_s, FlightEvent::GuardLearnsOfPilot(k)));
             if rng.random_bool(0.5) {
                 let most_m = rng.random_range(1.0..=30.0);
                 let way = (rng.random_range(1..=2), rng.random(), most_m);
-                plan.push((told_s, What::Aside(k, way)));
+                plan.push((told_s, FlightEvent::Aside(k, way)));
             }
             let is_alone = troubles.iter().all(|(_, what)| {
-                !matches!(what, What::Mute(other) | What::Vanish(other) if other.abs_diff(k) <= 3)
+                !matches!(what, FlightEvent::Mute(other) | FlightEvent::Vanish(other) if other.abs_diff(k) <= 3)
             });
             if is_alone && rng.random_bool(0.5) {
                 let later_s = told_s + rng.random_range(0.5..=15.0);
-                plan.push((later_s, What::Along(k, rng.random_range(0.0..=1.0))));
+                plan.push((later_s, FlightEvent::Along(k, rng.random_range(0.0..=1.0))));
             }
             if rng.random_bool(0.2) {
                 break;
             }
             let back_s = at_s + rng.random_range(5.0..=60.0);
-            plan.push((back_s, What::Give(k)));
+            plan.push((back_s, FlightEvent::PilotHandsBack(k)));
             at_s = back_s + 20.0 * rng.random_range(0.01..=1.0_f64).powi(2);
         }
     }
@@ -148,13 +148,20 @@ pub(crate) fn pilots(
 /// Plans the silence of relay `k`, and when its neighbours link past it. The relay returns unless it is `gone`.
 pub(crate) fn around(
     rng: &mut ChaCha8Rng,
-    plan: &mut Vec<(f64, What)>,
+    plan: &mut Vec<(f64, FlightEvent)>,
     (k, relays): (usize, usize),
     at_s: f64,
     gone: bool,
 ) {
     let [before, after] = beside(k, relays);
-    plan.push((at_s, if gone { What::Vanish(k) } else { What::Mute(k) }));
+    plan.push((
+        at_s,
+        if gone {
+            FlightEvent::Vanish(k)
+        } else {
+            FlightEvent::Mute(k)
+        },
+    ));
     let back_s = at_s + rng.random_range(10.0..=60.0);
     for (who, side, other) in [
         (before, Side::Downstream, after),
@@ -163,24 +170,24 @@ pub(crate) fn around(
         let Some(who) = who else { continue };
         plan.push((
             at_s + rng.random_range(0.0..=10.0),
-            What::Around(who, side, k, other),
+            FlightEvent::Around(who, side, k, other),
         ));
         let then_s = back_s + rng.random_range(0.0..=10.0);
         plan.push(if gone {
-            (then_s, What::Forget(who, side))
+            (then_s, FlightEvent::Forget(who, side))
         } else {
-            (then_s, What::Back(who, side, k))
+            (then_s, FlightEvent::Back(who, side, k))
         });
     }
     if !gone {
-        plan.push((back_s, What::Unmute(k)));
+        plan.push((back_s, FlightEvent::Unmute(k)));
     }
 }
 
 /// Returns random positions in order along x, with the least separation or more between neighbours.
-pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Point> {
-    let distance = f64::from(confines.fence.most_x_m);
-    let step = f64::from(confines.separation_m) + 5e-7 * distance;
+pub(crate) fn places(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
+    let distance = f64::from(config.fence.most_x_m);
+    let step = f64::from(config.separation_m) + 5e-7 * distance;
     let slack = distance - step * (relays - 1) as f64;
     let (from, to) = match rng.random_range(0..4) {
         0 => (0.0, 0.05),
@@ -209,13 +216,13 @@ pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize
 /// Relays that are not neighbours keep the least separation along x, unless `wild`.
 pub(crate) fn closer(
     rng: &mut ChaCha8Rng,
-    confines: &GuardConfig,
+    config: &GuardConfig,
     mut at: Vec<Point>,
     wild: bool,
 ) -> Vec<Point> {
-    let rounding = 5e-7 * f64::from(confines.fence.most_x_m);
-    let apart = 1.0001 * f64::from(confines.separation_m) + rounding;
-    let fence = confines.fence;
+    let rounding = 5e-7 * f64::from(config.fence.most_x_m);
+    let apart = 1.0001 * f64::from(config.separation_m) + rounding;
+    let fence = config.fence;
     let inside = |y: f64, h: f64| {
         (f64::from(fence.least_y_m)..=f64::from(fence.most_y_m)).contains(&y)
             && (f64::from(fence.least_altitude_m)..=f64::from(fence.most_altitude_m)).contains(&h)

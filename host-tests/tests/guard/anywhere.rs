@@ -89,7 +89,7 @@ struct Drone {
     /// Position to which the pilot flies the drone; `None` while its guard controls it.
     pilot: Option<Point>,
     reminder_s: f64,
-    letters: u64,
+    messages: u64,
 }
 
 impl Drone {
@@ -245,17 +245,17 @@ impl World {
             let said = drone.line.along(plus(drone.taken_at(), noise, 1.0));
             drone.guard.position(now, placement(said));
         }
-        for letter in self.medium.arrived(self.now_s) {
-            let pair = self.pair(letter.from, letter.to);
-            let drone = &mut self.drones[letter.to];
-            if drone.line.number == letter.line {
-                let is_place = letter.fence.flags & Fence::UNPLACED != 0;
-                if is_place && letter.sent_s >= self.hovers_s[letter.from] {
+        for message in self.medium.arrived(self.now_s) {
+            let pair = self.pair(message.from, message.to);
+            let drone = &mut self.drones[message.to];
+            if drone.line.number == message.line {
+                let is_place = message.fence.flags & Fence::UNPLACED != 0;
+                if is_place && message.sent_s >= self.hovers_s[message.from] {
                     self.known_s[pair] = self.known_s[pair].min(self.now_s);
                 }
                 drone
                     .guard
-                    .hear(letter.side, node(letter.from), &letter.fence);
+                    .hear(message.side, node(message.from), &message.fence);
             }
         }
         for k in 0..self.drones.len() {
@@ -270,7 +270,7 @@ impl World {
                 drone.target = drone.taken_at();
             }
             while let Some((side, to, fence)) = drone.guard.poll() {
-                drone.letters += 1;
+                drone.messages += 1;
                 let from = match side {
                     Side::Upstream => Side::Downstream,
                     Side::Downstream => Side::Upstream,
@@ -295,7 +295,7 @@ impl World {
         if std::env::var_os("STORY").is_some()
             && ((self.now_s * 10.0).round() as u64).is_multiple_of(5)
         {
-            self.tell();
+            self.exchange_fences();
         }
     }
 
@@ -327,7 +327,7 @@ impl World {
     }
 
     /// Prints the positions and goals of the drones for debugging.
-    fn tell(&self) {
+    fn exchange_fences(&self) {
         let each = self.drones.iter().map(|drone| {
             let at = drone.line.along(drone.at);
             let goal = drone.setpoint().map(|goal| drone.line.along(goal));
@@ -438,21 +438,21 @@ fn starts(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Poin
 }
 
 #[derive(Clone, Copy, Debug)]
-enum What {
-    Take(usize, Point),
-    Tell(usize),
-    Give(usize),
+enum FlightEvent {
+    PilotTakesOver(usize, Point),
+    GuardLearnsOfPilot(usize),
+    PilotHandsBack(usize),
     Reboot(usize),
     Agree(u32, usize, Point),
     Turn(usize, Line),
 }
 
-fn agenda(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<(f64, What)> {
+fn agenda(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<(f64, FlightEvent)> {
     let mut plan = Vec::new();
     let mut agree = |rng: &mut ChaCha8Rng, line, at_s: f64| {
         for (k, place) in agreed(rng, config, relays).into_iter().enumerate() {
             let at_s = at_s + rng.random_range(0.0..=2.0);
-            plan.push((at_s, What::Agree(line, k, place)));
+            plan.push((at_s, FlightEvent::Agree(line, k, place)));
         }
     };
     agree(rng, 0, 0.0);
@@ -469,7 +469,7 @@ fn agenda(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<(f64
         let angle = rng.random_range(-most..=most);
         for k in 0..relays {
             let at_s = turns_s + rng.random_range(0.0..=5.0);
-            plan.push((at_s, What::Turn(k, Line { number: 1, angle })));
+            plan.push((at_s, FlightEvent::Turn(k, Line { number: 1, angle })));
         }
     }
     let apart = f64::from(config.separation_m);
@@ -481,33 +481,39 @@ fn agenda(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<(f64
                 rng.random_range(-5.0..=5.0) * apart,
                 (40.0 + rng.random_range(-1.0..=5.0) * apart).max(5.0),
             ];
-            plan.push((at_s, What::Take(k, to)));
-            plan.push((at_s + rng.random_range(0.0..=1.5), What::Tell(k)));
-            plan.push((at_s + rng.random_range(5.0..=60.0), What::Give(k)));
+            plan.push((at_s, FlightEvent::PilotTakesOver(k, to)));
+            plan.push((
+                at_s + rng.random_range(0.0..=1.5),
+                FlightEvent::GuardLearnsOfPilot(k),
+            ));
+            plan.push((
+                at_s + rng.random_range(5.0..=60.0),
+                FlightEvent::PilotHandsBack(k),
+            ));
         }
         if rng.random_bool(0.2) {
-            plan.push((rng.random_range(1.0..ROUGH_S), What::Reboot(k)));
+            plan.push((rng.random_range(1.0..ROUGH_S), FlightEvent::Reboot(k)));
         }
     }
     plan.sort_by(|a, b| a.0.total_cmp(&b.0));
     plan
 }
 
-fn happen(world: &mut World, what: What, report: &mut Report) {
+fn apply(world: &mut World, what: FlightEvent, report: &mut Report) {
     let now = instant(world.now_s);
     if std::env::var_os("STORY").is_some() {
         println!("{:.1} {what:?}", world.now_s);
     }
     match what {
-        What::Take(k, to) => {
+        FlightEvent::PilotTakesOver(k, to) => {
             let drone = &mut world.drones[k];
             (drone.pilot, drone.target) = (Some(to), drone.taken_at());
         }
-        What::Tell(k) => {
+        FlightEvent::GuardLearnsOfPilot(k) => {
             let drone = &mut world.drones[k];
             drone.guard.control(now, drone.pilot.is_none());
         }
-        What::Give(k) => {
+        FlightEvent::PilotHandsBack(k) => {
             if world.is_in_the_way(k) {
                 world.later.push(k);
                 return;
@@ -520,8 +526,8 @@ fn happen(world: &mut World, what: What, report: &mut Report) {
             world.begin(k);
             report.given_back += 1;
         }
-        What::Reboot(k) => world.boot(k),
-        What::Agree(line, k, place) => {
+        FlightEvent::Reboot(k) => world.boot(k),
+        FlightEvent::Agree(line, k, place) => {
             let drone = &mut world.drones[k];
             if line < drone.line.number {
                 return;
@@ -531,7 +537,7 @@ fn happen(world: &mut World, what: What, report: &mut Report) {
                 drone.guard.commit(placement(place));
             }
         }
-        What::Turn(k, line) => {
+        FlightEvent::Turn(k, line) => {
             let drone = &mut world.drones[k];
             drone.line = line;
             drone.guard.leave_line(Some(now));
@@ -570,7 +576,7 @@ fn fly(seed: u64) -> Report {
             agreed: None,
             pilot: None,
             reminder_s: 0.0,
-            letters: 0,
+            messages: 0,
         }
     });
     let drones: Vec<Drone> = drones.collect();
@@ -608,10 +614,10 @@ fn fly(seed: u64) -> Report {
     let mut plan = plan.into_iter().peekable();
     loop {
         while let Some((_, what)) = plan.next_if(|(at_s, _)| *at_s <= world.now_s) {
-            happen(&mut world, what, &mut report);
+            apply(&mut world, what, &mut report);
         }
         for k in std::mem::take(&mut world.later) {
-            happen(&mut world, What::Give(k), &mut report);
+            apply(&mut world, FlightEvent::PilotHandsBack(k), &mut report);
         }
         world.step(&mut report);
         let all = world.drones.iter();
@@ -647,7 +653,7 @@ fn fly(seed: u64) -> Report {
 }
 
 #[test]
-fn drones_that_begin_anywhere_come_no_nearer_than_they_may() {
+fn drones_that_begin_anywhere_keep_their_separation() {
     let first = seed(1);
     let count = crate::count();
     let all: Vec<(u64, Report)> = (first..first + count)

@@ -104,13 +104,13 @@ impl Drone {
     /// Switches the guard on with the mission's neighbours, then tells it the links that exist.
     pub(crate) fn boot(
         &mut self,
-        confines: GuardConfig,
+        config: GuardConfig,
         mission: [Option<usize>; 2],
         seed: u32,
         now_s: f64,
     ) {
         let mut guard = Guard::new(
-            confines,
+            config,
             mission.map(|link| link.map(node)),
             seed,
             instant(now_s),
@@ -126,7 +126,7 @@ impl Drone {
     }
 
     /// Gives control of the drone to its pilot. The drone brakes and hovers where it stops.
-    pub(crate) fn take(&mut self, now_s: f64) {
+    pub(crate) fn pilot_takes_over(&mut self, now_s: f64) {
         self.taken = true;
         self.taken_s = now_s;
         self.clear = (f64::NEG_INFINITY, f64::INFINITY);
@@ -160,7 +160,7 @@ impl Drone {
     }
 
     /// Ends the pilot's control. The drone hovers where it stops, and follows its setpoints from then on.
-    pub(crate) fn give(&mut self, now_s: f64) {
+    pub(crate) fn pilot_hands_back(&mut self, now_s: f64) {
         if core::mem::take(&mut self.taken) {
             self.goal = self.body.stops_at(self.acceleration);
             self.is_flown(now_s);
@@ -202,7 +202,7 @@ impl Drone {
     }
 
     /// Asks the guard for the setpoint, and sends a changed one to the flight controller with a delay.
-    pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, confines: &GuardConfig, now_s: f64) {
+    pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, config: &GuardConfig, now_s: f64) {
         let Some(guard) = &mut self.guard else {
             return;
         };
@@ -217,7 +217,7 @@ impl Drone {
         };
         // The setpoint starts at the drone's position and enters the permitted box as soon as it may.
         let begun = *self.begun.get_or_insert(setpoint);
-        let fence = confines.fence;
+        let fence = config.fence;
         for (is, begun, least, most) in [
             (setpoint.x_m, begun.x_m, fence.least_x_m, fence.most_x_m),
             (setpoint.y_m, begun.y_m, fence.least_y_m, fence.most_y_m),
@@ -233,7 +233,7 @@ impl Drone {
                 "{setpoint:?}"
             );
         }
-        let lag_s = self.latency_s.min(confines.lag.as_micros() as f64 / 1e6);
+        let lag_s = self.latency_s.min(config.lag.as_micros() as f64 / 1e6);
         // Setpoints arrive in the order in which they were sent.
         let before_s = self.orders.back().map_or(0.0, |order| order.0);
         let due_s = (now_s + lag_s * rng.random_range(0.0..=0.99)).max(before_s);
@@ -252,7 +252,7 @@ impl Drone {
     }
 
     /// Returns the ranges of x, y and altitude in which the drone may be before new setpoints arrive.
-    pub(crate) fn stretch(&self) -> [(f64, f64); 3] {
+    pub(crate) fn possible_ranges(&self) -> [(f64, f64); 3] {
         let stop = self.body.stops_at(self.acceleration);
         [0, 1, 2].map(|part| {
             let orders = self.orders.iter().map(|(_, order)| order[part]);

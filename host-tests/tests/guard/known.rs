@@ -12,7 +12,7 @@ use crate::world::World;
 const SPEED: f64 = 10.0;
 
 fn world(relays: usize, from_m: f64, step_m: f64) -> World {
-    let confines = GuardConfig {
+    let config = GuardConfig {
         fence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,
@@ -26,7 +26,7 @@ fn world(relays: usize, from_m: f64, step_m: f64) -> World {
         hover_m: 0.0,
         lag: Duration::from_millis(200),
     };
-    let mut world = World::new(1, confines, &row(relays, from_m, step_m));
+    let mut world = World::new(1, config, &row(relays, from_m, step_m));
     for drone in &mut world.drones {
         drone.speed = SPEED;
     }
@@ -60,7 +60,7 @@ fn time(world: &mut World) -> f64 {
 }
 
 #[test]
-fn a_tight_row_shifts_either_way() {
+fn a_tight_row_of_drones_shifts_in_both_directions() {
     for shift_m in [4.0, -4.0, 100.0, -100.0] {
         let mut world = world(12, 400.0, 10.0);
         let start = row(12, 400.0, 10.0);
@@ -83,7 +83,7 @@ fn a_tight_row_shifts_either_way() {
 /// Checks agreed positions that are too close: three at 4 m along x, where the outer two need 10 m. The drones
 /// approach these positions as far as the separation permits.
 #[test]
-fn places_too_close_are_approached() {
+fn drones_approach_positions_that_are_too_close() {
     let mut world = world(5, 100.0, 100.0);
     let targets = [
         [50.0, 10.0, 30.0],
@@ -128,7 +128,7 @@ fn places_too_close_are_approached() {
 
 /// Checks that drones reach agreed positions above and beside one another, swap them, and leave them.
 #[test]
-fn places_above_each_other_are_flown_to_and_left() {
+fn positions_above_each_other_are_reached_and_left() {
     let mut world = world(4, 300.0, 20.0);
     let stacked = [
         [300.0, 0.0, 50.0],

@@ -23,7 +23,7 @@ fn count() -> u64 {
 
 /// Checks all schedules: every two drones keep the separation, and every drone arrives.
 #[test]
-fn nobody_comes_too_close_and_everybody_arrives() {
+fn drones_keep_apart_and_all_arrive() {
     let first = seed(20_260);
     let reports: Vec<Report> = (0..count())
         .into_par_iter()

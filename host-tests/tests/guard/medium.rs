@@ -15,7 +15,7 @@ pub(crate) struct Faults {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Letter {
+pub(crate) struct FenceMessage {
     pub(crate) sent_s: f64,
     due_s: f64,
     pub(crate) to: usize,
@@ -30,7 +30,7 @@ pub(crate) struct Letter {
 /// Simulated medium: the messages between drones that are in transit.
 #[derive(Debug, Default)]
 pub(crate) struct Medium {
-    letters: Vec<Letter>,
+    messages: Vec<FenceMessage>,
 }
 
 impl Medium {
@@ -49,7 +49,7 @@ impl Medium {
             }
             // The cube keeps long delays rare.
             let delay = faults.delay_s * rng.random_range(0.0..=1.0_f64).powi(3);
-            self.letters.push(Letter {
+            self.messages.push(FenceMessage {
                 sent_s: now_s,
                 due_s: now_s + 0.01 + delay,
                 to,
@@ -62,16 +62,16 @@ impl Medium {
     }
 
     /// Removes and returns the messages that have arrived by `now_s`, in no particular order.
-    pub(crate) fn arrived(&mut self, now_s: f64) -> Vec<Letter> {
-        if self.letters.is_empty() {
+    pub(crate) fn arrived(&mut self, now_s: f64) -> Vec<FenceMessage> {
+        if self.messages.is_empty() {
             return Vec::new();
         }
         let (arrived, rest) = self
-            .letters
+            .messages
             .iter()
             .copied()
-            .partition(|letter| letter.due_s <= now_s);
-        self.letters = rest;
+            .partition(|message| message.due_s <= now_s);
+        self.messages = rest;
         arrived
     }
 }

@@ -51,22 +51,22 @@ pub(crate) struct Report {
 
 pub(crate) fn fly(seed: u64) -> Report {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x00C0_FFEE);
-    let confines = confines(&mut rng);
+    let config = random_config(&mut rng);
     let relays = rng.random_range(1..=12);
-    let (confines, starts) = line(&mut rng, confines, relays);
+    let (config, starts) = line(&mut rng, config, relays);
     let agile = rng.random_bool(0.5);
     let acceleration = if agile {
         f64::INFINITY
     } else {
         rng.random_range(4.0..=40.0)
     };
-    let latency_s = confines.lag.as_micros() as f64 / 1e6;
+    let latency_s = config.lag.as_micros() as f64 / 1e6;
     let to_stop = Duration::from_micros((FASTEST / acceleration * 1e6) as u64);
-    let confines = GuardConfig {
-        lag: Duration::from_micros(confines.lag.as_micros() + to_stop.as_micros()),
-        ..confines
+    let config = GuardConfig {
+        lag: Duration::from_micros(config.lag.as_micros() + to_stop.as_micros()),
+        ..config
     };
-    let mut world = World::new(seed, confines, &starts);
+    let mut world = World::new(seed, config, &starts);
     for drone in &mut world.drones {
         (drone.acceleration, drone.latency_s) = (acceleration, latency_s);
     }
@@ -78,7 +78,7 @@ pub(crate) fn fly(seed: u64) -> Report {
     report
 }
 
-fn confines(rng: &mut ChaCha8Rng) -> GuardConfig {
+fn random_config(rng: &mut ChaCha8Rng) -> GuardConfig {
     let separation = if rng.random_bool(0.05) {
         0.0
     } else {
@@ -106,21 +106,17 @@ fn confines(rng: &mut ChaCha8Rng) -> GuardConfig {
 }
 
 /// Draws the line's length. Returns the guard's configuration with it, and the drones' start positions.
-fn line(
-    rng: &mut ChaCha8Rng,
-    mut confines: GuardConfig,
-    relays: usize,
-) -> (GuardConfig, Vec<Point>) {
-    let taken = f64::from(confines.separation_m) * relays as f64;
+fn line(rng: &mut ChaCha8Rng, mut config: GuardConfig, relays: usize) -> (GuardConfig, Vec<Point>) {
+    let taken = f64::from(config.separation_m) * relays as f64;
     let distance = if rng.random_bool(0.4) {
         taken * rng.random_range(1.001..=1.5)
     } else {
         taken * rng.random_range(2.0..=20.0)
     };
-    confines.fence.most_x_m = distance.max(10.0) as f32;
-    confines.relays = relays as u16;
-    let starts = places(rng, &confines, relays);
-    (confines, starts)
+    config.fence.most_x_m = distance.max(10.0) as f32;
+    config.relays = relays as u16;
+    let starts = places(rng, &config, relays);
+    (config, starts)
 }
 
 /// Runs the first phase of the flight, with all random faults and events.
@@ -136,20 +132,23 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     };
     let mut plan = agreements(rng, world);
     plan.extend(speeds(rng, world.drones.len()));
-    let troubles = troubles(rng, world.drones.len());
+    let troubles = failures(rng, world.drones.len());
     let around_s: Vec<f64> = troubles
         .iter()
-        .filter(|(_, what)| matches!(what, What::Around(..)))
+        .filter(|(_, what)| matches!(what, FlightEvent::Around(..)))
         .map(|(at_s, _)| *at_s)
         .collect();
     // The remaining relays agree twice: first on positions close to the silent relay, then on others.
     for at_s in around_s {
-        let before = places(rng, &world.confines, world.drones.len());
-        let before = closer(rng, &world.confines, before, false);
-        let after = places(rng, &world.confines, world.drones.len());
+        let before = places(rng, &world.config, world.drones.len());
+        let before = closer(rng, &world.config, before, false);
+        let after = places(rng, &world.config, world.drones.len());
         for (k, (before, after)) in before.into_iter().zip(after).enumerate() {
-            plan.push((at_s - 40.0, What::Hear(k, before)));
-            plan.push((at_s + rng.random_range(0.0..=5.0), What::Hear(k, after)));
+            plan.push((at_s - 40.0, FlightEvent::Setpoint(k, before)));
+            plan.push((
+                at_s + rng.random_range(0.0..=5.0),
+                FlightEvent::Setpoint(k, after),
+            ));
         }
     }
     let pilots = pilots(rng, world.drones.len(), &troubles);
@@ -159,61 +158,61 @@ fn rough(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     let mut plan = plan.into_iter().peekable();
     while world.now_s < ROUGH_S {
         while let Some((_, what)) = plan.next_if(|(at_s, _)| *at_s <= world.now_s) {
-            happen(world, what, report);
+            apply(world, what, report);
         }
         world.step();
     }
     for (_, what) in plan {
-        happen(world, what, report);
+        apply(world, what, report);
     }
 }
 
-fn happen(world: &mut World, what: What, report: &mut Report) {
+fn apply(world: &mut World, what: FlightEvent, report: &mut Report) {
     match what {
-        What::Hear(k, at) => {
+        FlightEvent::Setpoint(k, at) => {
             report.heard += 1;
             if let Some(guard) = &mut world.drones[k].guard {
                 guard.commit(place(at));
             }
         }
-        What::Off(k) => {
+        FlightEvent::Off(k) => {
             report.reboots += 1;
             world.drones[k].guard = None;
         }
-        What::On(k) => {
+        FlightEvent::On(k) => {
             if world.drones[k].guard.is_none() {
                 world.boot(k);
             }
         }
-        What::Mute(k) => {
+        FlightEvent::Mute(k) => {
             report.silences += 1;
             world.drones[k].speaks = false;
         }
-        What::Unmute(k) => world.drones[k].speaks = true,
-        What::Vanish(k) => {
+        FlightEvent::Unmute(k) => world.drones[k].speaks = true,
+        FlightEvent::Vanish(k) => {
             report.gone += 1;
             world.drones[k].flies = false;
         }
-        What::Around(who, side, k, other) => {
+        FlightEvent::Around(who, side, k, other) => {
             if !(world.drones[k].speaks && world.drones[k].flies) {
                 world.link(who, side, other);
             }
         }
-        What::Back(who, side, k) => world.link(who, side, Some(k)),
-        What::Forget(k, side) => {
+        FlightEvent::Back(who, side, k) => world.link(who, side, Some(k)),
+        FlightEvent::Forget(k, side) => {
             if let Some(guard) = &mut world.drones[k].guard {
                 guard.forget(side, false);
             }
         }
-        What::Speed(k, speed) => world.drones[k].speed = speed,
-        What::Take(k) => {
+        FlightEvent::Speed(k, speed) => world.drones[k].speed = speed,
+        FlightEvent::PilotTakesOver(k) => {
             report.taken += 1;
-            world.drones[k].take(world.now_s);
+            world.drones[k].pilot_takes_over(world.now_s);
         }
-        What::Hears(k) => world.drones[k].is_flown(world.now_s),
-        What::Aside(k, way) => world.aside(k, way),
-        What::Along(k, share) => report.along += u64::from(world.along(k, share)),
-        What::Give(k) => world.drones[k].give(world.now_s),
+        FlightEvent::GuardLearnsOfPilot(k) => world.drones[k].is_flown(world.now_s),
+        FlightEvent::Aside(k, way) => world.aside(k, way),
+        FlightEvent::Along(k, share) => report.along += u64::from(world.along(k, share)),
+        FlightEvent::PilotHandsBack(k) => world.drones[k].pilot_hands_back(world.now_s),
     }
 }
 
@@ -231,15 +230,15 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
     let left: Vec<usize> = (0..world.drones.len())
         .filter(|k| world.drones[*k].flies)
         .collect();
-    let mut targets = places(rng, &world.confines, left.len());
+    let mut targets = places(rng, &world.config, left.len());
     if rng.random_bool(0.5) {
-        targets = closer(rng, &world.confines, targets, false);
-        let apart_m = f64::from(world.confines.separation_m);
+        targets = closer(rng, &world.config, targets, false);
+        let apart_m = f64::from(world.config.separation_m);
         let steps = targets.windows(2).map(|pair| pair[1][0] - pair[0][0]);
         report.close += steps.filter(|step| *step < 0.99 * apart_m).count() as u64;
     }
     for drone in &mut world.drones {
-        drone.give(world.now_s);
+        drone.pilot_hands_back(world.now_s);
     }
     let relays = world.drones.len();
     let gone: Vec<bool> = world.drones.iter().map(|drone| !drone.flies).collect();
@@ -259,7 +258,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
         }
         guard.commit(place(*target));
     }
-    let distance = f64::from(world.confines.fence.most_x_m);
+    let distance = f64::from(world.config.fence.most_x_m);
     let (begun_s, allowed_s) = (
         world.now_s,
         left.len() as f64 * (10.0 + length([distance, 120.0, 100.0]) / SLOWEST),
@@ -283,7 +282,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
         );
         world.step();
     }
-    let off = f64::from(world.confines.hover_m) + world.allowed_m();
+    let off = f64::from(world.config.hover_m) + world.allowed_m();
     for (k, target) in left.iter().zip(&targets) {
         let at = world.drones[*k].body.at;
         assert!(

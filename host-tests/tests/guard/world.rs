@@ -18,7 +18,7 @@ pub(crate) struct World {
     pub(crate) seed: u64,
     pub(crate) rng: ChaCha8Rng,
     pub(crate) now_s: f64,
-    pub(crate) confines: GuardConfig,
+    pub(crate) config: GuardConfig,
     pub(crate) drones: Vec<Drone>,
     medium: Medium,
     pub(crate) faults: Faults,
@@ -29,13 +29,13 @@ pub(crate) struct World {
 }
 
 impl World {
-    pub(crate) fn new(seed: u64, confines: GuardConfig, starts: &[Point]) -> Self {
+    pub(crate) fn new(seed: u64, config: GuardConfig, starts: &[Point]) -> Self {
         let links = |k| beside(k, starts.len());
         let mut world = Self {
             seed,
             rng: ChaCha8Rng::seed_from_u64(seed),
             now_s: 1.0,
-            confines,
+            config,
             drones: (0..starts.len())
                 .map(|k| Drone::hovering(starts[k], links(k)))
                 .collect(),
@@ -61,7 +61,7 @@ impl World {
     pub(crate) fn boot(&mut self, k: usize) {
         let seed = self.rng.random();
         let mission = beside(k, self.drones.len());
-        self.drones[k].boot(self.confines, mission, seed, self.now_s);
+        self.drones[k].boot(self.config, mission, seed, self.now_s);
     }
 
     pub(crate) fn link(&mut self, k: usize, side: Side, neighbour: Option<usize>) {
@@ -74,8 +74,8 @@ impl World {
 
     /// Returns the permitted shortfall of the separation, m: four position errors and f32 rounding.
     pub(crate) fn allowed_m(&self) -> f64 {
-        let rounding = f64::from(self.confines.fence.most_x_m) * f64::from(f32::EPSILON);
-        4.0 * f64::from(self.confines.hover_m) + 8.0 * rounding
+        let rounding = f64::from(self.config.fence.most_x_m) * f64::from(f32::EPSILON);
+        4.0 * f64::from(self.config.hover_m) + 8.0 * rounding
     }
 
     pub(crate) fn step(&mut self) {
@@ -86,30 +86,30 @@ impl World {
             drone.report(
                 &mut self.rng,
                 self.board,
-                f64::from(self.confines.hover_m),
+                f64::from(self.config.hover_m),
                 now_s,
             );
         }
         let mut tell = Vec::new();
-        for letter in self.medium.arrived(now_s) {
-            let drone = &mut self.drones[letter.to];
+        for message in self.medium.arrived(now_s) {
+            let drone = &mut self.drones[message.to];
             if let Some(guard) = drone.guard.as_mut().filter(|_| drone.speaks && drone.flies) {
-                guard.hear(letter.side, node(letter.from), &letter.fence);
-                let side = usize::from(letter.side == Side::Downstream);
+                guard.hear(message.side, node(message.from), &message.fence);
+                let side = usize::from(message.side == Side::Downstream);
                 // Only a message of the present association counts.
-                let told =
-                    letter.fence.flags & Fence::LEFT != 0 && letter.fence.echo == drone.said[side];
-                tell.extend(told.then_some((letter, drone.stretch()[0])));
+                let told = message.fence.flags & Fence::LEFT != 0
+                    && message.fence.echo == drone.said[side];
+                tell.extend(told.then_some((message, drone.possible_ranges()[0])));
                 // The setpoint may be read at any time between two messages.
                 if self.rng.random_bool(0.5) {
-                    drone.steer(&mut self.rng, &self.confines, now_s);
+                    drone.steer(&mut self.rng, &self.config, now_s);
                 }
             }
         }
-        for (letter, stretch) in tell {
+        for (message, range) in tell {
             // A sender upstream of the receiver has the receiver on its downstream side.
-            let side = usize::from(letter.side == Side::Upstream);
-            self.drones[letter.from].is_known(side, letter.sent_s, stretch);
+            let side = usize::from(message.side == Side::Upstream);
+            self.drones[message.from].is_known(side, message.sent_s, range);
         }
         for k in 0..self.drones.len() {
             let drone = &mut self.drones[k];
@@ -117,14 +117,14 @@ impl World {
                 continue;
             }
             drone.reminded(now_s);
-            drone.steer(&mut self.rng, &self.confines, now_s);
-            self.talk(k);
+            drone.steer(&mut self.rng, &self.config, now_s);
+            self.exchange_messages(k);
         }
         self.check();
     }
 
     /// Sends all messages that the guard of drone `k` has pending.
-    fn talk(&mut self, k: usize) {
+    fn exchange_messages(&mut self, k: usize) {
         let drone = &mut self.drones[k];
         let Some(guard) = &mut drone.guard else {
             return;
@@ -154,12 +154,12 @@ impl World {
     /// Moves drone `k` up to `most_m` along axis `part`, if this is away from all nearby drones. `part` is 1 for y or
     /// 2 for altitude; `up` selects the direction.
     pub(crate) fn aside(&mut self, k: usize, (part, up, most_m): (usize, bool, f64)) {
-        let (low, high) = self.drones[k].stretch()[part];
+        let (low, high) = self.drones[k].possible_ranges()[part];
         let near = k.saturating_sub(3)..(k + 4).min(self.drones.len());
         let is_away = near
             .filter(|other| *other != k && self.drones[*other].flies)
             .all(|other| {
-                let (least, most) = self.drones[other].stretch()[part];
+                let (least, most) = self.drones[other].possible_ranges()[part];
                 if up { low >= most } else { high <= least }
             });
         if is_away {
@@ -173,10 +173,10 @@ impl World {
         if !self.drones[k].taken || self.drones[k].told != [true; 2] {
             return false;
         }
-        let apart_m = f64::from(self.confines.separation_m) + self.allowed_m();
+        let apart_m = f64::from(self.config.separation_m) + self.allowed_m();
         let flying = |part: &[Drone]| -> Vec<(f64, f64)> {
             let flying = part.iter().filter(|drone| drone.flies);
-            flying.map(|drone| drone.stretch()[0]).collect()
+            flying.map(|drone| drone.possible_ranges()[0]).collect()
         };
         let below = flying(&self.drones[..k]);
         let above = flying(&self.drones[k + 1..]);
@@ -184,7 +184,7 @@ impl World {
         let least = below.iter().map(|(_, high)| *high).fold(before, f64::max);
         let least = (least + apart_m).max(0.0);
         let most = above.iter().map(|(low, _)| *low).fold(after, f64::min);
-        let most = (most - apart_m).min(f64::from(self.confines.fence.most_x_m));
+        let most = (most - apart_m).min(f64::from(self.config.fence.most_x_m));
         let to = least + share * (most - least);
         if least < most {
             let [stop, ..] = self.drones[k].stopped();
@@ -195,13 +195,13 @@ impl World {
 
     /// Checks that no two drones came closer in this step, or can come before they stop, than permitted.
     fn check(&mut self) {
-        let separation = f64::from(self.confines.separation_m);
+        let separation = f64::from(self.config.separation_m);
         let floor = separation - self.allowed_m();
         let flying: Vec<&Drone> = self.drones.iter().filter(|drone| drone.flies).collect();
         self.steps += flying.len() as u64;
         for (k, one) in flying.iter().enumerate() {
             for other in &flying[..k] {
-                let margin = between(one.stretch(), other.stretch()) - floor;
+                let margin = between(one.possible_ranges(), other.possible_ranges()) - floor;
                 self.closest_m = self.closest_m.min(margin);
                 assert!(
                     margin >= 0.0,

@@ -197,7 +197,7 @@ fn a_chain_of_any_length_needs_one_round_trip() {
 
 /// Checks that both neighbours report a relay as lost that stops while all relays compute.
 #[test]
-fn who_fails_while_all_solve_is_missed() {
+fn a_relay_that_stops_while_all_compute_is_reported_lost() {
     let (link, corridor) = roomy(50, 500.0, 150.0, 280.0, 300.0);
     let mut setup = setup(&link, corridor).unwrap();
     let lost = setup.settings.dead_after;

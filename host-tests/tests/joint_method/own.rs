@@ -66,7 +66,7 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
 /// Checks that chains with different powers or held altitudes come near the joint optimum. Their SIR is never below
 /// that at the configured altitudes.
 #[test]
-fn relays_that_differ_come_near_the_joint_optimum() {
+fn different_relays_come_near_the_joint_optimum() {
     let count = count(200);
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(45));
     let (mut results, mut below) = (Vec::new(), Vec::new());
@@ -119,7 +119,7 @@ fn relays_that_differ_come_near_the_joint_optimum() {
 
 /// Checks that a relay that holds its altitude keeps it, while its neighbours choose others.
 #[test]
-fn a_relay_may_hold_its_altitude() {
+fn one_relay_may_have_a_fixed_altitude() {
     let (link, corridor) = close_by(6);
     let mut setup = setup(&link, corridor).unwrap();
     let own = Profile {
@@ -146,7 +146,7 @@ fn a_relay_may_hold_its_altitude() {
 ///
 /// If the leader is one of these relays, the first round trip is omitted.
 #[test]
-fn relays_that_differ_take_three_round_trips_or_more() {
+fn different_relays_take_three_round_trips_or_more() {
     for (relays, own, trips) in [
         (5, &[3][..], 3),
         (5, &[1], 2),
@@ -182,7 +182,7 @@ fn relays_that_differ_take_three_round_trips_or_more() {
 
 /// Checks that relays with powers unknown to the leader find altitudes within 1 % of the optimum.
 #[test]
-fn own_powers_are_found_out_about() {
+fn powers_unknown_to_the_leader_are_collected() {
     let (link, corridor) = close_by(8);
     let mut setup = setup(&link, corridor).unwrap();
     for (index, power_w) in [(2, 0.4), (5, 2.5), (7, 0.7)] {

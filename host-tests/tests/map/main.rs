@@ -80,7 +80,7 @@ fn example(file: &str) -> Scenario {
 }
 
 #[test]
-fn others_read_the_plan_where_it_is() {
+fn other_programs_read_the_plan_at_its_position() {
     let scenario = example("decibels.toml");
     let plan = best(&scenario, 7);
     let found = read(&scenario, &plan);
@@ -116,7 +116,7 @@ fn others_read_the_plan_where_it_is() {
 }
 
 #[test]
-fn without_a_geoid_there_is_no_height_that_would_be_wrong() {
+fn without_a_geoid_no_height_is_written() {
     let scenario = example("site.toml");
     let found = read(&scenario, &best(&scenario, 4));
     assert_eq!(found["geojson_dimensions"], json!([2]));
@@ -147,7 +147,7 @@ fn a_line_across_the_antimeridian_is_cut() {
 }
 
 #[test]
-fn a_line_that_is_nowhere_is_on_no_map() {
+fn a_line_without_sites_is_on_no_map() {
     let scenario = Scenario::default();
     let why = Map::new(&scenario, &best(&scenario, 2)).unwrap_err();
     assert!(
@@ -157,7 +157,7 @@ fn a_line_that_is_nowhere_is_on_no_map() {
 }
 
 #[test]
-fn an_interferer_too_far_to_place_is_left_out_and_said() {
+fn an_interferer_too_far_to_draw_is_left_out_with_a_note() {
     let text = std::fs::read_to_string(
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/site.toml"),
     )

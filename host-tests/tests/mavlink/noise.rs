@@ -18,7 +18,7 @@ fn hurt(rng: &mut ChaCha8Rng, frame: &mut Vec<u8>) {
 }
 
 #[test]
-fn every_frame_that_is_whole_is_found_whatever_is_around_it() {
+fn every_complete_frame_is_found_in_noise() {
     let mut rng = rng(4);
     let (mut line, mut whole) = (Vec::new(), Vec::new());
     for number in 0..FRAMES {
@@ -56,7 +56,7 @@ fn every_frame_that_is_whole_is_found_whatever_is_around_it() {
 
 /// Checks that a frame that is carried in another frame's payload is not read.
 #[test]
-fn what_is_carried_by_another_message_is_not_read() {
+fn frames_nested_in_a_message_are_not_parsed() {
     let inner = by_the_crate(&said(&mut rng(5)).0, 1);
     let mut payload = [0; 128];
     payload[..inner.len()].copy_from_slice(&inner);
@@ -73,7 +73,7 @@ fn what_is_carried_by_another_message_is_not_read() {
 
 /// Checks that an unknown message is skipped, and the message after it is read.
 #[test]
-fn an_unknown_message_costs_nothing_but_its_bytes() {
+fn an_unknown_message_costs_only_its_bytes() {
     let mut rng = rng(6);
     let unknown = mavlink::dialects::common::ATTITUDE_DATA {
         roll: rng.random(),
@@ -93,7 +93,7 @@ fn an_unknown_message_costs_nothing_but_its_bytes() {
 /// Checks the costliest known input: five bytes of it cause a checksum over 260 bytes. Each sixteen bytes have three
 /// false frame starts.
 #[test]
-fn bytes_that_are_made_for_it_cost_a_checksum_for_five_of_them() {
+fn adversarial_bytes_cost_one_checksum_per_five_bytes() {
     let made = [
         0xFD, 0xFF, 0, 0xFD, 0xFF, 0, 0xFD, 248, 0, 0, 11, 1, 0, 11, 1, 0,
     ];

@@ -86,7 +86,7 @@ fn mask(velocity: bool, yaw: bool) -> u16 {
 
 #[expect(clippy::too_many_lines, reason = "every field of every message")]
 #[test]
-fn pymavlink_reads_every_field_of_what_is_said() {
+fn pymavlink_reads_every_field_of_our_messages() {
     let framed = framed();
     let input: String = framed
         .iter()
@@ -216,7 +216,7 @@ fn pymavlink_reads_every_field_of_what_is_said() {
 }
 
 #[test]
-fn the_mavlink_crate_reads_every_field_of_what_is_said() {
+fn the_mavlink_crate_reads_every_field_of_our_messages() {
     for (message, number, bytes) in framed() {
         let mut reader = MavlinkReader::new(&bytes[..]);
         let (header, read) = reader

@@ -172,7 +172,7 @@ fn a_stamp_must_rise_for_each_sender_and_link() {
 
 /// Checks that a signer without a clock adopts the time of its first accepted frame.
 #[test]
-fn a_board_without_a_clock_takes_the_time_from_whom_it_hears() {
+fn a_board_without_a_clock_takes_the_received_time() {
     let mut ours = Signing::new(KEY, 0, Stamp::UNKNOWN, at(500));
     let heartbeat = || Outgoing::Heartbeat.encode(COMPANION, AUTOPILOT, 0);
     assert_eq!(stamp_of(&ours.sign(at(500), heartbeat())), 1);
@@ -195,7 +195,7 @@ fn a_board_without_a_clock_takes_the_time_from_whom_it_hears() {
 
 /// Checks that many changing senders do not make a signer forget the time stamp of an active sender.
 #[test]
-fn many_senders_do_not_make_an_old_frame_new() {
+fn many_senders_do_not_make_a_replay_acceptable() {
     let mut ours = signing(KEY);
     for turn in 0..1_000_u64 {
         let other = Address {

@@ -224,17 +224,17 @@ fn at_most_one_flies(medium: Medium, most_ms: u64) {
 }
 
 #[test]
-fn of_two_with_one_index_on_a_channel_one_has_a_setpoint() {
+fn one_of_two_duplicates_on_a_channel_has_a_setpoint() {
     at_most_one_flies(Medium::Shared, HEARD_MS);
 }
 
 #[test]
-fn of_two_with_one_index_on_links_one_has_a_setpoint() {
+fn one_of_two_duplicates_on_links_has_a_setpoint() {
     at_most_one_flies(Medium::Links, HEARD_MS);
 }
 
 #[test]
-fn of_two_hidden_ones_with_one_index_one_has_a_setpoint() {
+fn one_of_two_hidden_duplicates_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }
 
@@ -353,7 +353,7 @@ impl Meeting {
 /// Checks that one of two duplicates in settled chains gives up its setpoint when the chains meet. Only handshakes
 /// reveal a duplicate. Settled chains send them with the lease renewals alone.
 #[test]
-fn of_two_settled_chains_with_one_index_one_loses_it() {
+fn one_of_two_settled_duplicates_loses_its_setpoint() {
     let mut faults = Vec::new();
     for (loss, limit_ms) in [(0.0, HEARD_MS), (0.3, HEARD_LOSSY_MS)] {
         let mut longest = Vec::new();

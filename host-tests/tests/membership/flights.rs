@@ -17,7 +17,7 @@ fn guarded(rng: &mut ChaCha8Rng) -> Setup {
 }
 
 #[test]
-fn without_losses_all_arrive_and_none_come_close() {
+fn without_losses_all_drones_arrive_and_keep_apart() {
     for seed in 1..=40 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut setup = guarded(&mut rng);
@@ -37,7 +37,7 @@ fn without_losses_all_arrive_and_none_come_close() {
 }
 
 #[test]
-fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
+fn drones_keep_away_from_a_silent_hovering_drone() {
     for seed in 1..=200 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut setup = guarded(&mut rng);
@@ -72,7 +72,7 @@ fn a_drone_that_falls_silent_and_hovers_is_not_flown_into() {
 
 /// Checks that drones come too close without a motion guard, so that the test is able to fail.
 #[test]
-fn without_a_guard_some_come_close() {
+fn without_a_guard_some_drones_come_too_close() {
     let close = (1..=40).any(|seed| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut setup = guarded(&mut rng);

@@ -2,7 +2,7 @@
 
 use uav_relay::{Adjust, Band, Local, Method, MissionConfig};
 use uav_relay_oracle::mission::of_stochastic_link;
-use uav_relay_oracle::reference::Station;
+use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
@@ -64,7 +64,7 @@ fn any_one_two_or_three_of_eight_may_be_lost_at_once() {
 }
 
 #[test]
-fn a_relay_that_comes_back_takes_its_place_again() {
+fn a_relay_that_returns_gets_its_position_again() {
     for index in 1..=8 {
         // The relay returns before the loss is noticed, just when it is, or long after.
         for off in [1_000, 9_990, 10_020, 60_000] {
@@ -80,7 +80,7 @@ fn a_relay_that_comes_back_takes_its_place_again() {
 /// Checks that one of two adjacent lost relays returns into the gap that the others have closed. The second lost
 /// relay stays off.
 #[test]
-fn one_of_two_in_a_row_returns_into_the_closed_gap() {
+fn one_of_two_lost_neighbours_returns_into_the_gap() {
     for (index, off) in [(2, 3), (3, 2), (4, 5), (5, 4), (6, 7), (7, 6)] {
         for seconds_off in [15, 17, 20, 30, 60] {
             let mut setup = paper(8);
@@ -94,7 +94,7 @@ fn one_of_two_in_a_row_returns_into_the_closed_gap() {
 }
 
 #[test]
-fn all_of_them_are_switched_on_again_one_after_the_other() {
+fn relays_are_switched_on_again_one_by_one() {
     let mut setup = paper(8);
     for index in 1..=8 {
         let at = 20 + 40 * u64::from(index);
@@ -106,7 +106,7 @@ fn all_of_them_are_switched_on_again_one_after_the_other() {
 }
 
 #[test]
-fn one_after_the_other_until_two_are_left() {
+fn relays_are_lost_one_by_one_until_two_remain() {
     let mut setup = paper(8);
     let order = [4, 1, 8, 5, 3, 7];
     setup.kills = (1..)
@@ -118,7 +118,7 @@ fn one_after_the_other_until_two_are_left() {
 }
 
 #[test]
-fn over_two_wires_a_break_is_reported_and_a_reboot_is_mended() {
+fn on_wires_a_break_is_reported_and_a_reboot_recovered() {
     let mut setup = Setup::new(mission(8));
     setup.kills = vec![(4, seconds(20))];
     let outcome = run(setup).unwrap();
@@ -139,7 +139,7 @@ fn over_two_wires_a_break_is_reported_and_a_reboot_is_mended() {
 }
 
 #[test]
-fn a_chain_in_a_field_forms_anew_from_the_other_end() {
+fn a_chain_in_a_field_recovers_from_the_other_end() {
     let link = StochasticLink {
         distance_m: 1_000.0,
         tx_w: 80.0,
@@ -147,7 +147,7 @@ fn a_chain_in_a_field_forms_anew_from_the_other_end() {
         eta: 3.0,
         upsilon: vec![(0.0, 2e4), (400.0, 5e3), (1_000.0, 4e4)],
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 20.0,
                 power_w: 1.0
             };
@@ -163,7 +163,7 @@ fn a_chain_in_a_field_forms_anew_from_the_other_end() {
 }
 
 #[test]
-fn a_chain_that_chooses_altitudes_or_takes_turns_forms_anew() {
+fn a_chain_with_free_altitudes_or_turns_recovers() {
     let band = Band {
         least_m: 20.0,
         most_m: 300.0,

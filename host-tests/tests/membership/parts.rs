@@ -13,7 +13,7 @@ fn goes_on(after: u16) -> Vec<u16> {
 }
 
 #[test]
-fn of_a_split_chain_the_larger_part_goes_on() {
+fn the_larger_part_of_a_split_chain_goes_on() {
     for after in 1..8 {
         let mut setup = paper(8);
         setup.partitions = vec![Partition {
@@ -33,7 +33,7 @@ fn of_a_split_chain_the_larger_part_goes_on() {
 }
 
 #[test]
-fn without_the_rule_of_the_larger_part_both_go_on() {
+fn without_the_quorum_rule_both_parts_go_on() {
     let mut setup = paper(8);
     setup.settings.quorum = false;
     setup.partitions = vec![Partition {
@@ -81,7 +81,7 @@ fn flaps(half: u64, after: u16) -> usize {
 }
 
 #[test]
-fn a_link_that_comes_and_goes_disturbs_the_chain_less_and_less() {
+fn a_flapping_link_disturbs_the_chain_less_and_less() {
     for half in [1, 4, 8, 14, 16, 20, 30, 50] {
         let views: Vec<_> = (1..8).map(|after| flaps(half, after)).collect();
         println!(
@@ -98,7 +98,7 @@ fn a_link_that_comes_and_goes_disturbs_the_chain_less_and_less() {
 }
 
 #[test]
-fn nothing_happens_to_a_settled_chain_on_a_good_channel() {
+fn a_settled_chain_on_a_good_channel_stays_unchanged() {
     let mut setup = paper(8);
     setup.kills = vec![(3, seconds(20))];
     go_on_until(&mut setup, seconds(3_600));

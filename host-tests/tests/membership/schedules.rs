@@ -25,7 +25,7 @@ fn schedule(rng: &mut ChaCha8Rng) -> Setup {
 }
 
 #[test]
-fn every_schedule_ends_in_the_optimum_of_those_left() {
+fn every_schedule_ends_in_the_remaining_relays_optimum() {
     let usual = if cfg!(debug_assertions) {
         2_000
     } else {

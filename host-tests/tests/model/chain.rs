@@ -6,10 +6,10 @@ use uav_relay::Phase;
 use uav_relay::{Duration, Event, Instant, Port, Relay, Side};
 
 use super::Checked;
+use super::accepted_frames::{EpochPair, accepted_count};
 use super::ledger::{Ledger, MOST_FRAMES, Turn};
-use super::passes::Met;
+use super::passes::PassClass;
 use super::scenario::{Kind, Scenario};
-use super::seal::{Seal, taken};
 use super::tally::Tally;
 use super::wires::{FLIGHT, Flying, Wires, end, message, pass};
 
@@ -59,7 +59,7 @@ impl<'a> World<'a> {
         relay.handle_timeout(now);
         let mut frame = [0; MAX_FRAME];
         let mut sent = 0;
-        self.ledgers[at].look_up(relay)?;
+        self.ledgers[at].check_view(relay)?;
         // A firmware stores the record before the votes leave.
         let record = relay.unpersisted();
         self.ledgers[at].record = record.or(self.ledgers[at].record);
@@ -71,18 +71,18 @@ impl<'a> World<'a> {
             let bytes = frame[..transmit.len].to_vec();
             if let Some(pass) = pass(&bytes) {
                 let leads = at == self.scenario.leader();
-                self.ledgers[at].says(self.scenario, leads, pass)?;
+                self.ledgers[at].check_sent(self.scenario, leads, pass)?;
             }
             let (to, side) = match transmit.port {
                 Port::Upstream => (at - 1, Side::Upstream),
                 _ => (at + 1, Side::Downstream),
             };
             if let Some(message) = message(&bytes) {
-                self.ledgers[at].told(side, &message, now);
+                self.ledgers[at].on_sent(side, &message, now);
             }
             let frame = Flying {
                 due: now + FLIGHT,
-                seal: Seal {
+                seal: EpochPair {
                     from: self.ledgers[at].epoch,
                     to: self.ledgers[to].epoch,
                 },
@@ -129,7 +129,7 @@ impl<'a> World<'a> {
     /// the hop between them must meet the target.
     fn neighbours_agree(&mut self) -> Checked {
         let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
-        let hops = self.scenario.judge.hops(&places);
+        let hops = self.scenario.reference.hops(&places);
         let apart = f64::from(self.scenario.mission.config().min_separation_m) * (1.0 - CLOSE);
         let last = self.ledgers.len();
         for (hop, sir) in hops.into_iter().enumerate() {
@@ -149,7 +149,7 @@ impl<'a> World<'a> {
             let is_between = hop > 0 && hop < last;
             // Where relays measure, passes go toward Tx: relay `to` forwards them to `from`.
             let measures = self.scenario.kind == Kind::Measured;
-            if is_between && measures && to.begins_anew() {
+            if is_between && measures && to.repeats_first_pass() {
                 self.tally.add("hops excused");
                 continue;
             }
@@ -157,7 +157,10 @@ impl<'a> World<'a> {
                 .measured_per_w
                 .filter(|_| hop < last)
                 .map_or(1.0, |measured| {
-                    self.scenario.judge.louder(after.x_m, measured).max(1.0)
+                    self.scenario
+                        .reference
+                        .sir_ratio(after.x_m, measured)
+                        .max(1.0)
                 });
             prop_assert!(
                 sir * louder >= f64::from(target) * (1.0 - MISS),
@@ -196,20 +199,26 @@ impl<'a> World<'a> {
         let suspended = self.relays[to].phase() == Phase::ViewChange;
         self.relays[to].handle_bytes(self.now, port, bytes);
         let after = self.relays[to].stats();
-        let is_taken = taken(after) > taken(&before);
+        let is_taken = accepted_count(after) > accepted_count(&before);
         let known = (&self.scenario.settings[to], self.scenario.relays());
-        self.ledgers[to].heard(from, ended, is_taken.then_some(frame), known, self.now)?;
+        self.ledgers[to].on_received(from, ended, is_taken.then_some(frame), known, self.now)?;
         if let Some(pass) = pass(&frame.bytes).filter(|_| is_taken) {
-            let met =
-                self.ledgers[to].meets(self.scenario, pass, stands, suspended, &before, after)?;
+            let met = self.ledgers[to].check_received(
+                self.scenario,
+                pass,
+                stands,
+                suspended,
+                &before,
+                after,
+            )?;
             self.tally.add(match met {
-                Met::TakenUp => "passes taken up",
-                Met::Again => "passes again",
-                Met::Late => "stragglers",
-                Met::Foreign => "foreign passes",
+                PassClass::Accepted => "passes taken up",
+                PassClass::Again => "passes again",
+                PassClass::Late => "stragglers",
+                PassClass::Foreign => "foreign passes",
             });
         }
-        self.ledgers[to].look_up(&self.relays[to])
+        self.ledgers[to].check_view(&self.relays[to])
     }
 
     fn next_timer(&self) -> Option<Instant> {

@@ -9,8 +9,8 @@ use uav_relay::{
 use uav_relay_oracle::reference::joint::Place;
 
 use super::Checked;
+use super::accepted_frames::{AcceptedFrames, accepted_count, refused_count};
 use super::scenario::Scenario;
-use super::seal::{Taken, refused, taken};
 use super::signs::{LONGEST, QUESTIONS, Signs};
 use super::wires::{Ended, Flying, message};
 
@@ -45,7 +45,7 @@ pub(crate) struct Ledger {
     /// Record of the relay's votes in its flash, after the last vote.
     pub(crate) record: Option<ViewRecord>,
     /// Signed frames that the relay has accepted since its last start.
-    taken: Taken,
+    accepted: AcceptedFrames,
 }
 
 /// Returns the shortest interval of heartbeat requests to a neighbour. The channel's capacity limits it.
@@ -74,7 +74,7 @@ fn side(of: Side) -> usize {
     usize::from(of == Side::Downstream)
 }
 
-fn as_told(place: Placement) -> Place {
+fn to_f64(place: Placement) -> Place {
     Place::in_plane(f64::from(place.x_m), f64::from(place.altitude_m))
 }
 
@@ -96,7 +96,7 @@ impl Ledger {
             measured_per_w: None,
             epoch,
             record: None,
-            taken: Taken::default(),
+            accepted: AcceptedFrames::default(),
         }
     }
 
@@ -114,7 +114,7 @@ impl Ledger {
 
     /// Records frames that the relay received from the neighbour at `from`. `taken` is the frame that the relay
     /// accepted, if any.
-    pub(crate) fn heard(
+    pub(crate) fn on_received(
         &mut self,
         from: Side,
         ended: Ended,
@@ -131,19 +131,19 @@ impl Ledger {
         prop_assert!(ended.intact > 0, "a broken frame is taken");
         let tick = tick(settings, relays);
         if settings.auth.is_some() {
-            self.taken.take(side(from), bytes, *seal, self.epoch)?;
+            self.accepted.accept(side(from), bytes, *seal, self.epoch)?;
         }
         if let Some(message) = message(bytes) {
-            self.signs[side(from)].heard(&message, tick, now);
+            self.signs[side(from)].on_received(&message, tick, now);
             self.leased(&message);
         }
         Ok(())
     }
 
     /// Records a message that the relay sends to its neighbour at `to`.
-    pub(crate) fn told(&mut self, to: Side, message: &Message, now: Instant) {
+    pub(crate) fn on_sent(&mut self, to: Side, message: &Message, now: Instant) {
         if let Message::Heartbeat { request: 1.., .. } = message {
-            self.signs[side(to)].ask(message, now);
+            self.signs[side(to)].on_request(message, now);
         }
         self.leased(message);
     }
@@ -169,7 +169,7 @@ impl Ledger {
         self.measure(turn.relay);
         self.follow(turn)?;
         self.bounds(scenario, at)?;
-        self.aim(scenario, turn)?;
+        self.check_target(scenario, turn)?;
         self.count(scenario, turn.relay.stats())?;
         self.miss(scenario, at, turn)?;
         Ok(before != (self.place, self.target, self.holding))
@@ -203,7 +203,7 @@ impl Ledger {
 
     /// Checks that a relay never loses its setpoint, and reports each change of it by an event.
     fn follow(&mut self, turn: &Turn) -> Checked {
-        let place = turn.relay.setpoint().map(as_told);
+        let place = turn.relay.setpoint().map(to_f64);
         let told = turn.events.contains(&Event::SetpointChanged);
         prop_assert!(
             place.is_some() || self.place.is_none(),
@@ -244,7 +244,7 @@ impl Ledger {
     }
 
     /// Checks that a relay holds its position only for a target SIR that the chain can meet.
-    fn aim(&mut self, scenario: &Scenario, turn: &Turn) -> Checked {
+    fn check_target(&mut self, scenario: &Scenario, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let target = relay.target();
         prop_assert_eq!(
@@ -273,7 +273,7 @@ impl Ledger {
             let measured = [self.measured_per_w, turn.measured_per_w];
             let measured = measured.into_iter().flatten().reduce(f64::max);
             prop_assert!(
-                scenario.judge.may_meet(f64::from(target), measured),
+                scenario.reference.can_meet(f64::from(target), measured),
                 "no chain meets {target:e}"
             );
         }
@@ -304,8 +304,12 @@ impl Ledger {
             "a counter has fallen: {rising:?}"
         );
         prop_assert_eq!(stats.sent, self.sent);
-        let refused = refused(stats);
-        prop_assert_eq!(taken(stats) + refused, self.ended.intact, "intact frames");
+        let refused = refused_count(stats);
+        prop_assert_eq!(
+            accepted_count(stats) + refused,
+            self.ended.intact,
+            "intact frames"
+        );
         prop_assert!(scenario.signs() || refused == 0, "refused: {}", refused);
         prop_assert_eq!(
             stats.oversized + stats.truncated + stats.crc,
@@ -341,7 +345,7 @@ impl Ledger {
             match event {
                 Event::NeighbourLost { side: of, .. } => {
                     let signs = &mut self.signs[side(*of)];
-                    let silence = turn.now.since(signs.surely);
+                    let silence = turn.now.since(signs.certainly_alive);
                     prop_assert!(
                         silence >= scenario.settings[at].dead_after,
                         "missed too soon by relay {}",
@@ -364,14 +368,14 @@ impl Ledger {
             let idle = !looks || signs.missed;
             let asked = signs.asked.last().map_or(signs.last, |(_, asked)| *asked);
             // Questions are checked once per tick. The bound shows only in a turn with another cause, for example a claim.
-            let due = (signs.perhaps + settings.probe_after).max(signs.last) + tick;
+            let due = (signs.possibly_alive + settings.probe_after).max(signs.last) + tick;
             // Signed questions wait for the handshake.
             prop_assert!(
                 idle || scenario.signs() || turn.now <= due.max(asked + tick),
                 "not asked by relay {}: {signs:?}",
                 at + 1
             );
-            let last = (signs.perhaps + longest.max(most)).max(signs.last + tick) + tick;
+            let last = (signs.possibly_alive + longest.max(most)).max(signs.last + tick) + tick;
             let misses = turn.now >= last || signs.is_to_be_missed(most, longest);
             prop_assert!(idle || !misses, "not missed by relay {}: {signs:?}", at + 1);
         }

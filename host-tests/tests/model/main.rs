@@ -4,12 +4,12 @@
 //! | --- | --- |
 //! | `operation` | operations on a chain and their distribution |
 //! | `scenario` | random missions |
-//! | `judge` | best performance of a mission's chain, in f64 |
+//! | `reference` | best performance of a mission's chain, in f64 |
 //! | `wires` | frames in flight and their expected counts |
 //! | `ledger` | observed state of one relay, and rules that it may not break |
 //! | `chain` | connected relays and the clock, with the rules of neighbours |
-//! | `deed` | effect of each operation |
-//! | `seal` | signed frames: accepted once, in the lives in which they were sent |
+//! | `effect` | effect of each operation |
+//! | `accepted_frames` | signed frames: accepted once, in the lives in which they were sent |
 //! | `passes` | passes in which a relay may take part |
 //! | `recovery` | recovery from any state to one agreement |
 //! | `tally` | coverage counters |
@@ -23,15 +23,15 @@ use proptest::collection::vec;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestError, TestRunner};
 use uav_relay_oracle::random;
 
+mod accepted_frames;
 mod chain;
-mod deed;
-mod judge;
+mod effect;
 mod ledger;
 mod operation;
 mod passes;
 mod recovery;
+mod reference;
 mod scenario;
-mod seal;
 mod signs;
 mod tally;
 mod wires;
@@ -100,5 +100,5 @@ fn no_sequence_of_operations_breaks_a_rule() {
         ),
         Err(TestError::Abort(reason)) => panic!("{}", reason.message()),
     }
-    tally.into_inner().judge(count());
+    tally.into_inner().assert_coverage(count());
 }

@@ -36,8 +36,8 @@ const fn next(last: u16) -> u16 {
 
 /// Classification of a received pass, a message that travels along the chain.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Met {
-    TakenUp,
+pub(crate) enum PassClass {
+    Accepted,
     Again,
     /// Classification: a late pass, which is over already.
     Late,
@@ -47,7 +47,7 @@ pub(crate) enum Met {
 
 impl Ledger {
     /// Checks that a relay's membership view never goes back. A new view begins without a pass.
-    pub(crate) fn look_up(&mut self, relay: &Relay) -> Checked {
+    pub(crate) fn check_view(&mut self, relay: &Relay) -> Checked {
         let view = relay.view();
         prop_assert!(view >= self.view, "{view:?} after {:?}", self.view);
         if view > self.view {
@@ -60,7 +60,7 @@ impl Ledger {
     /// Checks how a relay counts a received pass. Returns the pass's classification.
     ///
     /// `stands`: the relay has a position. `suspended`: it may be in a view change.
-    pub(crate) fn meets(
+    pub(crate) fn check_received(
         &mut self,
         scenario: &Scenario,
         pass: Pass,
@@ -68,17 +68,19 @@ impl Ledger {
         suspended: bool,
         before: &Stats,
         after: &Stats,
-    ) -> Checked<Met> {
+    ) -> Checked<PassClass> {
         let view = digest(&scenario.mission).wrapping_add(mark(self.view));
-        let met = match self.rule(pass.number) {
-            _ if pass.digest != view => Met::Foreign,
+        let met = match self.classify(pass.number) {
+            _ if pass.digest != view => PassClass::Foreign,
             // The relay's view is being changed.
-            _ if suspended => Met::Late,
+            _ if suspended => PassClass::Late,
             // A pass that moves relays needs a position to move.
-            Met::TakenUp if pass.moves && !stands => Met::Foreign,
+            PassClass::Accepted if pass.moves && !stands => PassClass::Foreign,
             // The relay rebooted during the previous pass and does not know the others' profiles.
-            Met::TakenUp if pass.follows && self.begins_anew() && after.stale > before.stale => {
-                Met::Foreign
+            PassClass::Accepted
+                if pass.follows && self.repeats_first_pass() && after.stale > before.stale =>
+            {
+                PassClass::Foreign
             }
             met => met,
         };
@@ -92,41 +94,45 @@ impl Ledger {
         let stale = after.stale - before.stale;
         let again = after.repeated - before.repeated;
         let counted = match met {
-            Met::TakenUp => stale == 0 && again == 0,
+            PassClass::Accepted => stale == 0 && again == 0,
             // A pass that differs in more than its number is of another life.
-            Met::Again => stale + again == 1,
-            Met::Late => stale == 1,
-            Met::Foreign => stale + other == 1,
+            PassClass::Again => stale + again == 1,
+            PassClass::Late => stale == 1,
+            PassClass::Foreign => stale + other == 1,
         };
         prop_assert!(counted, "{pass:?} is {met:?} after {:?}", self.pass);
-        if met == Met::TakenUp {
+        if met == PassClass::Accepted {
             self.pass = Some(pass.number);
         }
         Ok(met)
     }
 
     /// Returns true if the relay takes part in the first pass of its membership view again, after a reboot.
-    pub(crate) fn begins_anew(&self) -> bool {
+    pub(crate) fn repeats_first_pass(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))
     }
 
-    fn rule(&self, number: u16) -> Met {
+    fn classify(&self, number: u16) -> PassClass {
         let is_first = number.is_multiple_of(FIRST);
         let Some(last) = self.pass else {
-            return if is_first { Met::TakenUp } else { Met::Foreign };
+            return if is_first {
+                PassClass::Accepted
+            } else {
+                PassClass::Foreign
+            };
         };
         let (ahead, behind) = (number.wrapping_sub(last), last.wrapping_sub(number));
         match () {
-            () if ahead == 0 => Met::Again,
-            () if number == next(last) => Met::TakenUp,
-            () if behind <= NEAR => Met::Late,
-            () => Met::Foreign,
+            () if ahead == 0 => PassClass::Again,
+            () if number == next(last) => PassClass::Accepted,
+            () if behind <= NEAR => PassClass::Late,
+            () => PassClass::Foreign,
         }
     }
 
     /// Checks a pass that the relay sends. It must be the accepted one or, at the leader, a new one.
-    pub(crate) fn says(&mut self, scenario: &Scenario, leads: bool, pass: Pass) -> Checked {
+    pub(crate) fn check_sent(&mut self, scenario: &Scenario, leads: bool, pass: Pass) -> Checked {
         let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         prop_assert_eq!(pass.digest, view, "a pass of another view is said");
         match self.pass {

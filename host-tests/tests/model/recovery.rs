@@ -61,7 +61,7 @@ impl World<'_> {
         // Lost handshakes are repeated after enough silence.
         let greets = if self.scenario.signs() { 2 } else { 0 };
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
-        let silence_us = greets * probe_after_us + 2 * self.a_call().as_micros();
+        let silence_us = greets * probe_after_us + 2 * self.view_request_time().as_micros();
         // A view may need a relay that rebooted and forgot it: positions are not used before its lease has expired.
         let lease_us = self.scenario.settings[0].dead_after.as_micros();
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
@@ -69,19 +69,19 @@ impl World<'_> {
 
     /// Returns the longest time that a request for a new view takes to the leader. Each relay may wait for
     /// `probe_after` before it forwards the request.
-    fn a_call(&self) -> Duration {
+    fn view_request_time(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;
         let probe_after_us = self.scenario.settings[0].probe_after.as_micros();
         Duration::from_micros(calls * probe_after_us)
     }
 
     /// Checks that Algorithm 2's agreed target equals the SIR of its worst hop. Other methods may leave a margin.
-    fn is_as_good_as_it_says(&self) -> Checked {
+    fn check_stated_target(&self) -> Checked {
         if self.scenario.kind == Kind::Adjust
             && let Some(target) = self.ledgers[0].target
         {
             let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
-            let hops = self.scenario.judge.hops(&places);
+            let hops = self.scenario.reference.hops(&places);
             let worst = hops.into_iter().fold(f64::INFINITY, f64::min);
             prop_assert!(
                 (worst / f64::from(target) - 1.0).abs() <= MISS,
@@ -95,7 +95,7 @@ impl World<'_> {
     fn settle(&mut self, at_most: Duration) -> Checked {
         for _ in 0..MOST_VIEWS {
             let views: Vec<ViewId> = self.relays.iter().map(Relay::view).collect();
-            let until = self.now + self.a_call();
+            let until = self.now + self.view_request_time();
             while self.flow(until)? {}
             if self.relays.iter().map(Relay::view).eq(views) {
                 return Ok(());
@@ -124,7 +124,7 @@ impl World<'_> {
             prop_assert_eq!(target, Some(self.scenario.calm.target), "another target");
             prop_assert_eq!(&places, &self.scenario.calm.places, "other places");
         }
-        self.is_as_good_as_it_says()?;
+        self.check_stated_target()?;
         let until = self.now + Duration::from_millis(WATCH_MS);
         while self.flow(until)? {}
         prop_assert_eq!(&self.places(), &places, "moved after the agreement");

@@ -13,10 +13,10 @@ use uav_relay_oracle::random::{Chain, Style, link as random_link, log_uniform};
 use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{self, Link};
 
 use super::chain::World;
-use super::judge::Judge;
+use super::reference::Reference;
 
 /// Number of samples that a relay averages at one position.
 pub(crate) const SAMPLES: u32 = 100;
@@ -72,7 +72,7 @@ pub(crate) struct Scenario {
     pub(crate) kind: Kind,
     pub(crate) mission: Mission,
     pub(crate) settings: Vec<Settings>,
-    pub(crate) judge: Judge,
+    pub(crate) reference: Reference,
     pub(crate) calm: Calm,
 }
 
@@ -138,7 +138,7 @@ pub(crate) fn pool(seed: u64, count: u32) -> Vec<Scenario> {
 
 /// Draws a mission of a kind; `None` if no chain can fly it.
 fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
-    let (mission, settings, judge) = match kind {
+    let (mission, settings, reference) = match kind {
         Kind::Predicted | Kind::Tried => aligned(rng, kind)?,
         Kind::Altitude | Kind::Adjust => joint(rng, kind)?,
         Kind::Field | Kind::Measured => in_a_field(rng, kind)?,
@@ -147,7 +147,7 @@ fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
         kind,
         mission,
         settings,
-        judge,
+        reference,
         calm: Calm {
             places: Vec::new(),
             target: 0,
@@ -161,7 +161,7 @@ fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
     Some(scenario)
 }
 
-type Parts = (Mission, Vec<Settings>, Judge);
+type Parts = (Mission, Vec<Settings>, Reference);
 
 /// Returns the settings of each relay, with its own profile if `own` has one.
 fn settings(relays: usize, common: Settings, own: &[(u16, Profile)]) -> Vec<Settings> {
@@ -194,7 +194,7 @@ fn aligned(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     };
     let optimum = link.optimum()?;
     let settings = settings(link.len(), common, &own);
-    Some((mission, settings, Judge::Source { link, optimum }))
+    Some((mission, settings, Reference::Source { link, optimum }))
 }
 
 /// Returns the link and altitude limits of random scene `number`, below [`SCENES`]. Its optimum is recorded.
@@ -257,7 +257,7 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
         ..link.clone()
     };
     let optimum = optimum(&unseparated, corridor, &[]).unwrap()?.sir;
-    Some((mission, settings, Judge::Source { link, optimum }))
+    Some((mission, settings, Reference::Source { link, optimum }))
 }
 
 /// Draws the parameters of Algorithm 2. Moves are up to a fraction of the highest altitude, `most_m`.
@@ -281,7 +281,7 @@ fn in_a_field(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     let relays = rng.random_range(2..=6_u8);
     let points = rng.random_range(1..=4_u8);
     let distance_m = round(log_uniform(rng, 100.0, 1e4));
-    let relay = Station {
+    let relay = reference::Relay {
         altitude_m: round(distance_m * log_uniform(rng, 0.005, 0.1)),
         power_w: round(log_uniform(rng, 0.1, 10.0)),
     };
@@ -322,5 +322,5 @@ fn in_a_field(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
         ..Settings::default()
     };
     let settings = vec![common; usize::from(relays)];
-    Some((mission, settings, Judge::Field(link)))
+    Some((mission, settings, Reference::Field(link)))
 }

@@ -18,15 +18,15 @@ pub(crate) const LONGEST: u32 = 8;
 pub(crate) struct Signs {
     /// Number and time of every heartbeat request to the neighbour.
     pub(crate) asked: Vec<(u16, Instant)>,
-    /// Last time when the neighbour was certainly alive. `perhaps` is the last time when it may have been.
-    pub(crate) surely: Instant,
-    pub(crate) perhaps: Instant,
+    /// Last time when the neighbour was certainly alive. `possibly_alive` is the last time when it may have been.
+    pub(crate) certainly_alive: Instant,
+    pub(crate) possibly_alive: Instant,
     /// Time at which the last possible sign of life was received.
     pub(crate) last: Instant,
     /// Number of requests since the last certain sign of life. The next fields are the number since the last possible
     /// sign, and the most before a certain one.
     pub(crate) open: usize,
-    pub(crate) perhaps_open: usize,
+    pub(crate) open_since_possible: usize,
     pub(crate) most_open: usize,
     /// True while the relay reports the neighbour as lost.
     pub(crate) missed: bool,
@@ -36,28 +36,28 @@ impl Signs {
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             asked: Vec::new(),
-            surely: now,
-            perhaps: now,
+            certainly_alive: now,
+            possibly_alive: now,
             last: now,
             open: 0,
-            perhaps_open: 0,
+            open_since_possible: 0,
             most_open: QUESTIONS,
             missed: false,
         }
     }
 
-    pub(crate) fn ask(&mut self, message: &Message, now: Instant) {
+    pub(crate) fn on_request(&mut self, message: &Message, now: Instant) {
         if let Message::Heartbeat { request: ask, .. } = message {
             self.asked.push((*ask, now));
             self.open += 1;
-            self.perhaps_open += 1;
+            self.open_since_possible += 1;
             self.most_open = self.most_open.max(self.open);
         }
     }
 
     /// Records signs of life of the neighbour. A reply proves life at the time of its request; a pass or a lease
     /// renewal may prove it on reception.
-    pub(crate) fn heard(&mut self, message: &Message, tick: Duration, now: Instant) {
+    pub(crate) fn on_received(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
             Message::Heartbeat { reply: answer, .. } => {
                 let known = self.asked.iter().rev().find(|(number, _)| number == answer);
@@ -65,11 +65,11 @@ impl Signs {
                     return;
                 };
                 self.last = now;
-                self.perhaps_open = 0;
-                self.perhaps = self.perhaps.max(*asked);
+                self.open_since_possible = 0;
+                self.possibly_alive = self.possibly_alive.max(*asked);
                 // So few questions followed this one that it must still be open.
                 if now.since(*asked) < tick.times(OPEN) {
-                    self.surely = self.surely.max(*asked);
+                    self.certainly_alive = self.certainly_alive.max(*asked);
                     self.open = 0;
                 }
             }
@@ -82,8 +82,8 @@ impl Signs {
             | Message::Claim(_) => {}
             // Lease renewal, pass, or result of a pass.
             _ => {
-                (self.last, self.perhaps) = (now, now);
-                self.perhaps_open = 0;
+                (self.last, self.possibly_alive) = (now, now);
+                self.open_since_possible = 0;
             }
         }
     }
@@ -94,8 +94,8 @@ impl Signs {
         let Some((_, asked)) = self.asked.last() else {
             return false;
         };
-        let silent = asked.since(self.perhaps);
-        let enough = self.perhaps_open > MARGIN * self.most_open;
+        let silent = asked.since(self.possibly_alive);
+        let enough = self.open_since_possible > MARGIN * self.most_open;
         silent >= most && (enough || silent >= longest)
     }
 }

@@ -63,7 +63,7 @@ impl Tally {
     }
 
     /// Prints the counters. Panics if an expected event is too rare in `sequences` sequences.
-    pub(crate) fn judge(&self, sequences: u32) {
+    pub(crate) fn assert_coverage(&self, sequences: u32) {
         println!("{sequences} sequences: {:?}", self.counts);
         println!("at most: {:?}", self.most);
         for (kind, took_us) in &self.took_us {

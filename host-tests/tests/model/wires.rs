@@ -7,7 +7,7 @@ use uav_relay::wire::frame;
 use uav_relay::wire::message::Message;
 use uav_relay::{Duration, Instant, Port};
 
-use super::seal::Seal;
+use super::accepted_frames::EpochPair;
 
 /// Time that a frame takes to a neighbour without faults.
 pub(crate) const FLIGHT: Duration = Duration::from_millis(5);
@@ -22,7 +22,7 @@ const RECORDED: usize = 64;
 pub(crate) struct Flying {
     pub(crate) bytes: Vec<u8>,
     pub(crate) due: Instant,
-    pub(crate) seal: Seal,
+    pub(crate) seal: EpochPair,
 }
 
 #[derive(Debug, Default)]

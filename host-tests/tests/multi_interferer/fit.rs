@@ -38,29 +38,29 @@ fn count(case: &Case, name: &str) -> u32 {
 /// Compares the single interferer fitted to several ones with values of a separate program. That program integrates
 /// errors by the midpoint rule on nx x nh cells.
 #[test]
-fn the_cases_of_a_separate_program_are_met() {
+fn the_fit_agrees_with_the_reference_program() {
     let cases = cases::of("hyp_msi").unwrap();
     assert_eq!(cases.len(), 2);
     for case in cases {
         let scene = of_case(&case);
         let raster = Raster::even(&scene, count(&case, "nx"), count(&case, "nh"));
         let part = |name| case.part(name).unwrap();
-        let theirs = raster.weigh(part("xH"), part("yH"));
+        let theirs = raster.best_power(part("xH"), part("yH"));
         assert!(above(theirs.error, part("err")).abs() < 1e-12);
         assert!(above(theirs.power_w, part("pH")).abs() < 1e-12);
         assert!(above(theirs.error / raster.total(), part("rel_err")).abs() < 1e-12);
         let on_theirs = fit(&scene, &raster).unwrap();
         let ours = hypothetical(&scene).unwrap();
         let fine = Raster::graded(&scene, None, 500_000);
-        let truly = |x, y| fine.weigh(x, y).error;
+        let truly = |x, y| fine.best_power(x, y).error;
         let gained = above(truly(ours.x_m, ours.y_m), truly(part("xH"), part("yH")));
-        let there = above(raster.weigh(ours.x_m, ours.y_m).error, part("err"));
+        let there = above(raster.best_power(ours.x_m, ours.y_m).error, part("err"));
         println!(
             "{}: on its raster {:.1e} above its error; by our raster {there:.1e}, and {gained:.1e} on a fine one; {ours:?}",
             case.id,
-            above(on_theirs.weighed.error, part("err")),
+            above(on_theirs.best_power.error, part("err")),
         );
-        assert!(above(on_theirs.weighed.error, part("err")) < 1e-9);
+        assert!(above(on_theirs.best_power.error, part("err")) < 1e-9);
         assert!(there < 1e-5 && gained < 1e-7);
         assert!(above(ours.relative_error, part("rel_err")).abs() < case.rtol);
         let mean = part("err") / (case.params.d * (case.params.h_max - case.params.h_min));
@@ -84,7 +84,7 @@ fn one_source_is_its_own_hypothetical_interferer() {
 }
 
 #[test]
-fn equal_sources_at_one_place_are_one_of_their_common_power() {
+fn equal_sources_at_one_position_are_one_of_their_sum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(73));
     for copies in 2..=5_u32 {
         let mut scene = scene(&mut rng, 1..=1, 1..=1);
@@ -113,7 +113,7 @@ fn the_rasters_are_fine_enough() {
         println!("{} sources: {:?}", scene.sources.len(), started.elapsed());
         let error = |most, also| {
             let raster = Raster::graded(&scene, also, most);
-            raster.weigh(found.x_m, found.y_m).error / raster.total()
+            raster.best_power(found.x_m, found.y_m).error / raster.total()
         };
         let best = error(600_000, Some((found.x_m, found.y_m)));
         search = search.max(above(error(4_000, None), best).abs());
@@ -182,7 +182,7 @@ fn extreme_scenes_have_a_finite_fit() {
 /// Checks that the fitted interferer is on the true ones' side if lateral offsets are permitted. Without lateral
 /// offsets, its side is always positive.
 #[test]
-fn with_room_beside_the_line_the_side_is_known() {
+fn with_lateral_range_the_fit_is_on_the_right_side() {
     let source = |x_m: f64, y_m: f64| Source {
         power_w: 50.0,
         x_m,

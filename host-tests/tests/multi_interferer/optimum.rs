@@ -33,7 +33,7 @@ pub(crate) fn checked(scene: &Scene, chain: multi_interferer::Chain) -> multi_in
 }
 
 #[test]
-fn of_one_source_it_is_the_optimum_of_the_reference() {
+fn for_one_source_the_optimum_is_that_of_the_reference() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(76));
     let (mut worst, mut hopeless) = (0.0_f64, 0);
     for at in 0..600 {
@@ -91,7 +91,7 @@ fn brute_force_finds_the_same() {
 }
 
 #[test]
-fn what_has_no_best_chain_has_none() {
+fn a_scene_without_an_optimum_has_none() {
     let paper = |n| of_link(&Link::paper(n));
     assert!(optimum(&paper(3)).is_some());
     let mut uneven = paper(3);

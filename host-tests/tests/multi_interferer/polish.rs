@@ -51,7 +51,7 @@ fn checked(scene: &Scene, start: &[impl Copy + Into<Place>], band: Corridor) -> 
 /// Checks that polishing at one altitude never exceeds the optimum. From even positions it comes near the optimum in
 /// three of four scenes.
 #[test]
-fn at_one_altitude_it_stays_below_the_optimum() {
+fn at_one_altitude_polishing_stays_below_the_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(79));
     let (mut reached, mut start_reached, count) = (0, 0, 150);
     for _ in 0..count {
@@ -76,7 +76,7 @@ fn at_one_altitude_it_stays_below_the_optimum() {
 
 /// Checks that polishing comes near the joint optimum for one source, without exceeding it.
 #[test]
-fn in_a_band_it_comes_near_the_joint_optimum() {
+fn in_a_band_polishing_comes_near_the_joint_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(80);
     let (mut near, mut common_near, mut compared) = (0, 0, 0);
     while compared < 20 {
@@ -127,7 +127,7 @@ fn with_several_sources_in_a_band_the_rules_are_kept() {
 
 /// Checks that polishing with lateral offsets never lowers the SIR, and keeps to their permitted range.
 #[test]
-fn with_room_to_the_side_it_gains() {
+fn with_lateral_range_polishing_gains() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(83));
     let mut gained = 0;
     for _ in 0..40 {
@@ -146,7 +146,7 @@ fn with_room_to_the_side_it_gains() {
 }
 
 #[test]
-fn a_start_that_is_no_chain_is_refused() {
+fn an_invalid_start_is_refused() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(82));
     let scene = scene(&mut rng, 3..=3, 2..=5);
     let start = even(&scene, scene.band.least_m);

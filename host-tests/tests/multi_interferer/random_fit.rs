@@ -15,7 +15,7 @@ const DRAWN: usize = 20_000;
 const WEIGHED: usize = 100;
 
 #[test]
-fn no_random_place_is_better() {
+fn no_random_position_fits_better() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(75));
     let mut nearest = f64::INFINITY;
     for at in 0..20 {
@@ -30,16 +30,16 @@ fn no_random_place_is_better() {
             .map(|_| {
                 let x = rng.random_range(low..=high);
                 let y = log_uniform(&mut rng, 1e-3 * d, 10.0 * d);
-                (rough.weigh(x, y).error, x, y)
+                (rough.best_power(x, y).error, x, y)
             })
             .collect();
         drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = drawn
             .iter()
             .take(WEIGHED)
-            .map(|&(_, x, y)| raster.weigh(x, y).error)
+            .map(|&(_, x, y)| raster.best_power(x, y).error)
             .fold(f64::INFINITY, f64::min);
-        let margin = above(best, found.weighed.error);
+        let margin = above(best, found.best_power.error);
         nearest = nearest.min(margin);
         assert!(
             margin > -1e-9,

@@ -3,8 +3,8 @@
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::{log_uniform, seed};
-use uav_relay_oracle::reference::{Link, Station};
-use uav_relay_scenario::scene::{Relay, Scene};
+use uav_relay_oracle::reference::{Link, Relay};
+use uav_relay_scenario::scene::{self, Scene};
 use uav_relay_scenario::{Field, Interference, RelayOverride, Scenario, Source};
 
 use super::above;
@@ -44,7 +44,7 @@ fn the_inverse_sirs_of_the_sources_add_up() {
 }
 
 fn alone(scene: &Scene, source: &Source) -> Link {
-    let station = |relay: &Relay| Station {
+    let station = |relay: &scene::Relay| Relay {
         altitude_m: relay.altitude_m,
         power_w: relay.power_w,
     };
@@ -64,7 +64,7 @@ fn alone(scene: &Scene, source: &Source) -> Link {
 }
 
 #[test]
-fn a_scene_is_what_the_scenario_says() {
+fn a_scene_has_the_scenarios_values() {
     let mut scenario = Scenario {
         altitude_max_m: 300.0,
         ..Scenario::default()
@@ -88,7 +88,7 @@ fn a_scene_is_what_the_scenario_says() {
     ] {
         assert!(above(ours, theirs).abs() < 1e-14);
     }
-    let relay = |altitude_m, power_w, holds| Relay {
+    let relay = |altitude_m, power_w, holds| scene::Relay {
         altitude_m,
         power_w,
         holds,

@@ -69,7 +69,7 @@ fn the_optimum_is_found_in_noise() {
 
 /// Checks that different relays in noise meet their agreed target SIR. It is never above the optimum.
 #[test]
-fn mixed_chains_in_noise_meet_what_they_agree_on() {
+fn different_relays_in_noise_meet_the_agreed_target() {
     let mut rng = generator(1103);
     let mut all = Mixed::default();
     let style = Style {

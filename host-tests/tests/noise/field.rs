@@ -70,7 +70,7 @@ fn mission(points: &[(f32, f32)], noise_w: f32, relays: u16) -> Result<Mission, 
 
 /// Checks that noise power N acts as if each Upsilon = E[1/I] were Upsilon / (1 + N Upsilon).
 #[test]
-fn a_chain_in_a_noisy_field_is_that_of_its_table() {
+fn a_chain_in_a_noisy_field_follows_its_table() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(1131));
     for round in 0..300 {
         let noise_w = log_uniform(&mut rng, 1e-13, 1e-8) as f32;

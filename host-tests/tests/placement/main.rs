@@ -116,7 +116,7 @@ fn the_optimum_is_found_on_random_links() {
 /// Checks that relays of different altitudes and powers meet their agreed target SIR. It may be below the optimum,
 /// but not above.
 #[test]
-fn mixed_chains_meet_what_they_agree_on() {
+fn chains_of_different_relays_meet_the_agreed_target() {
     let mut all = Mixed::default();
     let style = Style {
         relays: 2..=50,
@@ -135,7 +135,7 @@ fn mixed_chains_meet_what_they_agree_on() {
 /// Checks a chain that can meet an SIR of 37 743 but not one of 31 292. A search must not oscillate between them for
 /// ever.
 #[test]
-fn a_target_that_is_met_counts_though_a_lower_one_is_missed() {
+fn a_feasible_target_counts_above_an_infeasible_one() {
     let mut rng = ChaCha8Rng::seed_from_u64(124);
     let style = Style {
         relays: 2..=50,

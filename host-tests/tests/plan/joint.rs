@@ -40,7 +40,7 @@ fn agreed(scenario: &Scenario, relays: u16) -> f64 {
     let mut setup = Setup::new(mission);
     setup.settings.method = Method::Joint;
     setup.profiles.clone_from(&own);
-    setup.held = mission::held(scenario, relays);
+    setup.held = mission::fixed_altitude_relays(scenario, relays);
     let outcome = chain::run(setup).unwrap();
     if outcome.ending != Ending::Settled {
         return 0.0;
@@ -107,7 +107,7 @@ fn short(scenario: &Scenario, relays: u16) -> f64 {
 }
 
 #[test]
-fn a_plan_is_what_the_relays_agree_on() {
+fn a_plan_has_the_positions_that_the_relays_agree_on() {
     let (above, beside) = (example("altitudes.toml"), example("side.toml"));
     let mut all: Vec<(Scenario, u16)> = Vec::new();
     for relays in [2, 3, 8, 20] {
@@ -133,7 +133,7 @@ fn a_plan_is_what_the_relays_agree_on() {
 }
 
 #[test]
-fn a_plan_for_relays_that_differ_is_what_they_agree_on() {
+fn a_plan_for_different_relays_is_what_they_agree_on() {
     let mut scenario = example("side.toml");
     for (index, altitude_m, power_w) in [
         (2, Some(100.0), None),
@@ -167,7 +167,7 @@ fn a_plan_for_relays_that_differ_is_what_they_agree_on() {
 /// Checks that the relays reach the SIR of the plan if one of them holds a high altitude. The others may have to take
 /// another side of the interferer.
 #[test]
-fn the_others_take_the_side_that_suits_a_held_altitude() {
+fn the_others_take_the_side_of_a_fixed_altitude() {
     for altitude_m in [60.0, 120.0, 200.0, 300.0] {
         let mut scenario = example("side.toml");
         let own = RelayOverride {
@@ -220,7 +220,7 @@ fn over_the_judge(number: u32, optimum: f64) -> f64 {
 ///
 /// The reference itself is short by 0.03 % at 566.
 #[test]
-fn a_plan_comes_near_the_optimum_of_the_judge() {
+fn a_plan_comes_near_the_references_optimum() {
     let optima = optima().unwrap();
     let count: Option<usize> = std::env::var("COUNT")
         .ok()
@@ -262,7 +262,7 @@ fn a_plan_comes_near_the_optimum_of_the_judge() {
 }
 
 #[test]
-fn the_fewest_for_a_target_use_the_room() {
+fn the_fewest_for_a_target_use_lateral_offsets() {
     let scenario = example("side.toml");
     let target = 0.999 * free(&scenario, Number::Of(8)).sir();
     let fewest = free(&scenario, Number::Meeting(target));
@@ -288,7 +288,7 @@ fn the_fewest_for_a_target_use_the_room() {
 
 /// Checks that two interferers at one position are equivalent to one with the sum of their powers.
 #[test]
-fn two_interferers_in_one_place_are_one() {
+fn two_interferers_at_one_position_are_one() {
     let scenario = example("side.toml");
     let Interference::Sources(sources) = &scenario.interference else {
         panic!("{scenario:?}");

@@ -8,7 +8,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::recorded;
 use uav_relay_oracle::reference::joint::{self, Corridor, Place};
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_scenario::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, RelayOverride, Scenario, Source,
 };
@@ -141,7 +141,7 @@ fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
         eta: channel.eta(),
         noise_w: 0.0,
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: scenario.altitude_m,
                 power_w: scenario.uav_w,
             };
@@ -151,7 +151,7 @@ fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
 }
 
 #[test]
-fn plans_keep_every_limit_and_what_is_proven_is() {
+fn plans_keep_every_limit_and_proven_numbers_are_minimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(701));
     let (mut planned, mut unmet, mut proven, mut one_proven) = (0, 0, 0, 0);
     for _ in 0..count(250) {
@@ -256,7 +256,7 @@ fn places(plan: &Plan) -> impl Iterator<Item = Place> + '_ {
 
 /// Checks that plans with lateral offsets have the stated SIR, and come near the recorded optimum.
 #[test]
-fn plans_beside_the_line_are_worth_what_they_say() {
+fn plans_beside_the_line_have_the_stated_sir() {
     let mut rng = ChaCha8Rng::seed_from_u64(702);
     let mut ratios: Vec<f64> = Vec::new();
     let mut aside = 0;

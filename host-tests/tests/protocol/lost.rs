@@ -121,7 +121,7 @@ fn a_lost_neighbour_that_comes_back_is_reported_once_each_way() {
 type Change = fn(&mut Settings);
 
 #[test]
-fn what_a_relay_is_set_to_is_checked() {
+fn settings_are_checked() {
     use uav_relay::SetupError;
     use uav_relay::{Profile, Schedule};
     const UNKNOWN: Profile = Profile {

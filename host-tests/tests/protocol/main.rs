@@ -74,7 +74,7 @@ fn encode(sender: u16, destination: u16, message: &Message) -> Vec<u8> {
 }
 
 #[test]
-fn two_agree_in_two_frames_and_the_answer_is_repeated() {
+fn two_relays_agree_in_two_frames_and_repeat_the_answer() {
     let (mut head, mut tail) = (relay(mission(2), 1), relay(mission(2), 2));
     assert_eq!((head.phase(), tail.phase()), (Phase::Planning, Phase::Idle));
     let (now, sweep) = first_sweep(&mut head);
@@ -118,7 +118,7 @@ fn two_agree_in_two_frames_and_the_answer_is_repeated() {
 }
 
 #[test]
-fn a_sweep_is_repeated_and_a_waiting_relay_says_busy() {
+fn a_sweep_is_repeated_and_a_waiting_relay_sends_busy() {
     let (mut head, mut middle) = (relay(mission(3), 1), relay(mission(3), 2));
     let (mut now, sweep) = first_sweep(&mut head);
     middle.handle_bytes(now, Port::Upstream, &sweep);
@@ -170,7 +170,7 @@ fn a_relay_rebooted_during_a_pass_takes_part_again() {
 }
 
 #[test]
-fn relays_of_different_missions_ignore_each_other_and_say_so() {
+fn relays_of_different_missions_ignore_and_report_each_other() {
     let mut other = *mission(2).config();
     other.interference = Interference::Source(Interferer {
         y_m: 401.0,

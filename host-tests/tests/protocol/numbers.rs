@@ -28,7 +28,7 @@ fn again(tail: &mut Relay, sweep: &[u8], now: Instant, off: u16) {
 }
 
 /// Returns true if the relay requests a new membership view, at once or a millisecond later.
-fn calls(relay: &mut Relay, now: Instant) -> bool {
+fn requests_view(relay: &mut Relay, now: Instant) -> bool {
     let mut said = drain(relay, now);
     let later = now + Duration::from_millis(1);
     relay.handle_timeout(later);
@@ -40,7 +40,7 @@ fn calls(relay: &mut Relay, now: Instant) -> bool {
 }
 
 #[test]
-fn only_the_next_number_is_new_and_those_before_are_over() {
+fn only_the_next_pass_number_is_new() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     let number = sweep_in(&sweep).number;
     assert!(number.is_multiple_of(64), "{number}");
@@ -61,12 +61,12 @@ fn only_the_next_number_is_new_and_those_before_are_over() {
             }
             // Numbers 32 to 1 behind.
             0xFFE0.. => {
-                assert!(!calls(&mut tail, now), "{off}");
+                assert!(!requests_view(&mut tail, now), "{off}");
                 assert_eq!(stale, 1, "{off}");
                 found[1] += 1;
             }
             _ => {
-                assert!(calls(&mut tail, now), "{off}");
+                assert!(requests_view(&mut tail, now), "{off}");
                 assert_eq!(stale, 1, "{off}");
                 found[2] += 1;
             }
@@ -77,7 +77,7 @@ fn only_the_next_number_is_new_and_those_before_are_over() {
 }
 
 #[test]
-fn the_first_pass_of_another_life_is_never_the_next_one() {
+fn the_first_pass_after_a_reboot_is_never_the_next_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     // The chain is `last` passes beyond its first; the next first number is 64 after it.
     for last in [32, 62, 63] {
@@ -87,7 +87,7 @@ fn the_first_pass_of_another_life_is_never_the_next_one() {
         assert_eq!(tail.stats().stale, 0, "{last}");
         again(&mut tail, &sweep, now, 64);
         assert_eq!(tail.stats().stale, 1, "{last}");
-        assert!(calls(&mut tail, now), "{last}");
+        assert!(requests_view(&mut tail, now), "{last}");
         // The leader skips that number.
         again(&mut tail, &sweep, now, 65);
         let expected = if last == 63 { 1 } else { 2 };
@@ -98,14 +98,14 @@ fn the_first_pass_of_another_life_is_never_the_next_one() {
 /// Checks that a rebooted relay takes no part in a later pass. Before, it has received a delayed copy of the first
 /// pass.
 #[test]
-fn a_pass_that_was_held_up_lets_nobody_into_a_later_one() {
+fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(3), 1));
     let mut rebooted = relay(mission(3), 2);
     again(&mut rebooted, &sweep, now, 0);
     drain(&mut rebooted, now);
     again(&mut rebooted, &sweep, now, 5);
     assert_eq!(rebooted.stats().stale, 1);
-    assert!(calls(&mut rebooted, now));
+    assert!(requests_view(&mut rebooted, now));
     assert_eq!(rebooted.setpoint(), None);
 }
 
@@ -131,19 +131,19 @@ fn the_same_number_with_other_content_is_another_pass() {
         let other = which == 1 || which == 2;
         assert_eq!(tail.stats().stale - before.stale, u32::from(other));
         assert_eq!(tail.stats().repeated - before.repeated, u32::from(!other));
-        assert_eq!(calls(&mut tail, now), other, "{which}");
+        assert_eq!(requests_view(&mut tail, now), other, "{which}");
         assert_eq!(tail.setpoint(), setpoint);
     }
 }
 
 #[test]
-fn the_fourth_straggler_in_a_row_is_a_leader_that_insists() {
+fn the_fourth_late_pass_in_a_row_requests_a_view() {
     let (mut now, sweep) = first_sweep(&mut relay(mission(2), 1));
     let mut tail = after_two(&sweep, now, 1);
     for round in 0..3 {
         for _ in 0..3 {
             again(&mut tail, &sweep, now, 0);
-            assert!(!calls(&mut tail, now), "{round}");
+            assert!(!requests_view(&mut tail, now), "{round}");
             now = now + Duration::from_millis(1);
         }
         // The chain proceeds, so the three stragglers were late frames.
@@ -152,16 +152,16 @@ fn the_fourth_straggler_in_a_row_is_a_leader_that_insists() {
     }
     for _ in 0..3 {
         again(&mut tail, &sweep, now, 0);
-        assert!(!calls(&mut tail, now));
+        assert!(!requests_view(&mut tail, now));
         now = now + Duration::from_millis(1);
     }
     again(&mut tail, &sweep, now, 0);
-    assert!(calls(&mut tail, now));
+    assert!(requests_view(&mut tail, now));
     assert_eq!(tail.stats().stale, 13);
 }
 
 #[test]
-fn a_relay_that_missed_the_beginning_calls_for_another() {
+fn a_relay_that_missed_the_first_pass_requests_a_view() {
     let (now, sweep) = first_sweep(&mut relay(mission(2), 1));
     for (off, first) in [
         (0, true),
@@ -173,6 +173,6 @@ fn a_relay_that_missed_the_beginning_calls_for_another() {
         let mut tail = relay(mission(2), 2);
         again(&mut tail, &sweep, now, off);
         assert_eq!(tail.setpoint().is_some(), first, "{off}");
-        assert_eq!(calls(&mut tail, now), !first, "{off}");
+        assert_eq!(requests_view(&mut tail, now), !first, "{off}");
     }
 }

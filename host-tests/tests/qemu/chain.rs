@@ -47,7 +47,7 @@ pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
 const FLIGHTS: usize = 3;
 
 #[test]
-fn five_settle_where_the_simulated_chain_does() {
+fn five_drones_settle_like_the_simulation() {
     let flight = paper(5);
     let mut damaged = Vec::new();
     for _ in 0..FLIGHTS {
@@ -82,7 +82,7 @@ fn five_settle_where_the_simulated_chain_does() {
 }
 
 #[test]
-fn five_settle_there_through_a_bad_day() {
+fn five_drones_settle_like_the_simulation_with_faults() {
     let flight = paper(5);
     let expected = simulated(&flight);
     for seed in 1..=3 {
@@ -104,7 +104,7 @@ fn five_settle_there_through_a_bad_day() {
 
 /// Checks that the smallest firmware image agrees as the simulated chain does. It has no feature but the log.
 #[test]
-fn five_of_the_smallest_image_settle_there_too() {
+fn five_of_the_smallest_image_settle_like_the_simulation() {
     let flight = paper(5);
     for faults in [Faults::default(), BAD_DAY] {
         let mut fleet = Fleet::of(Image::Smallest, &flight, faults, 1);
@@ -120,7 +120,7 @@ fn five_of_the_smallest_image_settle_there_too() {
 
 /// Checks that the image with the runner of `uav_relay::asynch` agrees as the simulated chain does.
 #[test]
-fn five_on_asynchronous_ports_settle_there_too() {
+fn five_on_async_ports_settle_like_the_simulation() {
     let flight = paper(5);
     let expected = simulated(&flight);
     for faults in [Faults::default(), BAD_DAY] {
@@ -137,7 +137,7 @@ fn five_on_asynchronous_ports_settle_there_too() {
 
 /// Checks that an image without the configured method reports this and has no setpoint.
 #[test]
-fn the_smallest_image_refuses_what_it_cannot_do() {
+fn the_smallest_image_refuses_unsupported_methods() {
     let flight = paper(2).by(Method::Joint);
     let mut fleet = Fleet::of(Image::Smallest, &flight, Faults::default(), 1);
     fleet.wait("refusals", |lines| {
@@ -153,7 +153,7 @@ fn the_smallest_image_refuses_what_it_cannot_do() {
 
 #[test]
 #[ignore = "on demand: a chain of 20"]
-fn twenty_settle_where_the_simulated_chain_does() {
+fn twenty_drones_settle_like_the_simulation() {
     let flight = paper(20);
     let mut fleet = Fleet::of(Image::Wires, &flight, Faults::default(), 1);
     assert_eq!(fleet.places(), simulated(&flight));

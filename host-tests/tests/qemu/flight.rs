@@ -160,7 +160,7 @@ fn an_arducopter_flies_to_the_agreed_place() {
 
 /// Checks that a drone without configured sites sends no targets to its autopilot.
 #[test]
-fn a_drone_without_sites_tells_nobody() {
+fn a_drone_without_sites_sends_no_targets() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
     said(
         &mut fleet,

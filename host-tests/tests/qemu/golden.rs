@@ -30,7 +30,7 @@ fn here(heard: &[u8]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn the_target_makes_of_every_vector_what_this_machine_does() {
+fn the_target_handles_every_vector_like_the_host() {
     let vectors = Vectors::load().unwrap();
     assert!(vectors.frames.len() >= 20);
     let mut heard = Vec::new();

@@ -61,15 +61,15 @@ fn simulated(flight: &Flight) -> Outcome {
     let axis = unknown().line.unwrap().axis;
     let mut setup = Setup::new(*flight.mission());
     setup.settings.listen = flight.listen();
-    let mut sky = TrueInterference::of(scene());
+    let mut true_interference = TrueInterference::of(scene());
     for drone in 1..=RELAYS {
-        sky.handed.extend(places(drone).map(|place| {
+        true_interference.handed.extend(places(drone).map(|place| {
             let at = axis.place(axis.point(place).unwrap()).unwrap();
             let power_w = noise_w(noise(at)).unwrap();
             (drone, Sample::Heard { at, power_w })
         }));
     }
-    setup.sky = Some(sky);
+    setup.true_interference = Some(true_interference);
     run(setup).unwrap()
 }
 
@@ -83,7 +83,7 @@ fn last_setpoint(lines: &[Line], drone: u16) -> Option<[u32; 3]> {
 }
 
 #[test]
-fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_does() {
+fn three_drones_locate_an_interferer_like_the_simulation() {
     let flight = Flight::new(&unknown(), RELAYS, 1e-4, 7).unwrap();
     assert_eq!(
         flight.mission().config().interference,
@@ -95,7 +95,7 @@ fn three_find_an_interferer_by_their_radios_and_end_where_the_simulated_chain_do
         .iter()
         .map(|relay| bits(relay.setpoint.unwrap()))
         .collect();
-    let told = outcome.stands.last().unwrap().believed;
+    let told = outcome.snapshots.last().unwrap().believed;
     let InterferenceEstimate::Source { source, .. } = told.estimate else {
         panic!("{told:?}");
     };

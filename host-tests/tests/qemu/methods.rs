@@ -70,7 +70,7 @@ fn noisy(method: Method, most_m: f64) -> Flight {
 
 /// Checks that the iterative searches with noise give the same bits on the target as on the host.
 #[test]
-fn five_in_noise_settle_at_the_places_of_the_simulated_chain() {
+fn five_drones_in_noise_settle_like_the_simulation() {
     let silent = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
     let flight = noisy(Method::Align, 20.0);
     assert_ne!(simulated(&flight), simulated(&silent));
@@ -101,7 +101,7 @@ fn settles(flight: &Flight) {
 }
 
 #[test]
-fn five_choose_the_altitudes_of_the_simulated_chain() {
+fn five_drones_choose_the_simulations_altitudes() {
     let flight = past(50.0, 0.0, None, Method::Joint);
     let low = 20.0_f32.to_bits();
     let places = simulated(&flight);
@@ -117,7 +117,7 @@ fn five_choose_the_altitudes_of_the_simulated_chain() {
 
 /// Checks that drones that may have lateral offsets move to the side away from the interferer.
 #[test]
-fn five_go_to_the_side_as_the_simulated_chain_does() {
+fn five_drones_go_to_the_side_like_the_simulation() {
     let flight = past(150.0, 280.0, None, Method::Joint);
     let places = simulated(&flight);
     assert!(places.iter().all(|[_, y, _]| f32::from_bits(*y) < -1.0));
@@ -126,7 +126,7 @@ fn five_go_to_the_side_as_the_simulated_chain_does() {
 
 /// Checks that a relay that holds its altitude moves to the side with the others.
 #[test]
-fn five_go_to_the_side_around_one_that_holds_its_altitude() {
+fn five_drones_go_to_the_side_around_a_fixed_altitude() {
     let flight = past(150.0, 280.0, Some((3, 100.0)), Method::Joint);
     let places = simulated(&flight);
     let metres = |[_, y, altitude]: [u32; 3]| (f32::from_bits(y), f32::from_bits(altitude));
@@ -143,7 +143,7 @@ fn five_go_to_the_side_around_one_that_holds_its_altitude() {
 }
 
 #[test]
-fn five_adjust_themselves_as_the_simulated_chain_does() {
+fn five_drones_adjust_like_the_simulation() {
     settles(&past(
         50.0,
         0.0,
@@ -156,6 +156,6 @@ fn five_adjust_themselves_as_the_simulated_chain_does() {
 }
 
 #[test]
-fn five_in_a_field_settle_where_the_simulated_chain_does() {
+fn five_drones_in_a_field_settle_like_the_simulation() {
     settles(&field());
 }

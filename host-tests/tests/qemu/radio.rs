@@ -7,7 +7,7 @@ use crate::fleet::{Fleet, Image};
 use crate::log::Line;
 
 #[test]
-fn five_on_one_radio_settle_where_the_simulated_chain_does() {
+fn five_drones_on_one_radio_settle_like_the_simulation() {
     let flight = paper(5);
     for (faults, seed) in [(Faults::default(), 1), (BAD_DAY, 2)] {
         let mut fleet = Fleet::of(Image::Radio, &flight, faults, seed);
@@ -24,7 +24,7 @@ fn five_on_one_radio_settle_where_the_simulated_chain_does() {
 
 /// Checks that the others take exactly the positions of a chain of four after drone 3 was switched off.
 #[test]
-fn four_of_five_on_one_radio_form_anew_when_one_is_switched_off() {
+fn four_of_five_on_one_radio_recover_from_a_loss() {
     let flight = paper(5);
     let mut fleet = Fleet::of(Image::Radio, &flight, Faults::default(), 3);
     assert_eq!(fleet.places(), simulated(&flight));

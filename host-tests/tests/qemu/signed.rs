@@ -16,7 +16,7 @@ fn signed(flight: &Flight, key: [u8; 32]) -> Flight {
 }
 
 #[test]
-fn five_that_sign_settle_where_the_simulated_chain_does() {
+fn five_signing_drones_settle_like_the_simulation() {
     let plain = paper(5);
     let flight = signed(&plain, KEY);
     for (image, faults) in [

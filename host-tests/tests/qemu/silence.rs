@@ -80,7 +80,7 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
 }
 
 #[test]
-fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
+fn a_drone_with_a_bad_configuration_stays_out_and_logs_why() {
     let flight = paper(3);
     let good = flight.block(2).unwrap().to_vec();
     let mut damaged = good.clone();
@@ -140,7 +140,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
 }
 
 #[test]
-fn a_drone_with_half_a_secret_takes_no_part_and_says_why() {
+fn a_drone_with_half_a_key_stays_out_and_logs_why() {
     let good = paper(3).block(2).unwrap().to_vec();
     let blocks = [with(&good, 252, &[1]), with(&good, 256, &[1])];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);

@@ -86,7 +86,7 @@ impl Three {
 }
 
 #[test]
-fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
+fn three_images_fly_with_autopilots_one_by_mavsdk() {
     let flight = Flight::new(&scenario(), 3, 1e-4, 7).unwrap();
     let to = simulated(&flight).into_iter().map(|place| {
         let [x_m, y_m, altitude_m] = place.map(f32::from_bits);

@@ -107,7 +107,7 @@ impl Station {
 }
 
 #[test]
-fn three_fly_what_the_transmitter_uploads() {
+fn three_drones_fly_the_transmitters_upload() {
     let loaded = paper(3);
     for (image, wiring, faults) in [
         (Image::Wires, Wiring::Pair, Faults::default()),
@@ -134,7 +134,7 @@ fn three_fly_what_the_transmitter_uploads() {
 /// Checks that drones fly the newest mission stored in their flash. It has versions 2 and 3, and a version 4
 /// truncated by a power failure.
 #[test]
-fn three_fly_what_they_were_handed_before_they_were_switched_on() {
+fn three_drones_fly_a_stored_upload() {
     let loaded = paper(3);
     let blocks = blocks(&loaded);
     let flash: Vec<Vec<Kept>> = blocks

@@ -39,7 +39,7 @@ const HOLDS: &str = "votes on views restored from flash";
 
 /// Checks that drones with stored votes up to membership view 40 fly in a later view.
 #[test]
-fn three_that_were_switched_off_stand_by_what_they_said() {
+fn three_restarted_drones_keep_their_votes() {
     let flight = paper(3);
     let base = digest(flight.mission());
     let blocks = blocks(&flight);
@@ -56,7 +56,7 @@ fn three_that_were_switched_off_stand_by_what_they_said() {
 /// Checks that two of three drones do not fly if their stored membership view does not include them. Without that
 /// view they would have a quorum.
 #[test]
-fn two_that_remember_a_view_without_them_do_not_fly_it() {
+fn two_drones_that_recall_a_view_without_them_do_not_fly() {
     let flight = paper(3);
     let base = digest(flight.mission());
     let blocks = blocks(&flight)[..2].to_vec();

@@ -22,7 +22,7 @@ const BEGINS: [&str; 5] = [
 const FED: &str = "offset 0x000, value 0x0000aaaa)";
 
 #[test]
-fn the_watchdog_is_started_and_fed_for_as_long_as_the_relay_runs() {
+fn the_watchdog_is_fed_for_as_long_as_the_relay_runs() {
     let folder = tempfile::tempdir().unwrap();
     let [block, trace] = ["block.bin", "trace"].map(|name| folder.path().join(name));
     std::fs::write(&block, paper(1).block(1).unwrap()).unwrap();

@@ -115,14 +115,14 @@ fn listening() -> Settings {
 }
 
 #[test]
-fn every_measured_power_and_place_in_the_papers_chain() {
+fn any_measured_power_and_position_in_the_papers_chain() {
     each(2_000, |seed| {
         fly(seed, paper(1 + (seed % 6) as u16), listening());
     });
 }
 
 #[test]
-fn every_measured_power_and_place_in_every_mission() {
+fn any_measured_power_and_position_in_any_mission() {
     each(2_000, |seed| {
         let mut rng = ChaCha8Rng::seed_from_u64(!seed);
         let Some(mission) = mission(&mut rng, 4) else {

@@ -76,6 +76,6 @@ fn fly(seed: u64) {
 }
 
 #[test]
-fn every_place_time_and_control_of_a_guarded_chain() {
+fn any_position_time_and_control_of_a_guarded_chain() {
     each(1_000, fly);
 }

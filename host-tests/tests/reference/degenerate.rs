@@ -1,6 +1,6 @@
 //! Reaches where formulas divide by zero or lose a root, with answers worked out by hand.
 
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 
 use super::close;
 
@@ -47,7 +47,7 @@ fn degenerate_reaches_are_right() {
         ..Link::paper(1)
     };
     let behind = Link {
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: 50.0,
             power_w: 1.0,
         }],
@@ -97,7 +97,7 @@ fn degenerate_reaches_are_right() {
 /// Checks a chain in which relay 1 must not go as far as possible. There it would be too close to the interferer for
 /// relay 2's altitude.
 #[test]
-fn going_farthest_is_not_best_at_different_altitudes() {
+fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
     let link = Link {
         distance_m: 2224.8,
         tx_w: 22.15,
@@ -105,7 +105,7 @@ fn going_farthest_is_not_best_at_different_altitudes() {
         x_i: 1026.0,
         y_i: 60.0,
         relays: [527.0, 298.0]
-            .map(|altitude_m| Station {
+            .map(|altitude_m| Relay {
                 altitude_m,
                 power_w: 2.2,
             })
@@ -124,7 +124,7 @@ fn going_farthest_is_not_best_at_different_altitudes() {
 /// Checks the paper's fixed-step search with an interferer behind Tx. It must start at a higher target SIR there.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
-    let relay = Station {
+    let relay = Relay {
         altitude_m: 50.0,
         power_w: 1e3,
     };

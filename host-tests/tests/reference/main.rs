@@ -1,7 +1,7 @@
 //! f64 reference, compared with a separate program, with brute force, and between its methods.
 
 use uav_relay_oracle::cases::{self, Case};
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 
 mod degenerate;
 mod random;
@@ -116,7 +116,7 @@ fn single_hops_match_the_file() {
 /// in the file.
 #[test]
 fn each_hop_uses_its_own_path_loss() {
-    let relays = [(30.0, 4.0), (15.0, 7.0)].map(|(altitude_m, power_w)| Station {
+    let relays = [(30.0, 4.0), (15.0, 7.0)].map(|(altitude_m, power_w)| Relay {
         altitude_m,
         power_w,
     });
@@ -151,7 +151,7 @@ fn chains_match_the_file() {
         let mut link = case.link(0);
         link.relays = h
             .iter()
-            .map(|&altitude_m| Station {
+            .map(|&altitude_m| Relay {
                 altitude_m,
                 power_w: case.params.p_u,
             })

@@ -29,7 +29,7 @@ fn place(lines: &str) -> (f64, f64) {
 /// Compares the position of an interferer on earth with a library of geodesics. The tolerance is one unit of the
 /// coordinates, 1.1 cm.
 #[test]
-fn an_interferer_on_earth_is_where_geodesics_have_it() {
+fn an_interferer_by_coordinates_agrees_with_geodesics() {
     let earth = Geodesic::wgs84();
     let (d, azimuth, _, _): (f64, f64, f64, f64) = earth.inverse(TX[0], TX[1], RX[0], RX[1]);
     for (x, y) in [
@@ -52,7 +52,7 @@ fn an_interferer_on_earth_is_where_geodesics_have_it() {
 }
 
 #[test]
-fn what_is_no_place_on_the_line_is_refused() {
+fn coordinates_off_the_line_are_refused() {
     let near = "lat_deg = 47.404\nlon_deg = 8.548";
     for (lines, problem, parts) in [
         (
@@ -107,7 +107,7 @@ fn what_is_no_place_on_the_line_is_refused() {
 /// Checks that an interferer on a tower is refused if the tower changes the interference by over 1 dB. The change is
 /// (d^2 + h^2) / (d^2 + (h - t)^2), for a tower of height t.
 #[test]
-fn an_interferer_on_a_tower_is_refused_where_that_matters() {
+fn an_interferer_on_a_tower_is_refused_if_its_height_matters() {
     let azimuth = "lat_deg = 47.404\nlon_deg = 8.548";
     let (_, y) = place(azimuth);
     let db = |tower: f64| {

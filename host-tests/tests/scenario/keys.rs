@@ -274,7 +274,7 @@ fn every_key_refuses_another_type() {
 }
 
 #[test]
-fn every_required_key_is_missed() {
+fn every_missing_required_key_is_reported() {
     let optional = [
         "altitude_min_m",
         "altitude_max_m",

@@ -9,7 +9,7 @@ use uav_relay_scenario::{
 use super::*;
 
 #[test]
-fn a_file_with_every_key_means_what_it_says() {
+fn every_key_sets_its_value() {
     let text = "
         [geometry]
         distance_m = 1500.0
@@ -159,7 +159,7 @@ fn a_field_takes_the_place_of_the_interferers() {
 }
 
 #[test]
-fn the_obstructed_loss_is_the_larger() {
+fn the_obstructed_path_loss_is_the_larger() {
     let both = small("[channel]\nexcess_loss_los_db = 9\nexcess_loss_nlos_db = 8.5\n");
     refused(
         &both,
@@ -184,7 +184,7 @@ fn the_obstructed_loss_is_the_larger() {
 }
 
 #[test]
-fn the_words_of_air_ground_are_exact() {
+fn air_ground_accepts_only_its_exact_words() {
     let read = |value: &str| parse(&small(&format!("[channel]\nair_ground = {value}\n")));
     assert_eq!(read("'los'").unwrap().channel.air_ground, AirGround::Los);
     assert_eq!(read("'nlos'").unwrap().channel.air_ground, AirGround::Nlos);

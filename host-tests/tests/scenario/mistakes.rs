@@ -78,7 +78,7 @@ fn keys_that_contradict_each_other_are_refused() {
 }
 
 #[test]
-fn a_data_link_that_cannot_be_is_refused() {
+fn an_impossible_data_link_is_refused() {
     let steps = |second: &str| {
         small(&format!(
             "[link]\nsteps = [{{ sinr_db = 2, bits_per_hz = 0.5 }}, {second}]\n"
@@ -129,7 +129,7 @@ fn the_band_holds_the_common_altitude() {
 }
 
 #[test]
-fn broken_toml_is_placed_by_line_and_column() {
+fn toml_errors_have_line_and_column() {
     insta::assert_snapshot!(refusals(&[
         small("").replace("altitude_m = 20", "altitude_m = = 20"),
         small("").replace("uav_w = 1", "uav_w = 1\n uav_w = 2"),
@@ -145,7 +145,7 @@ fn broken_toml_is_placed_by_line_and_column() {
 }
 
 #[test]
-fn a_file_of_nothing_is_empty() {
+fn an_empty_file_is_an_empty_scenario() {
     let files = ["", "\n\n", "  \t\r\n", "# only a remark\n", "\u{feff}"];
     insta::assert_snapshot!(refusals(&files.map(str::to_owned)));
 }

@@ -28,7 +28,7 @@ fn the_default_scenario_is_that_of_its_file() {
 }
 
 #[test]
-fn what_is_wrong_with_a_plan_is_named() {
+fn errors_of_a_plan_are_named() {
     let plan = |from: &str, to: &str| small(&PLAN.replace(from, to));
     for (text, problem, parts) in [
         (

@@ -30,7 +30,7 @@ fn the_same_power_in_dbm_is_the_same_scenario() {
 }
 
 #[test]
-fn a_power_is_said_once() {
+fn a_power_is_given_once() {
     for (key, other, table) in [
         ("tx_w = 80", "tx_dbm = 49", "power"),
         ("tx_w = 80", "tx_eirp_dbm = 49", "power"),
@@ -65,7 +65,7 @@ fn a_power_is_said_once() {
 }
 
 #[test]
-fn an_eirp_that_no_mission_takes_is_refused() {
+fn an_eirp_outside_the_missions_range_is_refused() {
     for (plain, gain, parts) in [
         (
             "tx_w = 80",

@@ -26,12 +26,12 @@ fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
         let mut setup = wild.setup(Interference::Unknown).unwrap();
         setup.settings.wiring = Wiring::Shared;
         setup.auth = true;
-        setup.sky.as_mut().unwrap().scene.mu_nlos *= HILL;
+        setup.true_interference.as_mut().unwrap().scene.mu_nlos *= HILL;
         change(&mut setup);
-        let truth = setup.sky.as_ref().unwrap().scene.clone();
+        let truth = setup.true_interference.as_ref().unwrap().scene.clone();
         let outcome = run(setup).unwrap();
         let off = heard_at_rx(&outcome).map(|heard| heard / truth.interference_rx_w() - 1.0);
-        let stand = outcome.stands.last().unwrap();
+        let stand = outcome.snapshots.last().unwrap();
         let flown = stand.goals.as_ref().map_or(0.0, |goals| {
             let mut scene = truth.clone();
             scene.relays.truncate(goals.len());
@@ -53,7 +53,7 @@ fn heard_at_rx(outcome: &Outcome) -> Option<f64> {
 }
 
 #[test]
-fn what_the_receiver_says_on_the_air_is_believed_by_all() {
+fn measurements_at_rx_reach_all_relays_by_radio() {
     type Change = fn(&mut Setup);
     let last_lost: Change = |setup| setup.kills = vec![(RELAYS, Instant::from_millis(7_000))];
     let last_anew: Change = |setup| {
@@ -82,9 +82,9 @@ fn what_the_receiver_says_on_the_air_is_believed_by_all() {
 /// Checks that the measurements of Tx and Rx raise the SIR, to more than twice in each scene. Without them the last
 /// hop is planned with the mission's wrong path loss on the ground.
 #[test]
-fn it_is_worth_something() {
+fn measurements_of_tx_and_rx_raise_the_sir() {
     let told = flown(|_| {});
-    let untold = flown(|setup| setup.sky.as_mut().unwrap().ends = false);
+    let untold = flown(|setup| setup.true_interference.as_mut().unwrap().ends = false);
     assert!(untold.iter().all(|(off, _)| off.is_none()));
     let mut gains: Vec<f64> = told
         .iter()

@@ -27,7 +27,7 @@ fn guessed(wild: &RandomScene) -> Result<Setup, FigureError> {
 /// Returns a setup with 1 dB of shadowing at each position, whose relays also measure in flight.
 fn flown(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = wild.flown(Interference::Unknown)?;
-    setup.sky.as_mut().unwrap().shadow_db = 1.0;
+    setup.true_interference.as_mut().unwrap().shadow_db = 1.0;
     Ok(setup)
 }
 

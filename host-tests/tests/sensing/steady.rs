@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use uav_relay::{Duration, Instant, Interference};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
+use uav_relay_sim::simulator::true_interference::{BrokenReading, BrokenReceiver};
 
 use uav_relay_tools::listening::{RandomScene, quantile};
 
@@ -13,7 +13,7 @@ use crate::wrong::{named, share};
 
 /// Checks that a static world leads to at most five new agreements in an hour of measurements.
 #[test]
-fn a_still_world_becomes_silent() {
+fn with_a_fixed_interferer_estimates_stop_changing() {
     let seeds: Vec<u64> = (0..count(12)).collect();
     let found: Vec<u32> = seeds
         .into_par_iter()
@@ -21,18 +21,18 @@ fn a_still_world_becomes_silent() {
             let relays = [3, 5, 8, 20][seed as usize % 4];
             let wild = RandomScene::new(seed, relays, 1);
             let mut setup = wild.setup(Interference::Unknown).unwrap();
-            let sky = setup.sky.as_mut().unwrap();
-            sky.period = Duration::from_millis(1_000);
-            sky.until = Instant::from_millis(3_600_000);
+            let true_interference = setup.true_interference.as_mut().unwrap();
+            true_interference.period = Duration::from_millis(1_000);
+            true_interference.until = Instant::from_millis(3_600_000);
             setup.deadline = Instant::from_millis(3_700_000);
             let outcome = run(setup).unwrap();
             // The first agreement is made without an estimate.
-            let found = outcome.stands.last().unwrap().agreements - 1;
+            let found = outcome.snapshots.last().unwrap().agreements - 1;
             let last = outcome
-                .stands
+                .snapshots
                 .iter()
                 .position(|stand| stand.agreements == found + 1);
-            let at = outcome.stands[last.unwrap()].at.as_micros() / 1_000_000;
+            let at = outcome.snapshots[last.unwrap()].at.as_micros() / 1_000_000;
             println!("seed {seed}: {relays} relays, {found} agreements, the last after {at} s");
             found
         })
@@ -41,7 +41,7 @@ fn a_still_world_becomes_silent() {
 }
 
 #[test]
-fn under_faults_all_believe_the_same_to_the_bit() {
+fn under_faults_all_estimates_are_equal_to_the_bit() {
     let seeds: Vec<u64> = (0..count(20)).collect();
     let mut shares: Vec<f64> = seeds
         .into_par_iter()
@@ -70,7 +70,7 @@ fn under_faults_all_believe_the_same_to_the_bit() {
 /// Checks that a chain of eight detects one wrong sensor and ignores it. The sensor is wrong from the start or from
 /// 40 s on.
 #[test]
-fn a_broken_sensor_is_named_and_left_out() {
+fn a_broken_sensor_is_reported_and_excluded() {
     for (off_db, since_s) in [
         (10.0, 0),
         (-10.0, 0),
@@ -91,9 +91,9 @@ fn a_broken_sensor_is_named_and_left_out() {
                 let wild = RandomScene::new(seed, 8, 1);
                 let broken = 1 + (seed % 8) as u16;
                 let mut setup = wild.setup(Interference::Unknown).unwrap();
-                setup.sky.as_mut().unwrap().broken = vec![Broken {
+                setup.true_interference.as_mut().unwrap().broken = vec![BrokenReceiver {
                     node: broken,
-                    says: SensorReading::Times(10_f64.powf(off_db / 10.0)),
+                    reading: BrokenReading::Times(10_f64.powf(off_db / 10.0)),
                     since: Instant::from_millis(since_s * 1_000),
                 }];
                 let outcome = run(setup).unwrap();

@@ -5,7 +5,7 @@ use uav_relay::{Instant, Interference, Wiring};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_sim::simulator::true_interference::{Broken, SensorReading};
+use uav_relay_sim::simulator::true_interference::{BrokenReading, BrokenReceiver};
 
 use uav_relay_tools::listening::{RandomScene, quantile};
 
@@ -13,14 +13,14 @@ use crate::count;
 
 /// Simulated faults of a sensor: factors on its readings, and constant readings. The constants are those of a 10 W
 /// interferer at 500 m, of a receiver's noise, and zero.
-const KINDS: [(&str, SensorReading); 7] = [
-    ("0.1 times", SensorReading::Times(0.1)),
-    ("0.5 times", SensorReading::Times(0.5)),
-    ("2 times", SensorReading::Times(2.0)),
-    ("10 times", SensorReading::Times(10.0)),
-    ("5e-9 W always", SensorReading::Always(5e-9)),
-    ("1e-13 W always", SensorReading::Always(1e-13)),
-    ("0 W always", SensorReading::Always(0.0)),
+const KINDS: [(&str, BrokenReading); 7] = [
+    ("0.1 times", BrokenReading::Times(0.1)),
+    ("0.5 times", BrokenReading::Times(0.5)),
+    ("2 times", BrokenReading::Times(2.0)),
+    ("10 times", BrokenReading::Times(10.0)),
+    ("5e-9 W always", BrokenReading::Always(5e-9)),
+    ("1e-13 W always", BrokenReading::Always(1e-13)),
+    ("0 W always", BrokenReading::Always(0.0)),
 ];
 
 /// Returns the setup of a chain whose Tx and Rx measure the interference and send it to the relays.
@@ -33,7 +33,7 @@ fn setup(wild: &RandomScene) -> Setup {
 
 /// Returns the SIR of the final positions as a fraction of the optimum.
 pub(crate) fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
-    let goals = outcome.stands.last().unwrap().goals.as_ref();
+    let goals = outcome.snapshots.last().unwrap().goals.as_ref();
     goals.map_or(0.0, |goals| {
         wild.scene().unwrap().chain_sir(goals) / wild.optimum().unwrap()
     })
@@ -61,11 +61,11 @@ fn sound(relays: u16) -> Vec<f64> {
 }
 
 /// Runs a scene in which the sensor of `node` is wrong from the start, as `says` describes.
-fn with_wrong(wild: &RandomScene, node: u16, says: SensorReading) -> Outcome {
+fn with_wrong(wild: &RandomScene, node: u16, says: BrokenReading) -> Outcome {
     let mut wrong = setup(wild);
-    wrong.sky.as_mut().unwrap().broken = vec![Broken {
+    wrong.true_interference.as_mut().unwrap().broken = vec![BrokenReceiver {
         node,
-        says,
+        reading: says,
         since: Instant::ZERO,
     }];
     run(wrong).unwrap()
@@ -100,7 +100,7 @@ fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync)
         // An end that receives nothing sends no measurement.
         let least = match (who, says) {
             ("a relay", _) => 0.9,
-            (_, SensorReading::Always(0.0)) => 0.0,
+            (_, BrokenReading::Always(0.0)) => 0.0,
             _ => 2.0 / 3.0,
         };
         let share = found as f64 / came.len() as f64;
@@ -109,7 +109,7 @@ fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync)
 }
 
 #[test]
-fn one_wrong_relay_costs_next_to_nothing() {
+fn one_wrong_sensor_of_a_relay_costs_little_sir() {
     for relays in [5, 8] {
         let of = |seed| 1 + (seed % u64::from(relays)) as u16;
         hold(relays, &sound(relays), "a relay", of);
@@ -117,7 +117,7 @@ fn one_wrong_relay_costs_next_to_nothing() {
 }
 
 #[test]
-fn a_wrong_end_costs_next_to_nothing() {
+fn one_wrong_sensor_of_tx_or_rx_costs_little_sir() {
     for relays in [5, 8] {
         let sound = sound(relays);
         hold(relays, &sound, "the receiver", |_| relays + 1);
@@ -128,7 +128,7 @@ fn a_wrong_end_costs_next_to_nothing() {
 /// Checks that one or two relays never blame another sensor, and report that no interferer fits. Three or four relays
 /// may blame another one in 2 % of the scenes.
 #[test]
-fn a_short_chain_seldom_names_another_sensor() {
+fn a_short_chain_seldom_accuses_a_correct_sensor() {
     for relays in [1, 2, 3, 4] {
         for (what, says) in KINDS {
             let one = |seed: usize| {
@@ -154,7 +154,7 @@ fn a_short_chain_seldom_names_another_sensor() {
 }
 
 #[test]
-fn sensors_that_are_right_are_not_named() {
+fn correct_sensors_are_not_accused() {
     let mut all = 0;
     for relays in [5, 8, 3, 2, 1, 20] {
         let each: Vec<(Vec<u16>, f64)> = (0..count(24))
@@ -195,12 +195,12 @@ fn measurements_of_an_end_may_come_late_or_stop() {
     ] {
         let one = |seed| {
             let mut late = setup(&RandomScene::new(seed, 5, 1));
-            let sky = late.sky.as_mut().unwrap();
-            sky.scene.mu_nlos *= 8.0;
-            sky.ends_during = during;
-            let truth = sky.scene.clone();
+            let true_interference = late.true_interference.as_mut().unwrap();
+            true_interference.scene.mu_nlos *= 8.0;
+            true_interference.ends_during = during;
+            let truth = true_interference.scene.clone();
             let outcome = run(late).unwrap();
-            let goals = outcome.stands.last().unwrap().goals.clone();
+            let goals = outcome.snapshots.last().unwrap().goals.clone();
             goals.map_or(0.0, |goals| truth.chain_sir(&goals))
         };
         let sirs: Vec<f64> = (0..count(24)).into_par_iter().map(one).collect();

@@ -98,7 +98,7 @@ fn the_driver_is_enabled_while_bytes_leave_and_no_longer() {
 }
 
 #[test]
-fn a_pin_that_refuses_is_counted_and_asked_again() {
+fn a_pin_error_is_counted_and_retried() {
     let bench = Rc::new(RefCell::new(Bench {
         refusals: [3, 4],
         ..Bench::default()

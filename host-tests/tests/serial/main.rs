@@ -42,7 +42,7 @@ fn a_chain_on_ports_of_any_size_settles_like_bare_relays() {
 }
 
 #[test]
-fn an_end_that_never_reads_does_not_starve_the_other_link() {
+fn an_unread_link_does_not_starve_the_other_link() {
     for kind in KINDS {
         // Relay 2 of 3; its wire toward relay 1 is never read, relay 3 works.
         let [nobody, deaf] = End::wire(3);
@@ -148,7 +148,7 @@ fn read_errors_are_counted_by_kind_and_survived() {
 }
 
 #[test]
-fn a_port_that_only_fails_gives_the_others_their_turn() {
+fn a_failing_port_does_not_starve_the_others() {
     let dead = Trouble::times(usize::MAX, 1);
     let [up, _] = End::wire(16);
     let [down, _] = End::wire(16);
@@ -188,7 +188,7 @@ fn a_poll_reads_up_to_its_limit_and_asks_to_be_called_soon() {
 }
 
 #[test]
-fn an_idle_facade_asks_for_nothing_but_what_the_relay_asks_for() {
+fn an_idle_facade_has_only_the_relays_timeouts() {
     for kind in KINDS {
         // A single settled relay only renews its lease, without frames.
         let (mut nodes, far) = chain(kind, Wiring::Pair, 1, 16, &Trouble::default());
@@ -218,7 +218,7 @@ fn an_idle_facade_asks_for_nothing_but_what_the_relay_asks_for() {
 }
 
 #[test]
-fn frames_for_a_port_that_is_not_there_are_counted() {
+fn frames_for_an_absent_port_are_counted() {
     let [end, far] = End::wire(1000);
     let relay = relay(2, 1, Wiring::Pair);
     let mut nodes = [Node::new(Kind::Nb, relay, &[end], &Trouble::default())];

@@ -2,7 +2,7 @@
 
 use roxmltree::{Document, Node};
 use uav_relay_scenario::{Scenario, mission};
-use uav_relay_sim::svg::{Picture, Room, draw, room};
+use uav_relay_sim::svg::{LateralView, Picture, draw, lateral_view};
 
 use super::{all, assert_apart, assert_inside, chain, drawn, has_text, level, number, tip};
 
@@ -18,7 +18,7 @@ fn swung(relays: usize, edge: f64) -> Picture {
         (1..=relays).map(|number| -4.0 * edge * 280.0 * share(number) * (1.0 - share(number)));
     Picture {
         interferers: vec![(80.0, 500.0, 150.0)],
-        room: Some(Room {
+        lateral_view: Some(LateralView {
             least_m: -280.0,
             most_m: 280.0,
             y_m: y_m.collect(),
@@ -46,10 +46,10 @@ fn gallery() -> Vec<Picture> {
         ..swung(8, 1.0)
     });
     let mut narrow = swung(8, 0.01);
-    narrow.room = narrow.room.map(|room| Room {
+    narrow.lateral_view = narrow.lateral_view.map(|view| LateralView {
         least_m: 0.0,
         most_m: 3.0,
-        ..room
+        ..view
     });
     pictures.push(narrow);
     pictures
@@ -70,7 +70,7 @@ fn parts<'a>(
 }
 
 #[test]
-fn without_room_beside_the_line_there_is_one_view() {
+fn without_lateral_range_there_is_one_view() {
     let svg = draw(&level(8));
     let document = Document::parse(&svg).unwrap();
     assert!(!has_text(&document, "from above") && !has_text(&document, "y (m)"));
@@ -80,13 +80,13 @@ fn without_room_beside_the_line_there_is_one_view() {
 /// Checks the view from above of an interferer beside a straight chain. In a side view it would seem to be below the
 /// chain.
 #[test]
-fn an_interferer_beside_the_line_is_seen_beside_it() {
+fn the_view_from_above_shows_an_interferer_at_its_offset() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();
     let picture = level(8);
     for (y, sign) in [(400.0, 1.0), (-400.0, -1.0)] {
         let interferers = vec![(80.0, 500.0, y)];
         let svg = draw(&Picture {
-            room: room(&mission, [0.0; 8], &interferers),
+            lateral_view: lateral_view(&mission, [0.0; 8], &interferers),
             interferers,
             ..picture.clone()
         });
@@ -103,7 +103,7 @@ fn an_interferer_beside_the_line_is_seen_beside_it() {
         assert!(sign * (above - line) > 60.0, "{above} and {line}");
     }
     for interferers in [vec![(80.0, 500.0, 0.0)], vec![], vec![(80.0, 9e3, 5.0)]] {
-        assert_eq!(room(&mission, [0.0; 8], &interferers), None);
+        assert_eq!(lateral_view(&mission, [0.0; 8], &interferers), None);
     }
 }
 
@@ -119,7 +119,7 @@ fn an_interferer_far_beside_the_line_is_an_arrow_at_the_edge() {
     ] {
         let interferers = vec![(80.0, 500.0, y)];
         let svg = draw(&Picture {
-            room: room(&mission, [0.0; 8], &interferers),
+            lateral_view: lateral_view(&mission, [0.0; 8], &interferers),
             interferers,
             ..level(8)
         });
@@ -231,8 +231,8 @@ fn the_view_from_above_is_to_scale() {
     assert!(left < right, "{edges:?}");
     let at = |y: f64| left + (y + 280.0) / 560.0 * (right - left);
     let [_, above] = parts(&document, "circle", "relay", "cy");
-    let room = picture.room.unwrap();
-    for ((circle, y), number_of) in above.iter().zip(room.y_m).zip(1..) {
+    let view = picture.lateral_view.unwrap();
+    for ((circle, y), number_of) in above.iter().zip(view.y_m).zip(1..) {
         assert!((number(circle, "cy") - at(y)).abs() < 0.02, "{number_of}");
         assert!(
             tip(circle).contains(&format!("y = {y:.2} m")),
@@ -278,22 +278,22 @@ fn a_short_chain_has_every_number_in_both_views() {
 }
 
 #[test]
-fn hostile_rooms_still_make_a_picture() {
-    for room in [
-        Room::default(),
-        Room {
+fn extreme_lateral_views_still_make_a_picture() {
+    for view in [
+        LateralView::default(),
+        LateralView {
             least_m: f64::NAN,
             most_m: f64::INFINITY,
             y_m: vec![f64::NAN, 1e300, -1e308],
         },
-        Room {
+        LateralView {
             least_m: -1e300,
             most_m: 1e-300,
             y_m: vec![0.0; 99],
         },
     ] {
         let svg = drawn(&Picture {
-            room: Some(room),
+            lateral_view: Some(view),
             ..level(8)
         });
         Document::parse(&svg).unwrap();

@@ -110,7 +110,7 @@ fn row_of_most(texts: &[Node]) -> f64 {
 }
 
 #[test]
-fn colours_tell_how_far_a_hop_is_above_the_worst() {
+fn colours_show_how_far_a_hop_is_above_the_worst() {
     let at = |decibels: f64| 2.5 * 10f64.powf(decibels / 10.0);
     let hop_sir = vec![
         at(0.0),

@@ -6,7 +6,7 @@ use uav_relay_sim::svg::{Picture, draw};
 use super::{SIZE, all, assert_apart, has_text, level, number, tip};
 
 #[test]
-fn hops_pass_by_relays_that_are_not_in_the_chain_any_more() {
+fn hops_skip_relays_outside_the_chain() {
     let mut picture = level(8);
     picture.left_out = vec![3, 8];
     picture.hop_sir.truncate(7);

@@ -180,7 +180,7 @@ fn every_picture_is_well_formed_and_stays_in_its_frame() {
 }
 
 #[test]
-fn hostile_input_still_makes_a_picture() {
+fn extreme_input_still_makes_a_picture() {
     let mut picture = level(4);
     picture.title_method = "<b>&\"'\u{0}\n]]>".to_owned();
     picture.nodes[1] = (f64::NAN, 20.0);
@@ -217,7 +217,7 @@ fn hostile_input_still_makes_a_picture() {
 }
 
 #[test]
-fn the_title_is_said_and_the_same_picture_is_the_same_file() {
+fn a_picture_has_a_title_and_is_reproducible() {
     let svg = draw(&level(8));
     let document = Document::parse(&svg).unwrap();
     assert!(has_text(&document, "align, N = 8 relays"));

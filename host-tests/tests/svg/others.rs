@@ -40,7 +40,7 @@ fn the_interferer_of_the_previous_mission_is_faint() {
 /// Checks that another interferer is not drawn if it would disturb. It is at the present one's position, far away, or
 /// at an undefined position.
 #[test]
-fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
+fn a_previous_interferer_under_a_present_one_is_left_out() {
     let same = level(8).interferers;
     for others in [
         same,
@@ -58,7 +58,7 @@ fn where_its_marker_would_only_be_in_the_way_it_is_left_out() {
 
 /// Checks that an estimated interferer is drawn even next to the true one.
 #[test]
-fn what_is_believed_is_drawn_beside_what_is_true() {
+fn the_estimated_interferer_is_drawn_beside_the_true_one() {
     for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {
         let picture = Picture {
             others: vec![(30.0, x, y)],

@@ -113,7 +113,7 @@ fn interferers_beyond_the_plot_are_pointed_to() {
 }
 
 #[test]
-fn a_crowd_of_interferers_is_told_of_in_one_line() {
+fn many_interferers_beyond_the_plot_share_one_line() {
     let crowd = (0..20)
         .map(|index| (1.0 + f64::from(index), 50.0 * f64::from(index), -300.0))
         .collect();

@@ -12,11 +12,11 @@ use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::joint::Corridor;
 
 use super::ALLOWED;
-use super::roomy::Roomy;
+use super::lateral_scene::LateralScene;
 use super::scene::Scene;
 
 /// Result of a scene: the theorem's case, its SIR against brute force, and the error of its stated SIR.
-struct Seen {
+struct SceneResult {
     case: String,
     short: f64,
     told: f64,
@@ -26,25 +26,25 @@ struct Seen {
 /// the altitudes that brute force searches.
 fn no_worse_than_brute_force(
     seed: u64,
-    draw: impl Fn(&mut ChaCha8Rng) -> Roomy + Sync,
+    draw: impl Fn(&mut ChaCha8Rng) -> LateralScene + Sync,
     band: impl Fn(&Scene) -> (f64, f64) + Sync,
     best: impl Fn(&Scene) -> (Found, AsideCase) + Sync,
 ) -> BTreeMap<String, u32> {
     let first = random::seed(seed) << 32;
     let look = |number: u64| {
-        let roomy = draw(&mut ChaCha8Rng::seed_from_u64(first + number));
-        let (found, case) = best(&roomy.scene);
-        let ranges = roomy.ranges(band(&roomy.scene));
+        let drawn = draw(&mut ChaCha8Rng::seed_from_u64(first + number));
+        let (found, case) = best(&drawn.scene);
+        let ranges = drawn.ranges(band(&drawn.scene));
         let place = found.place;
         let place = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
         for (value, (low, high)) in place.into_iter().zip(ranges) {
             assert!((low..=high).contains(&value), "{place:?} in {ranges:?}");
         }
-        let (reached, most) = (roomy.sir_of(&found), roomy.brute(ranges));
+        let (reached, most) = (drawn.sir_of(&found), drawn.brute(ranges));
         let case = format!("{case:?}");
         if !(most > 0.0) {
             assert_eq!(case, "Drowned");
-            return Seen {
+            return SceneResult {
                 case,
                 short: 0.0,
                 told: 0.0,
@@ -54,12 +54,12 @@ fn no_worse_than_brute_force(
         assert!(
             short <= ALLOWED && told.abs() <= 1e-5,
             "short by {short:e}, told {told:e} ({case}, {place:?}) in {ranges:?} {:?}",
-            roomy.scene.link
+            drawn.scene.link
         );
-        Seen { case, short, told }
+        SceneResult { case, short, told }
     };
     // Fewer scenes than in the theorems' tests, because the search is expensive.
-    let seen: Vec<Seen> = (0..count(10_000) as u64)
+    let seen: Vec<SceneResult> = (0..count(10_000) as u64)
         .into_par_iter()
         .map(look)
         .collect();
@@ -67,7 +67,7 @@ fn no_worse_than_brute_force(
     for one in &seen {
         *cases.entry(one.case.clone()).or_insert(0) += 1;
     }
-    let largest = |of: fn(&Seen) -> f64| seen.iter().map(of).fold(f64::MIN, f64::max);
+    let largest = |of: fn(&SceneResult) -> f64| seen.iter().map(of).fold(f64::MIN, f64::max);
     println!(
         "{} scenes: short of brute force by at most {:.1e}, told off by {:.1e}; brute force fell short by more than 1e-4 in {}, by at most {:.1e}; {cases:?}",
         seen.len(),
@@ -90,17 +90,17 @@ const CASES: [&str; 8] = [
     "Touching",
 ];
 
-type Draw = fn(&mut ChaCha8Rng) -> Roomy;
+type Draw = fn(&mut ChaCha8Rng) -> LateralScene;
 
-/// Checks a relay at a given altitude with lateral offsets. All cases must occur but those of `but`.
-fn at_its_altitude(seed: u64, draw: Draw, but: &[&str]) {
+/// Checks a relay at a given altitude with lateral offsets. All cases must occur but those of `absent`.
+fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
         draw,
         |scene| (scene.band.0, scene.band.0),
         |scene| aside::best_at(&scene.mission, scene.profile(scene.band.0)).unwrap(),
     );
-    for case in CASES.iter().filter(|case| !but.contains(case)) {
+    for case in CASES.iter().filter(|case| !absent.contains(case)) {
         assert!(seen.contains_key(*case), "{case}: {seen:?}");
     }
 }
@@ -122,25 +122,25 @@ fn anywhere(seed: u64, draw: Draw, cases: &[&str]) {
 }
 
 #[test]
-fn a_relay_aside_at_its_altitude_is_no_worse_than_brute_force() {
-    at_its_altitude(511, Roomy::random, &["Edge(Upward)"]);
+fn a_relay_at_its_altitude_beats_brute_force() {
+    at_its_altitude(511, LateralScene::random, &["Edge(Upward)"]);
 }
 
 #[test]
-fn at_its_altitude_in_noise_it_is_no_worse_than_brute_force() {
-    at_its_altitude(531, Roomy::noisy, &["Edge(Upward)", "Level"]);
+fn a_relay_at_its_altitude_in_noise_beats_brute_force() {
+    at_its_altitude(531, LateralScene::noisy, &["Edge(Upward)", "Level"]);
 }
 
 #[test]
 fn a_relay_aside_is_no_worse_than_brute_force() {
-    anywhere(512, Roomy::random, &CASES);
+    anywhere(512, LateralScene::random, &CASES);
 }
 
 #[test]
 fn a_relay_aside_in_noise_is_no_worse_than_brute_force() {
     let cases = CASES.into_iter().filter(|case| *case != "Level");
     let cases: Vec<&str> = cases.chain(["Wall", "Inside"]).collect();
-    anywhere(532, Roomy::noisy, &cases);
+    anywhere(532, LateralScene::noisy, &cases);
 }
 
 #[test]
@@ -148,23 +148,23 @@ fn one_relay_aside_has_the_recorded_optimum() {
     let (mut worst, mut best, mut below) = (0.0_f64, 0.0_f64, 0);
     let first = 513 << 32;
     for number in 0..300 {
-        let roomy = Roomy::random(&mut ChaCha8Rng::seed_from_u64(first + number));
-        let (found, case) = aside::best_place(&roomy.scene.mission, roomy.power_w()).unwrap();
+        let drawn = LateralScene::random(&mut ChaCha8Rng::seed_from_u64(first + number));
+        let (found, case) = aside::best_place(&drawn.scene.mission, drawn.power_w()).unwrap();
         let corridor = Corridor {
-            least_m: roomy.scene.band.0,
-            most_m: roomy.scene.band.1,
-            left_m: roomy.lateral.0,
-            right_m: roomy.lateral.1,
+            least_m: drawn.scene.band.0,
+            most_m: drawn.scene.band.1,
+            left_m: drawn.lateral.0,
+            right_m: drawn.lateral.1,
         };
-        let Some(judged) = optimum(&roomy.scene.link, corridor, &[]).unwrap() else {
+        let Some(judged) = optimum(&drawn.scene.link, corridor, &[]).unwrap() else {
             assert_eq!(case, AsideCase::Drowned);
             continue;
         };
-        let short = 1.0 - roomy.sir_of(&found) / judged.sir;
+        let short = 1.0 - drawn.sir_of(&found) / judged.sir;
         assert!(
             short <= ALLOWED,
             "{short:e} ({case:?}) {:?}",
-            roomy.scene.link
+            drawn.scene.link
         );
         (worst, best) = (worst.max(short), best.max(-short));
         below += u32::from(short < -1e-6);
@@ -177,13 +177,13 @@ fn one_relay_aside_has_the_recorded_optimum() {
 /// Checks that the solution without lateral offsets is that of Theorems 1 and 3. Permitted offsets never make it
 /// worse.
 #[test]
-fn without_room_it_is_theorems_1_and_3() {
+fn without_lateral_range_it_is_theorems_1_and_3() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(514));
     for _ in 0..10_000 {
         let scene = Scene::random(&mut rng);
         let d = scene.link.distance_m;
         let room = log_uniform(&mut rng, 1e-3, 1.0) * d;
-        let none = Roomy::new(scene, (0.0, 0.0));
+        let none = LateralScene::new(scene, (0.0, 0.0));
         let profile = none.scene.profile(none.scene.band.0);
         let pairs = [
             (
@@ -213,7 +213,7 @@ fn without_room_it_is_theorems_1_and_3() {
             );
             least = least.max(theorem);
         }
-        let more = Roomy::new(none.scene, (-room, room));
+        let more = LateralScene::new(none.scene, (-room, room));
         let (found, _) = aside::best_place(&more.scene.mission, more.power_w()).unwrap();
         assert!(more.sir_of(&found) >= least * (1.0 - ALLOWED));
     }

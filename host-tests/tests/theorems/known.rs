@@ -112,7 +112,7 @@ fn counterexamples_and_degenerate_places() {
         mu_los: 1.0,
         mu_nlos: kappa,
         eta: 1.0,
-        relays: vec![uav_relay_oracle::reference::Station {
+        relays: vec![uav_relay_oracle::reference::Relay {
             altitude_m: 5.0,
             power_w,
         }],

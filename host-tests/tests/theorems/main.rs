@@ -3,9 +3,9 @@
 mod aside;
 mod brute;
 mod known;
+mod lateral_scene;
 mod lemmas;
 mod optima;
-mod roomy;
 mod scene;
 
 /// Largest permitted shortfall from the best SIR, as a fraction.

@@ -150,7 +150,7 @@ fn theorem_3_in_noise_is_no_worse_than_brute_force() {
 }
 
 #[test]
-fn noise_is_no_worse_than_brute_force() {
+fn one_relay_in_noise_is_no_worse_than_brute_force() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(507));
     let (mut worst, mut middle) = (0.0_f64, 0);
     for _ in 0..20_000 {

@@ -30,7 +30,7 @@ fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
 }
 
 #[test]
-fn a_moved_interferer_is_flown_by_all_from_either_end() {
+fn an_uploaded_interferer_is_flown_from_either_end() {
     for relays in [1, 2, 3, 8, 20] {
         for shared in [true, false] {
             for end in [Side::Upstream, Side::Downstream] {
@@ -46,7 +46,7 @@ fn a_moved_interferer_is_flown_by_all_from_either_end() {
 }
 
 #[test]
-fn a_new_band_of_altitudes_is_climbed_into() {
+fn a_new_altitude_band_is_flown_to() {
     let base = MissionConfig {
         band: Band {
             least_m: 15.0,
@@ -140,7 +140,7 @@ fn a_newer_version_overtakes_an_older_one() {
 }
 
 #[test]
-fn an_older_version_changes_nothing() {
+fn an_older_version_has_no_effect() {
     let base = mission(8);
     let (one, two) = (moved(&base, 700.0, -300.0), moved(&base, 100.0, 500.0));
     let mut setup = signed(base, true);
@@ -191,7 +191,7 @@ fn an_infeasible_mission_is_followed_by_a_feasible_one() {
 }
 
 #[test]
-fn an_upload_in_the_midst_of_forming_anew_is_not_forgotten() {
+fn an_upload_during_a_view_change_is_not_lost() {
     let base = mission(6);
     let config = moved(&base, 700.0, -300.0);
     let mut setup = signed(base, true);

@@ -31,7 +31,7 @@ fn flight(seed: u64) -> (Setup, MissionConfig) {
 }
 
 #[test]
-fn no_two_come_close_on_their_way_from_one_mission_to_the_next() {
+fn drones_keep_apart_between_two_missions() {
     for seed in 1..=40 {
         let (setup, config) = flight(seed);
         let outcome = run(setup.clone()).unwrap();

@@ -70,7 +70,7 @@ fn talk(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) -> Vec
 }
 
 #[test]
-fn an_upload_says_what_is_wrong_with_it() {
+fn an_upload_reports_its_errors() {
     let base = mission(3);
     let of = |version, config| Upload::new(&base, version, config).map(|_| ());
     let good = moved(&base, 1.0, 2.0);
@@ -97,7 +97,7 @@ fn an_upload_says_what_is_wrong_with_it() {
 }
 
 #[test]
-fn what_is_stored_is_read_back_and_nothing_else() {
+fn only_stored_bytes_decode_to_the_upload() {
     let base = mission(3);
     let stored = new_place(&base, 9);
     let mut bytes = [0; Upload::LENGTH];
@@ -113,7 +113,7 @@ fn what_is_stored_is_read_back_and_nothing_else() {
 }
 
 #[test]
-fn a_relay_takes_over_from_its_firmware_what_is_newer() {
+fn a_relay_accepts_a_newer_upload_from_its_firmware() {
     let base = mission(3);
     let now = Instant::ZERO;
     let mut relay = alone(base, Wiring::Shared);
@@ -135,7 +135,7 @@ fn a_relay_takes_over_from_its_firmware_what_is_newer() {
 }
 
 #[test]
-fn a_relay_resumes_what_was_made_for_its_mission() {
+fn a_relay_resumes_an_upload_for_its_mission_only() {
     let base = mission(3);
     let five = new_place(&base, 5);
     let mut relay = alone(base, Wiring::Pair);
@@ -155,7 +155,7 @@ fn a_relay_resumes_what_was_made_for_its_mission() {
 }
 
 #[test]
-fn a_single_relay_flies_an_upload_and_the_ground_hears_of_it() {
+fn a_single_relay_flies_an_upload_and_reports_it() {
     let base = mission(1);
     for (wiring, port, end) in [
         (Wiring::Pair, Port::Upstream, Side::Upstream),
@@ -201,7 +201,7 @@ fn a_single_relay_flies_an_upload_and_the_ground_hears_of_it() {
 type Counter = fn(&Relay) -> u32;
 
 #[test]
-fn nobody_answers_a_ground_of_another_key_network_or_mission() {
+fn a_ground_of_another_key_network_or_mission_is_ignored() {
     let base = mission(1);
     let other = Mission::try_new(moved(&base, 1.0, 2.0)).unwrap();
     let stranger = Auth {
@@ -239,7 +239,7 @@ fn nobody_answers_a_ground_of_another_key_network_or_mission() {
 }
 
 #[test]
-fn the_ground_asks_the_next_relay_when_the_nearest_is_silent() {
+fn the_ground_tries_the_next_relay_if_the_nearest_is_silent() {
     let base = mission(6);
     let mut ground = Ground::new(&base, Side::Downstream, 7, Wiring::Shared, auth(1));
     ground.upload(Instant::ZERO, new_place(&base, 1)).unwrap();

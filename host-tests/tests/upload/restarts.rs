@@ -44,7 +44,7 @@ fn a_rebooted_chain_flies_a_stored_upload_at_once() {
 }
 
 #[test]
-fn one_relay_that_has_stored_it_is_enough() {
+fn one_relay_with_a_stored_upload_is_enough() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         for keeper in 1..=8 {
             let others: Vec<u16> = (1..=8).filter(|relay| *relay != keeper).collect();
@@ -59,7 +59,7 @@ fn one_relay_that_has_stored_it_is_enough() {
 }
 
 #[test]
-fn a_chain_that_has_stored_nothing_flies_the_loaded_mission() {
+fn a_chain_without_stored_uploads_flies_the_loaded_mission() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let all: Vec<u16> = (1..=8).collect();
         let (setup, outcome) = power_cut(wiring, &all);

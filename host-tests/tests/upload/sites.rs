@@ -61,7 +61,7 @@ fn judge_between(setup: &Setup, outcome: &Outcome, version: u16) -> Result<(), S
 }
 
 #[test]
-fn a_receiver_that_moves_is_flown_to_by_all_and_back_again() {
+fn all_relays_follow_a_moved_receiver_there_and_back() {
     for shared in [false, true] {
         for end in [Side::Upstream, Side::Downstream] {
             let (base, mut setup) = sited(8, shared);
@@ -78,7 +78,7 @@ fn a_receiver_that_moves_is_flown_to_by_all_and_back_again() {
 }
 
 #[test]
-fn a_moved_receiver_is_flown_to_by_all_in_spite_of_losses() {
+fn all_relays_follow_a_moved_receiver_despite_losses() {
     for seed in 1..=60 {
         let (base, mut setup) = sited(8, seed % 2 == 0);
         setup.seed = seed;

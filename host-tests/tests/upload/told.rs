@@ -24,7 +24,7 @@ fn seed() -> u64 {
 /// Checks that the ground station reports completion once all relays fly the upload, and not before. Frames are lost,
 /// and two ground stations are active.
 #[test]
-fn the_ground_says_flown_only_once_every_relay_flies_it() {
+fn the_ground_reports_flown_once_every_relay_flies_it() {
     let told: Vec<bool> = (0..count())
         .into_par_iter()
         .map(|round| {
@@ -129,7 +129,7 @@ fn tell_places(wires: &mut Wires, base: &Mission) {
 }
 
 #[test]
-fn an_upload_outside_the_geofence_is_refused_and_told() {
+fn an_upload_outside_the_geofence_is_refused_and_reported() {
     let wide = Band {
         least_m: 50.0,
         most_m: 150.0,
@@ -233,7 +233,7 @@ fn a_relay_with_its_own_altitude_refuses_like_the_others() {
 /// Checks that a far relay's refusal reaches the ground station. Only that relay has a geofence; a newer upload
 /// clears the refusal.
 #[test]
-fn a_refusal_of_a_far_relay_is_told_at_the_ground() {
+fn a_refusal_of_a_far_relay_reaches_the_ground() {
     let base = at_120(5, Band::at(120.0));
     for far in 1..=5 {
         for end in ENDS {
@@ -269,7 +269,7 @@ fn a_refusal_of_a_far_relay_is_told_at_the_ground() {
 
 /// Checks that a refusal by any relay reaches the ground station, although frames are lost.
 #[test]
-fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
+fn a_refusal_reaches_the_ground_despite_losses() {
     (0..count()).into_par_iter().for_each(|round| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed() + round);
         let relays = rng.random_range(1..=10);
@@ -311,7 +311,7 @@ fn a_refusal_is_told_at_the_ground_whatever_is_lost() {
 
 /// Checks two ground stations at once. All relays fly the newer upload, and the other station learns of it.
 #[test]
-fn of_two_stations_at_once_the_newer_upload_is_flown() {
+fn the_newer_upload_of_two_stations_is_flown() {
     let settled: Vec<u64> = (0..count())
         .into_par_iter()
         .map(|round| {

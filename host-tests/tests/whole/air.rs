@@ -10,7 +10,7 @@ use uav_relay::{
     Auth, Event, Identity, Instant, Key, MAX_FRAME, Mission, Phase, Port, Relay, Settings, Upload,
     ViewRecord, Wiring,
 };
-use uav_relay_sim::simulator::watch::{Seen, groups};
+use uav_relay_sim::simulator::watch::{ObservedState, groups};
 
 /// Bit rate of a wire, and of each relay's transmitter on the channel.
 const BAUD: u64 = 115_200;
@@ -37,7 +37,7 @@ pub(crate) struct Kind {
 
 /// Scheduled event at a relay or link. Relays are counted from 0.
 #[derive(Clone, Debug)]
-pub(crate) enum Deed {
+pub(crate) enum ScheduledEvent {
     /// Event: the relay is switched on. After a reboot it has its stored votes and upload.
     On(usize),
     Off(usize),
@@ -61,8 +61,8 @@ pub(crate) enum Deed {
 }
 
 #[derive(Clone, Debug)]
-enum Happening {
-    Deed(Deed),
+enum QueuedEvent {
+    Scheduled(ScheduledEvent),
     Frame {
         from: usize,
         to: usize,
@@ -73,7 +73,7 @@ enum Happening {
 }
 
 #[derive(Debug)]
-struct Entry(u64, u64, Happening);
+struct Entry(u64, u64, QueuedEvent);
 
 impl PartialEq for Entry {
     fn eq(&self, other: &Self) -> bool {
@@ -119,7 +119,7 @@ pub(crate) struct Air {
     cuts: Vec<u16>,
     loss: f64,
     rng: ChaCha8Rng,
-    seen: Vec<Seen>,
+    seen: Vec<ObservedState>,
     /// Largest number of groups that flew different agreements at once. The next field is the time of that, µs.
     pub(crate) groups: usize,
     pub(crate) groups_us: u64,
@@ -174,7 +174,7 @@ impl Air {
             .collect();
         let seen = drones
             .iter()
-            .map(|drone| Seen::of(&drone.relay, false))
+            .map(|drone| ObservedState::of(&drone.relay, false))
             .collect();
         Self {
             kind,
@@ -204,14 +204,13 @@ impl Air {
         }
     }
 
-    fn put(&mut self, at_us: u64, happening: Happening) {
-        self.queue
-            .push(Reverse(Entry(at_us, self.order, happening)));
+    fn put(&mut self, at_us: u64, event: QueuedEvent) {
+        self.queue.push(Reverse(Entry(at_us, self.order, event)));
         self.order += 1;
     }
 
-    pub(crate) fn plan(&mut self, at_us: u64, deed: Deed) {
-        self.put(at_us, Happening::Deed(deed));
+    pub(crate) fn plan(&mut self, at_us: u64, event: ScheduledEvent) {
+        self.put(at_us, QueuedEvent::Scheduled(event));
     }
 
     pub(crate) fn run(&mut self, until_us: u64) {
@@ -223,7 +222,7 @@ impl Air {
             };
             self.now_us = at_us;
             let touched = match happening {
-                Happening::Wake(at) => {
+                QueuedEvent::Wake(at) => {
                     let drone = &mut self.drones[at];
                     if drone.wake_us != Some(at_us) || !drone.is_on {
                         continue;
@@ -233,7 +232,7 @@ impl Air {
                     drone.relay.handle_timeout(now);
                     at
                 }
-                Happening::Frame {
+                QueuedEvent::Frame {
                     from,
                     to,
                     port,
@@ -250,11 +249,11 @@ impl Air {
                     drone.relay.handle_bytes(now, port, &bytes);
                     to
                 }
-                Happening::Deed(deed) => {
+                QueuedEvent::Scheduled(event) => {
                     if self.story {
-                        println!("{:10.3} {deed:?}", at_us as f64 / 1e6);
+                        println!("{:10.3} {event:?}", at_us as f64 / 1e6);
                     }
-                    match self.act(deed) {
+                    match self.act(event) {
                         Some(at) => at,
                         None => continue,
                     }
@@ -265,10 +264,10 @@ impl Air {
         self.now_us = until_us;
     }
 
-    fn act(&mut self, deed: Deed) -> Option<usize> {
+    fn act(&mut self, event: ScheduledEvent) -> Option<usize> {
         let all = self.drones.len();
-        match deed {
-            Deed::On(at) => {
+        match event {
+            ScheduledEvent::On(at) => {
                 let seed = self.rng.random();
                 let drone = &mut self.drones[at];
                 if drone.is_on {
@@ -288,20 +287,20 @@ impl Air {
                 }
                 return Some(at);
             }
-            Deed::Off(at) => {
+            ScheduledEvent::Off(at) => {
                 self.drones[at].is_on = false;
                 return Some(at);
             }
-            Deed::Clear(at) => {
+            ScheduledEvent::Clear(at) => {
                 let drone = &mut self.drones[at];
                 let now = drone.clock(self.now_us);
                 drone.relay.clear_duplicate_index(now);
                 return Some(at);
             }
-            Deed::Cut { from, to } => self.cuts[from * all + to] += 1,
-            Deed::Mend { from, to } => self.cuts[from * all + to] -= 1,
-            Deed::Loss(loss) => self.loss = loss,
-            Deed::Upload(at, upload) => {
+            ScheduledEvent::Cut { from, to } => self.cuts[from * all + to] += 1,
+            ScheduledEvent::Mend { from, to } => self.cuts[from * all + to] -= 1,
+            ScheduledEvent::Loss(loss) => self.loss = loss,
+            ScheduledEvent::Upload(at, upload) => {
                 let drone = &mut self.drones[at];
                 if drone.is_on {
                     let now = drone.clock(self.now_us);
@@ -310,7 +309,7 @@ impl Air {
                     return Some(at);
                 }
             }
-            Deed::Step(at, by_us) => {
+            ScheduledEvent::Step(at, by_us) => {
                 let drone = &mut self.drones[at];
                 let least = i64::try_from(self.now_us).map_or(i64::MIN, |now_us| -now_us);
                 drone.ahead_us = (drone.ahead_us + by_us).max(least);
@@ -340,7 +339,7 @@ impl Air {
                 self.send(at, sent.port, &frame[..sent.len]);
             }
             while let Some(event) = self.drones[at].relay.poll_event() {
-                self.tell(at, event);
+                self.count_event(at, event);
             }
             let drone = &mut self.drones[at];
             if let Some(wake) = drone.relay.poll_timeout() {
@@ -348,12 +347,12 @@ impl Air {
                 let wake_us = self.now_us + wake.since(now).as_micros();
                 if drone.wake_us.is_none_or(|known| known != wake_us) {
                     drone.wake_us = Some(wake_us);
-                    self.put(wake_us, Happening::Wake(at));
+                    self.put(wake_us, QueuedEvent::Wake(at));
                 }
             }
         }
         self.compare_copies();
-        let seen = Seen::of(&self.drones[at].relay, self.drones[at].is_on);
+        let seen = ObservedState::of(&self.drones[at].relay, self.drones[at].is_on);
         if seen == self.seen[at] {
             return;
         }
@@ -371,7 +370,7 @@ impl Air {
         }
     }
 
-    fn tell(&mut self, at: usize, event: Event) {
+    fn count_event(&mut self, at: usize, event: Event) {
         if self.story {
             let relay = &self.drones[at].relay;
             println!(
@@ -413,7 +412,7 @@ impl Air {
                 let bytes = Rc::clone(&bytes);
                 self.put(
                     at_us,
-                    Happening::Frame {
+                    QueuedEvent::Frame {
                         from,
                         to,
                         port: into,
@@ -431,7 +430,7 @@ impl Air {
     }
 
     /// Returns the observed states of all relays except the copied one and its copy.
-    fn uncopied(&self) -> Vec<Seen> {
+    fn uncopied(&self) -> Vec<ObservedState> {
         let drones = (0..self.drones.len()).filter(|at| Some(self.place(*at)) != self.kind.copied);
         drones.map(|at| self.seen[at]).collect()
     }
@@ -479,11 +478,11 @@ impl Air {
     /// Returns the size of the largest group that flies one agreement with all members of its view. A view is the
     /// agreed membership of the chain.
     fn flying(&self) -> usize {
-        let holds = |seen: &&Seen| {
+        let holds = |seen: &&ObservedState| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding
         };
-        let holding: Vec<&Seen> = self.seen.iter().filter(holds).collect();
-        let of = |one: &&Seen| {
+        let holding: Vec<&ObservedState> = self.seen.iter().filter(holds).collect();
+        let of = |one: &&ObservedState| {
             let same = holding.iter().filter(|other| other.view == one.view);
             let count = same.count();
             (count == usize::from(one.relays)).then_some(count)
@@ -496,7 +495,7 @@ impl Air {
         let all = usize::from(self.kind.mission.relays());
         let is_on = |at: &usize| self.seen[*at].is_on;
         let on = (0..self.seen.len()).filter(is_on);
-        let on: Vec<&Seen> = on.map(|at| &self.seen[at]).collect();
+        let on: Vec<&ObservedState> = on.map(|at| &self.seen[at]).collect();
         let places = (0..self.seen.len()).filter(is_on).map(|at| self.place(at));
         let places: std::collections::BTreeSet<usize> = places.collect();
         places.len() == all

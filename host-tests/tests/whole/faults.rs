@@ -13,7 +13,7 @@ use super::schedule::{SECOND, Schedule};
 use host_tests::fixtures::mission;
 
 /// Returns the number of times that all relays together raised the event `name`.
-fn told(air: &Air, name: &str) -> u32 {
+fn event_count(air: &Air, name: &str) -> u32 {
     let of = |((_, event), times): (&(usize, String), &u32)| (event == name).then_some(*times);
     air.events.iter().filter_map(of).sum()
 }
@@ -21,17 +21,17 @@ fn told(air: &Air, name: &str) -> u32 {
 /// Checks that four relays fly without long pauses although one link works in one direction only. One of the relays
 /// may be left out.
 #[test]
-fn a_link_that_is_one_way_from_the_start_leaves_one_relay_out_for_good() {
+fn a_permanent_one_way_link_leaves_out_one_relay_for_good() {
     let mut late = Vec::new();
     for (from, to) in [(2, 1), (1, 2), (0, 1), (1, 0), (3, 2), (2, 3)] {
         for seed in 0..10 {
             let mut schedule = Schedule::of(4, seed);
-            schedule.deafen(from, to, 0, 3_600 * SECOND);
+            schedule.cut_link_between(from, to, 0, 3_600 * SECOND);
             let mut air = schedule.begun();
             air.spare = 1;
             air.run(900 * SECOND);
             air.measure();
-            let found = told(&air, "NeighbourBack");
+            let found = event_count(&air, "NeighbourBack");
             println!(
                 "relay {} deaf to {}: flown {:.1} s, the first at {:?} s, the longest pause {:.1} s, {found} times found, {} frames; {}",
                 to + 1,
@@ -103,7 +103,7 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
 /// relay 3, which is linked to neither relay 1 nor relay 2. If its hello counted these two, relay 6 would select it
 /// in place of relay 5 every 16 s.
 #[test]
-fn a_relay_that_is_left_out_draws_no_other_away() {
+fn a_left_out_relay_attracts_no_other() {
     let (air, share) = flown_with_flaps(2, (10_191_000, 25_107_000), 325);
     println!("{:.1} %; {}", 100.0 * share, air.described());
     assert!(share > 0.98, "{share}");
@@ -147,7 +147,7 @@ fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
 /// Checks that a neighbour with another mission is reported seldom. No event may occur more than 22 times in ten
 /// minutes.
 #[test]
-fn a_relay_of_another_mission_is_told_of_once_a_minute() {
+fn a_mission_mismatch_is_reported_once_a_minute() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let mut schedule = Schedule::of(4, 1);
         schedule.kind.wiring = wiring;
@@ -157,7 +157,7 @@ fn a_relay_of_another_mission_is_told_of_once_a_minute() {
         let most = air.events.iter().max_by_key(|(_, times)| **times);
         println!(
             "{wiring:?}: {} times, {} frames, most {most:?}; {}",
-            told(&air, "MissionMismatch"),
+            event_count(&air, "MissionMismatch"),
             air.frames,
             air.described()
         );
@@ -171,7 +171,7 @@ fn a_relay_of_another_mission_is_told_of_once_a_minute() {
 
 /// Checks that an epoch of relay 2 that goes back is reported, and costs few frames.
 #[test]
-fn an_epoch_that_goes_back_on_wires_is_told_and_costs_few_frames() {
+fn a_returning_epoch_on_wires_is_reported_and_costs_little() {
     for wiring in [Wiring::Pair, Wiring::Shared] {
         let mut schedule = Schedule::of(4, 1);
         schedule.kind.wiring = wiring;
@@ -188,7 +188,7 @@ fn an_epoch_that_goes_back_on_wires_is_told_and_costs_few_frames() {
             air.events,
             air.described()
         );
-        assert!(told(&air, "EpochWentBack") > 0);
+        assert!(event_count(&air, "EpochWentBack") > 0);
         assert!(rate < 6.0, "{rate} frames a second");
     }
 }

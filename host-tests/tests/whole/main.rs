@@ -25,7 +25,7 @@ fn number(name: &str, usual: u64) -> u64 {
 
 /// Result of one schedule of faults.
 #[derive(Clone, Debug)]
-struct Found {
+struct Measured {
     seed: u64,
     /// Time from the last fault until the chain was whole for good, s; `None` beyond 15 minutes. In a whole chain,
     /// all relays hold positions in one membership view.
@@ -37,12 +37,12 @@ struct Found {
     text: String,
 }
 
-fn flown(seed: u64, schedule: &Schedule) -> Found {
+fn flown(seed: u64, schedule: &Schedule) -> Measured {
     ended(seed, schedule, schedule.begun())
 }
 
 /// Runs the chain `air` to the end of its schedule, and until it is whole.
-fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
+fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Measured {
     let end = schedule.faults_end_us;
     air.run(end);
     // The chain has to stay whole for a minute.
@@ -54,7 +54,7 @@ fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
         air.run(at);
     }
     let whole_us = air.whole_since_us.map(|since| since.saturating_sub(end));
-    Found {
+    Measured {
         seed,
         whole_s: whole_us.map(|us| us as f64 / 1e6),
         groups: air.groups,
@@ -72,7 +72,7 @@ fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Found {
 }
 
 /// Runs `count` schedules on all cores. Returns the results in the order of their seeds.
-fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Found> {
+fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Measured> {
     let next = AtomicU64::new(first);
     let all = Mutex::new(Vec::new());
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -91,20 +91,20 @@ fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Found
         }
     });
     let mut all = all.into_inner().unwrap();
-    all.sort_by_key(|found: &Found| found.seed);
+    all.sort_by_key(|found: &Measured| found.seed);
     all
 }
 
 #[test]
-fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
+fn every_schedule_ends_in_one_whole_chain_within_120_s() {
     let first = number("SEED", 1);
     let count = number("COUNT", 150);
     let all = flown_all(first, count, random);
-    let late: Vec<&Found> = all
+    let late: Vec<&Measured> = all
         .iter()
         .filter(|found| found.whole_s.is_none_or(|s| s > WHOLE_S as f64))
         .collect();
-    let two: Vec<&Found> = all.iter().filter(|found| found.groups > 1).collect();
+    let two: Vec<&Measured> = all.iter().filter(|found| found.groups > 1).collect();
     let mut took: Vec<(f64, u64)> = all
         .iter()
         .map(|found| (found.whole_s.unwrap_or(f64::INFINITY), found.seed))
@@ -135,7 +135,7 @@ fn every_schedule_of_faults_ends_in_one_whole_chain_within_120_s() {
 ///
 /// Two chains can fly only where a copy is on either side of a cut, because each copy has its vote.
 #[test]
-fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
+fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
     let all = flown_all(first, count, with_copy);
     let mut faults = Vec::new();
@@ -166,7 +166,7 @@ fn with_a_copied_relay_one_chain_flies_and_is_whole_once_the_other_is_gone() {
 /// Their causes are view numbers far ahead, an idle neighbour that is switched on elsewhere, two interleaved chains,
 /// and two candidates for one position that are received in turn.
 #[test]
-fn schedules_that_were_stuck_once_end_in_one_whole_chain() {
+fn schedules_that_once_got_stuck_end_in_one_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
         let found = flown(seed, &without_steps(seed));
         assert!(
@@ -205,13 +205,13 @@ fn a_radio_that_was_off_for_hours_joins_again_within_120_s() {
 }
 
 #[test]
-fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
+fn a_drone_switched_on_hours_early_joins_within_120_s() {
     let mut late = Vec::new();
     for (relays, early) in [(2, 1), (4, 0), (4, 3), (6, 2)] {
         for minutes in [10, 25, 120] {
             let mut schedule = Schedule::of(relays, 1);
             for at in (0..usize::from(relays)).filter(|at| *at != early) {
-                schedule.deeds[at].0 = 60 * minutes * SECOND;
+                schedule.events[at].0 = 60 * minutes * SECOND;
             }
             schedule.faults_end_us = 60 * minutes * SECOND;
             let found = flown(1, &schedule);
@@ -232,7 +232,7 @@ fn a_drone_that_was_switched_on_hours_early_is_joined_within_120_s() {
 /// Checks that a chain recovers if one relay has a stored vote with a far later view number. The vote is from an
 /// earlier flight.
 #[test]
-fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
+fn a_relay_with_far_later_views_joins_within_120_s() {
     for (relays, later) in [(2_u16, 1), (4, 0), (5, 2), (8, 7)] {
         for number in [257, 3_000, 20_000, 100_000] {
             let schedule = Schedule::of(relays, 1);
@@ -256,7 +256,7 @@ fn a_relay_with_far_later_view_numbers_is_joined_within_120_s() {
 /// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
 /// Returns the number of chains, those that recovered late, and those that flew as two chains at once.
-fn with_steps(forward: bool) -> (u64, Vec<Found>, Vec<Found>) {
+fn with_steps(forward: bool) -> (u64, Vec<Measured>, Vec<Measured>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);
     for seed in 1..=count {
@@ -297,7 +297,7 @@ fn clocks_that_step_back_leave_one_whole_chain() {
 /// Checks clocks that step forward. A step ends the wait for others' leases early, so that two chains may fly until
 /// these expire.
 #[test]
-fn clocks_that_step_forward_leave_a_whole_chain_and_seldom_two_for_a_while() {
+fn clocks_that_step_forward_seldom_split_the_chain() {
     let (count, late, two) = with_steps(true);
     assert!(late.is_empty());
     assert!(two.len() as u64 * 100 <= count);

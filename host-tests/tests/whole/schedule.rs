@@ -4,7 +4,7 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use uav_relay::{Interference, Interferer, Upload, Wiring};
 
-use super::air::{Air, Deed, Kind};
+use super::air::{Air, Kind, ScheduledEvent};
 use host_tests::fixtures::mission;
 
 pub(crate) const SECOND: u64 = 1_000_000;
@@ -13,7 +13,7 @@ pub(crate) const SECOND: u64 = 1_000_000;
 #[derive(Clone, Debug)]
 pub(crate) struct Schedule {
     pub(crate) kind: Kind,
-    pub(crate) deeds: Vec<(u64, Deed)>,
+    pub(crate) events: Vec<(u64, ScheduledEvent)>,
     pub(crate) faults_end_us: u64,
 }
 
@@ -30,50 +30,50 @@ impl Schedule {
             goes_back: None,
             copied: None,
         };
-        let on = (0..usize::from(relays)).map(|at| (0, Deed::On(at)));
+        let on = (0..usize::from(relays)).map(|at| (0, ScheduledEvent::On(at)));
         Self {
             kind,
-            deeds: on.collect(),
+            events: on.collect(),
             faults_end_us: 0,
         }
     }
 
     pub(crate) fn begun(&self) -> Air {
         let mut air = Air::new(self.kind.clone());
-        for (at_us, deed) in &self.deeds {
-            air.plan(*at_us, deed.clone());
+        for (at_us, event) in &self.events {
+            air.plan(*at_us, event.clone());
         }
         air
     }
 
-    fn put(&mut self, at_us: u64, deed: Deed) {
-        self.deeds.push((at_us, deed));
+    fn put(&mut self, at_us: u64, event: ScheduledEvent) {
+        self.events.push((at_us, event));
         self.faults_end_us = self.faults_end_us.max(at_us);
     }
 
     /// Switches relay `at` off at `off_us`, and on again at `on_us`.
     pub(crate) fn reboot(&mut self, at: usize, off_us: u64, on_us: u64) {
-        self.put(off_us, Deed::Off(at));
-        self.put(on_us, Deed::On(at));
+        self.put(off_us, ScheduledEvent::Off(at));
+        self.put(on_us, ScheduledEvent::On(at));
     }
 
     /// Steps the clock of relay `at` by a millisecond to ten hours, forward or back.
     pub(crate) fn step(&mut self, at: usize, at_us: u64, forward: bool, rng: &mut ChaCha8Rng) {
         let by_us = 1e3 * f64::powf(3.6e7, rng.random_range(0.0..1.0));
         let by_us = if forward { by_us as i64 } else { -by_us as i64 };
-        self.put(at_us, Deed::Step(at, by_us));
+        self.put(at_us, ScheduledEvent::Step(at, by_us));
     }
 
     /// Loses the frames from relay `from` to relay `to` between two times.
-    pub(crate) fn deafen(&mut self, from: usize, to: usize, from_us: u64, until_us: u64) {
-        self.put(from_us, Deed::Cut { from, to });
-        self.put(until_us, Deed::Mend { from, to });
+    pub(crate) fn cut_link_between(&mut self, from: usize, to: usize, from_us: u64, until_us: u64) {
+        self.put(from_us, ScheduledEvent::Cut { from, to });
+        self.put(until_us, ScheduledEvent::Mend { from, to });
     }
 
     /// Cuts the link of two relays in both directions between two times.
-    pub(crate) fn part(&mut self, one: usize, other: usize, from_us: u64, until_us: u64) {
-        self.deafen(one, other, from_us, until_us);
-        self.deafen(other, one, from_us, until_us);
+    pub(crate) fn cut_both_links(&mut self, one: usize, other: usize, from_us: u64, until_us: u64) {
+        self.cut_link_between(one, other, from_us, until_us);
+        self.cut_link_between(other, one, from_us, until_us);
     }
 
     /// Separates the relays for which `is_in` is true from all others, between two times.
@@ -81,7 +81,7 @@ impl Schedule {
         let all = usize::from(self.kind.mission.relays());
         for one in 0..all {
             for other in (0..one).filter(|other| is_in(*other) != is_in(one)) {
-                self.part(one, other, from_us, until_us);
+                self.cut_both_links(one, other, from_us, until_us);
             }
         }
     }
@@ -96,7 +96,7 @@ impl Schedule {
     ) {
         let mut at_us = from_us;
         while at_us < until_us {
-            self.part(one, other, at_us, (at_us + down_us).min(until_us));
+            self.cut_both_links(one, other, at_us, (at_us + down_us).min(until_us));
             at_us += down_us + up_us;
         }
     }
@@ -149,12 +149,12 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
             1..5 => 10 * SECOND,
             _ => 240 * SECOND,
         };
-        for (at_us, _) in &mut schedule.deeds {
+        for (at_us, _) in &mut schedule.events {
             if rng.random_bool(0.5) {
                 *at_us = rng.random_range(0..most);
             }
         }
-        let starts = schedule.deeds.iter().map(|(at_us, _)| *at_us);
+        let starts = schedule.events.iter().map(|(at_us, _)| *at_us);
         schedule.faults_end_us = starts.max().unwrap_or(0);
     }
     let begun = schedule.faults_end_us.min(600 * SECOND);
@@ -194,14 +194,14 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
                 let part: Vec<bool> = (0..all).map(|_| rng.random()).collect();
                 schedule.cut(|at| part[at], from_us, until_us);
             }
-            3 => schedule.part(one, other, from_us, until_us),
-            4 => schedule.deafen(one, other, from_us, until_us),
+            3 => schedule.cut_both_links(one, other, from_us, until_us),
+            4 => schedule.cut_link_between(one, other, from_us, until_us),
             5 => {
                 // One relay receives no frames, or none of its frames is received.
                 let mute = rng.random_bool(0.5);
                 for other in (0..all).filter(|other| *other != one) {
                     let (from, to) = if mute { (one, other) } else { (other, one) };
-                    schedule.deafen(from, to, from_us, until_us);
+                    schedule.cut_link_between(from, to, from_us, until_us);
                 }
             }
             6 => {
@@ -209,8 +209,8 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
                 schedule.flap((one, other), period, from_us, until_us);
             }
             7 => {
-                schedule.put(from_us, Deed::Loss(rng.random_range(0.05..0.7)));
-                schedule.put(until_us, Deed::Loss(0.0));
+                schedule.put(from_us, ScheduledEvent::Loss(rng.random_range(0.05..0.7)));
+                schedule.put(until_us, ScheduledEvent::Loss(0.0));
             }
             _ => schedule.reboot(one, from_us, until_us),
         }
@@ -218,7 +218,10 @@ pub(crate) fn without_steps(seed: u64) -> Schedule {
     if schedule.kind.signed && rng.random_bool(0.5) {
         let at_us = rng.random_range(0..=schedule.faults_end_us);
         let upload = moved(&schedule, rng);
-        schedule.put(at_us, Deed::Upload(rng.random_range(0..all), upload));
+        schedule.put(
+            at_us,
+            ScheduledEvent::Upload(rng.random_range(0..all), upload),
+        );
     }
     schedule
 }
@@ -252,31 +255,31 @@ pub(crate) fn with_copy(seed: u64) -> Schedule {
     if rng.random_bool(0.5) {
         // The copy is the only fault.
         schedule
-            .deeds
-            .retain(|(_, deed)| matches!(deed, Deed::On(_)));
-        let starts = schedule.deeds.iter().map(|(at_us, _)| *at_us);
+            .events
+            .retain(|(_, event)| matches!(event, ScheduledEvent::On(_)));
+        let starts = schedule.events.iter().map(|(at_us, _)| *at_us);
         schedule.faults_end_us = starts.max().unwrap_or(0);
     }
     let most_us = schedule.faults_end_us.min(600 * SECOND) + 60 * SECOND;
     let on_us = rng.random_range(0..most_us);
-    schedule.put(on_us, Deed::On(copy));
+    schedule.put(on_us, ScheduledEvent::On(copy));
     if rng.random_bool(0.3) {
-        schedule.part(copied, copy, 0, rng.random_range(0..most_us + 60 * SECOND));
+        schedule.cut_both_links(copied, copy, 0, rng.random_range(0..most_us + 60 * SECOND));
     }
     let gone_us = schedule.faults_end_us + rng.random_range(0..120 * SECOND);
     // With a key, the neighbours refuse the copy with the older epoch.
     let rebooted = schedule
-        .deeds
+        .events
         .iter()
-        .any(|(_, deed)| matches!(deed, Deed::Off(at) if *at == copied));
+        .any(|(_, event)| matches!(event, ScheduledEvent::Off(at) if *at == copied));
     let (gone, left) = if schedule.kind.signed && rebooted || rng.random_bool(0.5) {
         (copy, copied)
     } else {
         (copied, copy)
     };
-    schedule.put(gone_us, Deed::Off(gone));
+    schedule.put(gone_us, ScheduledEvent::Off(gone));
     if rng.random_bool(0.5) {
-        schedule.put(gone_us, Deed::Clear(left));
+        schedule.put(gone_us, ScheduledEvent::Clear(left));
     }
     schedule
 }
@@ -285,8 +288,8 @@ impl Schedule {
     /// Returns true if no link between two relays is ever cut in this schedule.
     pub(crate) fn is_uncut(&self) -> bool {
         !self
-            .deeds
+            .events
             .iter()
-            .any(|(_, deed)| matches!(deed, Deed::Cut { .. }))
+            .any(|(_, event)| matches!(event, ScheduledEvent::Cut { .. }))
     }
 }

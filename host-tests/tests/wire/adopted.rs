@@ -8,30 +8,30 @@ use uav_relay::{
 };
 
 use super::kinds::{FIELD, FIRST, beat, one_of_each};
+use super::message::WireMessage;
 use super::offer::{KEPT, kept, mission_id, upload};
-use super::said::Said;
-use super::signed::{Met, NOW, settings};
+use super::signed::{NOW, SignedBench, settings};
 use super::votes::*;
 
 /// Returns relay 4, which has adopted an upload of version 2 in membership view 1 of all eight relays. The upload
 /// comes with it.
-fn adopted() -> (Met, Said) {
-    let mut met = Met::fourth();
+fn adopted() -> (SignedBench, WireMessage) {
+    let mut met = SignedBench::fourth();
     let newer = upload(2, met.base);
     adopts(&mut met, &newer);
     (met, newer)
 }
 
 /// Makes relay 4 receive the upload `newer`, and adopt it in membership view 1 of all eight relays.
-pub(crate) fn adopts(met: &mut Met, newer: &Said) {
+pub(crate) fn adopts(met: &mut SignedBench, newer: &WireMessage) {
     let of = mission_id(newer);
-    met.hears(0, newer);
-    met.hears(1, &hello(met.base, 4, of, 0));
-    met.sends_after(NOW);
-    let out = met.hears(0, &proposed(id(1, 1), of, 3, 8));
+    met.receive(0, newer);
+    met.receive(1, &hello(met.base, 4, of, 0));
+    met.sent_after(NOW);
+    let out = met.receive(0, &proposed(id(1, 1), of, 3, 8));
     assert_eq!(out, [(5, proposed(id(1, 1), of, 4, 8))]);
     assert_eq!((met.version(), met.view()), (0, ViewId::LOADED));
-    let out = met.hears(1, &granted(id(1, 1), of, 5, 8));
+    let out = met.receive(1, &granted(id(1, 1), of, 5, 8));
     assert_eq!(out, [(3, granted(id(1, 1), of, 4, 8))]);
 }
 
@@ -55,41 +55,43 @@ fn a_granted_view_flies_the_mission_of_its_proposal() {
         (base ^ 0x4000, [1, 0]),
     ] {
         let mut after = met.clone();
-        let out = after.hears(0, &one_of_each(FIRST, digest)[0]);
+        let out = after.receive(0, &one_of_each(FIRST, digest)[0]);
         let stats = after.stats();
         assert_eq!([stats.view, stats.mission], expected, "{digest:04x}");
-        let hello = |(to, said): &(u16, Said)| *to == 3 && said.is("Hello") && said.has(FLIES);
+        let hello = |(to, message): &(u16, WireMessage)| {
+            *to == 3 && message.is("Hello") && message.has(FLIES)
+        };
         assert_eq!(out.iter().any(hello), expected != [0, 0], "{digest:04x}");
     }
     // Heartbeats always carry the base's digest.
     for (mission, expected) in [(base, 0), (flown, 1), (own, 1)] {
         let mut after = met.clone();
-        after.hears(0, &beat(mission, 0, 0));
+        after.receive(0, &beat(mission, 0, 0));
         assert_eq!(after.stats().mission, expected);
     }
 }
 
 #[test]
-fn a_decision_of_the_flown_mission_is_taken_of_others_not() {
+fn only_a_decision_of_the_flown_mission_is_accepted() {
     let (mut met, flown) = adopted();
     met.events();
-    met.hears(0, &proposed(id(2, 1), mission_id(&flown), 3, 8));
+    met.receive(0, &proposed(id(2, 1), mission_id(&flown), 3, 8));
     let next = upload(3, met.base);
-    met.hears(0, &next);
-    met.sends_after(NOW);
+    met.receive(0, &next);
+    met.sent_after(NOW);
     for (of, view) in [
         ((met.base, 0), 1),
         (mission_id(&next), 1),
         (mission_id(&flown), 2),
     ] {
         let mut after = met.clone();
-        after.hears(1, &granted(id(2, 1), of, 5, 8));
+        after.receive(1, &granted(id(2, 1), of, 5, 8));
         let flies = (after.version(), after.view().number());
         assert_eq!(flies, (2, view), "{of:?}");
         if view == 2 {
             // The relay still holds a newer mission than it flies.
-            let out = after.sends_after(NOW + Duration::from_millis(1));
-            let call = near(1, 5, &hello(met.base, 3, mission_id(&next), ASKS | FORMS));
+            let out = after.sent_after(NOW + Duration::from_millis(1));
+            let call = with_neighbours(1, 5, &hello(met.base, 3, mission_id(&next), ASKS | FORMS));
             let call = call.with(json!({ "latest_view": id(2, 1) }));
             assert_eq!(out, [(3, call)]);
         }
@@ -97,27 +99,27 @@ fn a_decision_of_the_flown_mission_is_taken_of_others_not() {
 }
 
 #[test]
-fn in_a_field_no_upload_is_held() {
+fn in_a_field_no_upload_is_stored() {
     let mission = MissionConfig {
         interference: Interference::Field(FIELD),
         ..paper(8)
     };
     let mission = Mission::try_new(mission).unwrap();
-    let mut met = Met::new(mission, 4, settings(Wiring::Pair), &[(3, Port::Upstream)]);
+    let mut met = SignedBench::new(mission, 4, settings(Wiring::Pair), &[(3, Port::Upstream)]);
     // The mission and the base happen to have the same digest.
-    met.hears(0, &upload(1, met.base));
+    met.receive(0, &upload(1, met.base));
     assert_eq!((met.held(), met.counted()), (None, vec!["received"]));
 }
 
 #[test]
-fn a_stored_mission_is_held_and_flown_after_a_reboot() {
+fn a_stored_mission_is_flown_after_a_reboot() {
     let (met, newer) = adopted();
     let mut bytes = [0; KEPT];
     met.upload().unwrap().encode(&mut bytes).unwrap();
     assert_eq!(bytes[..], kept(&newer));
     let upload = Upload::decode(&bytes).unwrap();
     for remembers in [false, true] {
-        let mut met = Met::fourth();
+        let mut met = SignedBench::fourth();
         if remembers {
             met.resume(&upload).unwrap();
         }
@@ -127,10 +129,10 @@ fn a_stored_mission_is_held_and_flown_after_a_reboot() {
         } else {
             (met.base, 0)
         };
-        let answer = near(1, 1, &hello(met.base, 3, holds, FRESH | FLIES));
-        assert_eq!(met.hears(0, &asks), [(3, answer)]);
+        let answer = with_neighbours(1, 1, &hello(met.base, 3, holds, FRESH | FLIES));
+        assert_eq!(met.receive(0, &asks), [(3, answer)]);
         assert_eq!((met.version(), met.view()), (holds.1, ViewId::LOADED));
-        met.hears(0, &one_of_each(FIRST, mission_id(&newer).0)[0]);
+        met.receive(0, &one_of_each(FIRST, mission_id(&newer).0)[0]);
         assert_eq!(met.stats().view, u32::from(!remembers));
     }
 }
@@ -141,14 +143,14 @@ fn a_stored_mission_is_held_and_flown_after_a_reboot() {
 /// `dead_after` ago; a relay's offer repeats the number that it received.
 #[test]
 fn an_offer_that_answers_no_recent_hello_is_stale() {
-    let met = Met::fourth();
+    let met = SignedBench::fourth();
     let newer = upload(2, met.base);
     let after = |ms| NOW + Duration::from_millis(ms);
-    let first = met.number(0, NOW);
+    let first = met.offer_number(0, NOW);
     assert_ne!(first, 0);
-    assert_eq!(met.number(0, after(14_999)), first);
+    assert_eq!(met.offer_number(0, after(14_999)), first);
     let next = if first == u16::MAX { 1 } else { first + 1 };
-    assert_eq!(met.number(0, after(15_000)), next);
+    assert_eq!(met.offer_number(0, after(15_000)), next);
     // The relay has not sent a hello with the second number yet.
     for (answer, ms, counts) in [
         (first, 0, true),
@@ -160,28 +162,28 @@ fn an_offer_that_answers_no_recent_hello_is_stale() {
     ] {
         let mut met = met.clone();
         let offer = newer.with(json!({ "offer_number": answer }));
-        let out = met.hears_as_it_is(0, after(ms), &offer);
+        let out = met.receive_unchanged(0, after(ms), &offer);
         let expected = counts.then_some(mission_id(&newer));
         assert_eq!(met.held(), expected, "{answer} at {ms}");
         assert_eq!(met.stats().stale, u32::from(!counts));
         // In either case the neighbour gets a hello, whose number the next offer repeats.
-        let told = |(to, said): &(u16, Said)| *to == 3 && said.is("Hello");
+        let told = |(to, message): &(u16, WireMessage)| *to == 3 && message.is("Hello");
         assert!(out.iter().any(told), "{answer} at {ms}: {out:?}");
     }
     // A hello with the next number was sent, and another with the one after that.
     let mut later = met.clone();
     let asks = hello(met.base, 4, (met.base, 0), ASKS);
     for (ms, first_counts) in [(15_000, true), (30_000, false)] {
-        later.hears_as_it_is(0, after(ms), &asks);
+        later.receive_unchanged(0, after(ms), &asks);
         let mut after_it = later.clone();
         let offer = newer.with(json!({ "offer_number": first }));
-        after_it.hears_as_it_is(1, after(ms), &offer);
+        after_it.receive_unchanged(1, after(ms), &offer);
         assert_eq!(after_it.held().is_some(), first_counts, "at {ms}");
     }
     let mut told = met.clone();
-    told.hears(0, &newer);
-    told.sends_after(NOW);
+    told.receive(0, &newer);
+    told.sent_after(NOW);
     let older = hello(met.base, 4, (met.base, 0), 0).with(json!({ "offer_number": 0xABCD }));
     let answers = newer.with(json!({ "offer_number": 0xABCD }));
-    assert_eq!(told.hears(1, &older), [(5, answers)]);
+    assert_eq!(told.receive(1, &older), [(5, answers)]);
 }

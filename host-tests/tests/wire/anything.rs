@@ -15,15 +15,15 @@ use uav_relay_decode::envelope::unsigned;
 use super::bench::Bench;
 use super::config;
 use super::kinds::{FIELD, FIRST, WEAK, WILD, mission, one_of_each, place, source, ways};
-use super::said::{Said, plain_of};
+use super::message::{WireMessage, plain_of};
 use super::strategies::messages;
 use super::votes::mark;
 
 /// Sets the pass number and the mission digest of a message, in messages that have them.
-fn renamed(said: &Said, number: u16, mission: u16) -> Said {
+fn renamed(message: &WireMessage, number: u16, mission: u16) -> WireMessage {
     // The view of that number proposed by relay 1; proposed numbers are above 0.
     let view = u32::from(number.max(1)) << 10 | 1;
-    said.with(match said.name() {
+    message.with(match message.name() {
         "Claim" | "Busy" => json!({ "number": number }),
         "Heartbeat" | "Level" => json!({ "mission": mission }),
         // A fence's number is that of its association, never 0.
@@ -36,7 +36,7 @@ fn renamed(said: &Said, number: u16, mission: u16) -> Said {
         }),
         "Decision" => {
             // An accepted view is at most the proposed one.
-            let mut accepted = json!(said.fields())["accepted"].take();
+            let mut accepted = json!(message.fields())["accepted"].take();
             if let Some(accepted) = accepted.as_object_mut() {
                 let least = view.min(accepted["view"].as_u64().unwrap() as u32);
                 accepted["view"] = least.into();
@@ -50,49 +50,49 @@ fn renamed(said: &Said, number: u16, mission: u16) -> Said {
 }
 
 /// Returns the message with some fields changed to values that are plausible in the test's mission.
-fn tamed(said: &Said) -> Said {
+fn with_plausible_values(message: &WireMessage) -> WireMessage {
     let within = |numbers: Vec<f32>| numbers.into_iter().map(|number| number % 1000.0);
-    match said.name() {
+    match message.name() {
         "Sweep" | "Aside" => {
-            let gap = if said.is("Aside") {
+            let gap = if message.is("Aside") {
                 0
             } else {
-                (said.number("gap") as u8).min(140)
+                (message.number("gap") as u8).min(140)
             };
-            let growth = (said.number("growth") as u8).min(if gap == 0 { 0 } else { 4 });
-            let mut reaches: Vec<f32> = within(said.list("reach_m")).collect();
+            let growth = (message.number("growth") as u8).min(if gap == 0 { 0 } else { 4 });
+            let mut reaches: Vec<f32> = within(message.list("reach_m")).collect();
             reaches.truncate(if gap == 0 { 1 } else { 16 });
-            let tame = said.with(json!({
-                "anchor": 1.0_f64.copysign(said.number("anchor")), "gap": gap, "growth": growth,
+            let tame = message.with(json!({
+                "anchor": 1.0_f64.copysign(message.number("anchor")), "gap": gap, "growth": growth,
                 "reach_m": reaches,
             }));
-            if said.is("Sweep") {
+            if message.is("Sweep") {
                 return tame;
             }
-            tame.with(json!({ "power_w": 1.0, "y_m": said.number("y_m") % 100.0 }))
+            tame.with(json!({ "power_w": 1.0, "y_m": message.number("y_m") % 100.0 }))
         }
         "Verdict" => {
-            let slack = said.list("slack_m").first().map(|slack| slack.abs());
+            let slack = message.list("slack_m").first().map(|slack| slack.abs());
             let commit = slack.map(|_| 0);
-            said.with(
+            message.with(
                 json!({ "slack_m": Vec::from_iter(slack), "commit": commit, "required_x_m": null }),
             )
         }
         "Gather" => {
-            let fields = json!(said.fields());
+            let fields = json!(message.fields());
             let mut seats = fields["seats"].as_array().unwrap().clone();
             seats.truncate(2);
             for (seat, index) in seats.iter_mut().zip(1..) {
                 seat["relay"] = index.into();
             }
-            said.with(json!({ "after": 0, "seats": seats }))
+            message.with(json!({ "after": 0, "seats": seats }))
         }
         "Proposal" => {
-            let relays = said.number("agreed_relays").min(8.0) as u16;
-            let votes = (said.number("votes") as u16).min(relays);
-            said.with(json!({ "place": 3, "agreed_relays": relays, "votes": votes }))
+            let relays = message.number("agreed_relays").min(8.0) as u16;
+            let votes = (message.number("votes") as u16).min(relays);
+            message.with(json!({ "place": 3, "agreed_relays": relays, "votes": votes }))
         }
-        _ => said.clone(),
+        _ => message.clone(),
     }
 }
 
@@ -100,7 +100,7 @@ fn tamed(said: &Said) -> Said {
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is drawn by itself")]
 struct Step {
-    said: Said,
+    message: WireMessage,
     right_side: bool,
     right_mission: bool,
     /// Offset of the message's pass number from that of the next pass. An answer's is counted from the last pass.
@@ -125,8 +125,8 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         any::<bool>(),
     );
     let step = drawn.prop_map(
-        |(said, right_side, right_mission, off, tame, wait_ms, answered)| Step {
-            said,
+        |(message, right_side, right_mission, off, tame, wait_ms, answered)| Step {
+            message,
             right_side,
             right_mission,
             off,
@@ -142,7 +142,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 struct Flight {
     bench: Bench,
     /// Messages of the test, one of each tag, in the order of the tags.
-    kinds: Vec<Said>,
+    kinds: Vec<WireMessage>,
     ports: (Port, Port),
     /// True once the relay may have accepted a pass. The next fields are the number of the pass sent, and of the last
     /// one accepted.
@@ -154,9 +154,9 @@ struct Flight {
 
 impl Flight {
     /// Returns the messages of a step with the ports at which they arrive. A pass may be followed by its answer.
-    fn said(&mut self, step: &Step) -> Vec<(Port, Said)> {
+    fn messages(&mut self, step: &Step) -> Vec<(Port, WireMessage)> {
         let (from, to) = self.ports;
-        let tag = step.said.tag();
+        let tag = step.message.tag();
         let onward = [0, 4, 5, 6, 8, 11, 15, 17].contains(&tag);
         let port = if onward == step.right_side { from } else { to };
         // These relays do not measure: collection passes do not count.
@@ -180,8 +180,12 @@ impl Flight {
         };
         let number = number.wrapping_add_signed(step.off);
         let wrong = if step.right_mission { 0 } else { 0x4000 };
-        let said = renamed(&step.said, number, mission ^ wrong);
-        let said = if step.tame { tamed(&said) } else { said };
+        let message = renamed(&step.message, number, mission ^ wrong);
+        let message = if step.tame {
+            with_plausible_values(&message)
+        } else {
+            message
+        };
         let answer = match tag {
             0 | 4 | 5 => 1,
             6 => 7,
@@ -192,7 +196,7 @@ impl Flight {
         };
         let answer = renamed(&self.kinds[answer], number, mission);
         let answer = (onward && step.answered).then_some((to, answer));
-        [(port, said)].into_iter().chain(answer).collect()
+        [(port, message)].into_iter().chain(answer).collect()
     }
 }
 
@@ -227,13 +231,13 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                     *counts.entry("view").or_insert(0) += 1;
                     (flight.view, flight.begun) = (view, false);
                 }
-                for (port, said) in flight.said(&step) {
+                for (port, message) in flight.messages(&step) {
                     for pause in 0..=step.wait_ms {
                         let bench = &mut flight.bench;
                         if pause == 0 {
-                            bench.hears(port, &said);
+                            bench.receive(port, &message);
                         } else {
-                            bench.sends();
+                            bench.sent();
                         }
                         bench.events();
                         prop_assert!((1..=bench.mission().relays()).contains(&bench.index()));
@@ -250,7 +254,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                             );
                         }
                         if bench.setpoint() != held {
-                            let cause = match (said.tag(), pause) {
+                            let cause = match (message.tag(), pause) {
                                 (1, 0) => "verdict",
                                 (8, _) => "turn",
                                 (0 | 4 | 5, 0) => "sweep at the last",
@@ -259,7 +263,7 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
                             *counts.entry(cause).or_insert(0) += 1;
                             held = bench.setpoint();
                         }
-                        bench.ticks();
+                        bench.advance_1_ms();
                     }
                 }
             }
@@ -276,20 +280,20 @@ fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
 }
 
 #[test]
-fn any_messages_leave_a_relay_in_bounds() {
+fn any_messages_keep_a_relay_within_its_limits() {
     led_by_anything(source(), 4, &["verdict", "turn", "view"]);
     led_by_anything(source(), 1, &[]);
     led_by_anything(source(), 8, &["work", "view"]);
 }
 
 #[test]
-fn any_messages_leave_a_relay_on_the_line_in_bounds() {
+fn any_messages_keep_a_relay_on_the_line_in_its_limits() {
     led_by_anything(paper(8), 4, &["verdict", "view"]);
     led_by_anything(paper(8), 8, &["sweep at the last", "view"]);
 }
 
 #[test]
-fn any_messages_leave_a_relay_in_a_field_in_bounds() {
+fn any_messages_keep_a_relay_in_a_field_in_its_limits() {
     let field = mission(Interference::Field(FIELD));
     led_by_anything(field, 4, &["verdict", "view"]);
     led_by_anything(field, 1, &["sweep at the last", "view"]);
@@ -314,16 +318,16 @@ fn a_relays_frames_have_its_header_and_a_rising_counter() {
         head.persist(|_| true);
         while let Some(transmit) = head.poll_transmit(now, &mut buffer) {
             let plain = plain_of(&buffer[..transmit.len]);
-            let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
+            let message = WireMessage::read(&plain[10..plain.len() - 4]).unwrap();
             let header = Header {
                 network: NETWORK,
                 sender: 1,
                 destination: 2,
                 counter,
             };
-            assert_eq!(plain, unsigned(header, said.body()), "frame {counter}");
-            if said.is("Sweep") {
-                assert_eq!(said.number("view_digest"), f64::from(head.mission));
+            assert_eq!(plain, unsigned(header, message.body()), "frame {counter}");
+            if message.is("Sweep") {
+                assert_eq!(message.number("view_digest"), f64::from(head.mission));
             }
             counter += 1;
         }

@@ -11,7 +11,7 @@ use uav_relay::{
 };
 use uav_relay_fuzz::counted::named;
 
-use super::said::{Said, plain_of, wire};
+use super::message::{WireMessage, plain_of, wire};
 
 /// Test bench: a relay without a key, and the current time.
 #[derive(Clone, Debug)]
@@ -63,31 +63,40 @@ impl Bench {
     }
 
     /// Delivers a message of the neighbour at `port`. Returns the ports and messages that the relay then sends.
-    pub(crate) fn hears(&mut self, port: Port, said: &Said) -> Vec<(Port, Said)> {
+    pub(crate) fn receive(
+        &mut self,
+        port: Port,
+        message: &WireMessage,
+    ) -> Vec<(Port, WireMessage)> {
         let sender = match port {
             Port::Upstream => self.own - 1,
             _ => self.own + 1,
         };
-        self.hears_from(sender, port, said)
+        self.receive_from(sender, port, message)
     }
 
     /// Delivers a message of node `sender`. Returns the ports and messages that the relay then sends.
-    pub(crate) fn hears_from(&mut self, sender: u16, port: Port, said: &Said) -> Vec<(Port, Said)> {
-        let bytes = between(sender, self.own, said);
+    pub(crate) fn receive_from(
+        &mut self,
+        sender: u16,
+        port: Port,
+        message: &WireMessage,
+    ) -> Vec<(Port, WireMessage)> {
+        let bytes = frame_between(sender, self.own, message);
         self.relay.handle_bytes(self.now, port, &bytes);
-        self.sends()
+        self.sent()
     }
 
     /// Returns the ports and messages that the relay sends now, without index claims.
-    pub(crate) fn sends(&mut self) -> Vec<(Port, Said)> {
-        let mut out = self.sends_with_claims();
-        out.retain(|(_, said)| !said.is("Claim"));
+    pub(crate) fn sent(&mut self) -> Vec<(Port, WireMessage)> {
+        let mut out = self.sent_with_claims();
+        out.retain(|(_, message)| !message.is("Claim"));
         out
     }
 
     /// Returns the ports and messages that the relay sends now. Checks that each is valid, and that the next timeout
     /// is in the future.
-    pub(crate) fn sends_with_claims(&mut self) -> Vec<(Port, Said)> {
+    pub(crate) fn sent_with_claims(&mut self) -> Vec<(Port, WireMessage)> {
         let mut out = Vec::new();
         let mut buffer = [0; MAX_FRAME];
         self.relay.persist(|_| true);
@@ -96,8 +105,8 @@ impl Bench {
             let read = frame::decode(&plain);
             let (header, _) = read.unwrap_or_else(|error| panic!("{error}: {plain:02x?}"));
             assert_eq!(header.network, NETWORK);
-            let said = Said::read(&plain[10..plain.len() - 4]).unwrap();
-            out.push((transmit.port, said));
+            let message = WireMessage::read(&plain[10..plain.len() - 4]).unwrap();
+            out.push((transmit.port, message));
         }
         let next = self.relay.poll_timeout();
         assert!(next.is_none_or(|next| next > self.now));
@@ -105,23 +114,23 @@ impl Bench {
     }
 
     /// Advances the time by a millisecond. Returns what the relay then sends.
-    pub(crate) fn ticks(&mut self) -> Vec<(Port, Said)> {
+    pub(crate) fn advance_1_ms(&mut self) -> Vec<(Port, WireMessage)> {
         self.now = self.now + Duration::from_millis(1);
         self.relay.handle_timeout(self.now);
-        self.sends()
+        self.sent()
     }
 
     /// Advances the time to the relay's next timeout. Returns what it then sends.
-    pub(crate) fn wakes(&mut self) -> Vec<(Port, Said)> {
+    pub(crate) fn advance_to_timeout(&mut self) -> Vec<(Port, WireMessage)> {
         self.now = self.relay.poll_timeout().unwrap();
         self.relay.handle_timeout(self.now);
-        self.sends()
+        self.sent()
     }
 
     /// Advances the time by a second. Returns all that the relay sends meanwhile.
-    pub(crate) fn settles(&mut self) -> Vec<(Port, Said)> {
-        let mut out = self.sends();
-        out.extend((0..1000).flat_map(|_| self.ticks()));
+    pub(crate) fn advance_1_s(&mut self) -> Vec<(Port, WireMessage)> {
+        let mut out = self.sent();
+        out.extend((0..1000).flat_map(|_| self.advance_1_ms()));
         out
     }
 
@@ -140,14 +149,14 @@ pub(crate) fn events(relay: &mut Relay) -> Vec<Event> {
 }
 
 /// Encodes a message of node `sender` to node `destination` as a frame on the wire.
-pub(crate) fn between(sender: u16, destination: u16, said: &Said) -> Vec<u8> {
+pub(crate) fn frame_between(sender: u16, destination: u16, message: &WireMessage) -> Vec<u8> {
     let header = Header {
         network: NETWORK,
         sender,
         destination,
         counter: 0,
     };
-    wire(header, said.body())
+    wire(header, message.body())
 }
 
 /// Names of the statistics counters of which each received frame increments one.

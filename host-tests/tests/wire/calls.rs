@@ -15,19 +15,23 @@ fn a_part_without_quorum_stops_requesting_views() {
     // The relay requests a view because it has missed earlier passes.
     let sweep = &one_of_each(FIRST + 1, bench.mission)[0];
     // The relay is fresh, so no others are connected behind it.
-    let calls = near(1, 1, &a_hello(0, bench.mission, 3, ASKS | FORMS | FRESH));
-    assert_eq!(bench.hears(Port::Upstream, sweep), []);
-    assert_eq!(bench.ticks(), [(Port::Upstream, calls)]);
+    let calls = with_neighbours(
+        1,
+        1,
+        &loaded_hello(0, bench.mission, 3, ASKS | FORMS | FRESH),
+    );
+    assert_eq!(bench.receive(Port::Upstream, sweep), []);
+    assert_eq!(bench.advance_1_ms(), [(Port::Upstream, calls)]);
     let (view, of) = (id(1, 1), (bench.mission, 0));
-    bench.hears(Port::Upstream, &proposed(view, of, 1, 8));
+    bench.receive(Port::Upstream, &proposed(view, of, 1, 8));
     let too_few = |place| refused(view, of, place, 3);
-    let out = bench.hears(Port::Downstream, &too_few(3));
+    let out = bench.receive(Port::Downstream, &too_few(3));
     assert_eq!(out, [(Port::Upstream, too_few(2))]);
     assert_eq!(bench.events(), [Event::NoQuorum]);
     assert_eq!((bench.view(), bench.setpoint()), (ViewId::LOADED, None));
     for _ in 0..200 {
-        for (_, said) in bench.wakes() {
-            assert!(said.is("Heartbeat"), "{said:?}");
+        for (_, message) in bench.advance_to_timeout() {
+            assert!(message.is("Heartbeat"), "{message:?}");
         }
     }
     assert!(bench.now > Instant::from_millis(60_000));
@@ -36,29 +40,35 @@ fn a_part_without_quorum_stops_requesting_views() {
 /// Checks that a leader without a quorum proposes again, after ever longer waits. The first one is `probe_after`; it
 /// doubles with each refusal, up to eight times.
 #[test]
-fn a_leader_without_quorum_proposes_again_ever_later() {
+fn a_leader_without_quorum_proposes_at_growing_intervals() {
     let mut head = Bench::new(1, 8, Wiring::Pair);
     let mission = head.mission;
-    head.hears(Port::Downstream, &a_hello(0, mission, 1, FORMS | READY));
-    head.ticks();
+    head.receive(
+        Port::Downstream,
+        &loaded_hello(0, mission, 1, FORMS | READY),
+    );
+    head.advance_1_ms();
     for number in 1..=6_u32 {
         let since = head.now;
         let too_few = refused(id(number, 1), (mission, 0), 2, 2);
-        assert_eq!(head.hears(Port::Downstream, &too_few), []);
+        assert_eq!(head.receive(Port::Downstream, &too_few), []);
         assert_eq!(head.phase(), Phase::NoQuorum);
         let now = head.now;
         head.restart(now);
-        assert_eq!((head.phase(), head.ticks()), (Phase::NoQuorum, vec![]));
+        assert_eq!(
+            (head.phase(), head.advance_1_ms()),
+            (Phase::NoQuorum, vec![])
+        );
         let mut turns = 0..10_000;
         let proposal = loop {
             assert!(turns.next().is_some(), "{number}: no proposal");
-            let out = head.wakes();
+            let out = head.advance_to_timeout();
             // Its neighbour answers; alone the leader would propose nothing.
-            for (port, said) in out.iter().filter(|(_, said)| said.is("Heartbeat")) {
-                let asked = said.number("request") as u16;
-                head.hears(*port, &beat(mission, 0, asked));
+            for (port, message) in out.iter().filter(|(_, message)| message.is("Heartbeat")) {
+                let asked = message.number("request") as u16;
+                head.receive(*port, &beat(mission, 0, asked));
             }
-            if let Some(proposal) = out.into_iter().find(|(_, said)| said.is("Proposal")) {
+            if let Some(proposal) = out.into_iter().find(|(_, message)| message.is("Proposal")) {
                 break proposal;
             }
         };
@@ -76,7 +86,7 @@ fn a_leader_without_quorum_proposes_again_ever_later() {
 /// Checks that a hello is answered by a hello only if it requests one. A view number far ahead of the relay's own is
 /// approached in limited steps.
 #[test]
-fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
+fn a_hello_is_answered_by_a_hello_on_request() {
     for (asks, newest, known) in [
         (false, 0, 0),
         (true, 0, 0),
@@ -89,9 +99,9 @@ fn a_hello_is_answered_by_a_hello_if_it_asks_for_one() {
         let mut bench = Bench::new(4, 8, Wiring::Pair);
         let mission = bench.mission;
         let flags = if asks { ASKS } else { 0 };
-        let mut out = bench.hears(Port::Upstream, &a_hello(newest, mission, 4, flags));
-        out.extend(bench.ticks());
-        let answer = near(1, 1, &a_hello(known, mission, 3, FRESH));
+        let mut out = bench.receive(Port::Upstream, &loaded_hello(newest, mission, 4, flags));
+        out.extend(bench.advance_1_ms());
+        let answer = with_neighbours(1, 1, &loaded_hello(known, mission, 3, FRESH));
         let expected = asks.then_some((Port::Upstream, answer));
         assert_eq!(out, expected.into_iter().collect::<Vec<_>>());
         assert_eq!(bench.counted(), ["received"]);
@@ -103,7 +113,7 @@ fn more_relays_than_the_mission_has_are_stale() {
     for place in [1, 7, 8, 9, 999, 1000] {
         let mut bench = Bench::new(4, 8, Wiring::Pair);
         let (view, of) = (id(1, 1), (bench.mission, 0));
-        let out = bench.hears(Port::Upstream, &proposed(view, of, place, 8));
+        let out = bench.receive(Port::Upstream, &proposed(view, of, place, 8));
         if place > 7 {
             assert_eq!(bench.counted(), ["received", "stale"], "{place}");
             assert_eq!(out, []);
@@ -111,7 +121,7 @@ fn more_relays_than_the_mission_has_are_stale() {
         }
         assert_eq!(bench.counted(), ["received"], "{place}");
         assert_eq!(out.len(), 1);
-        bench.hears(Port::Downstream, &granted(view, of, place + 1, 9));
+        bench.receive(Port::Downstream, &granted(view, of, place + 1, 9));
         assert_eq!(bench.counted(), ["received", "stale"], "{place}");
         assert_eq!(bench.mission().relays(), 8);
     }

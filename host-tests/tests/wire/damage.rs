@@ -8,7 +8,7 @@ use uav_relay_decode::envelope::unsigned;
 
 use super::config;
 use super::golden::vectors;
-use super::said::wire;
+use super::message::wire;
 use super::strategies::{headers, messages};
 
 /// Returns the number of frames that a receiver accepts from a stream.
@@ -69,11 +69,11 @@ proptest! {
 
     #[test]
     fn up_to_five_flipped_bits_are_always_noticed(
-        said in messages(),
+        message in messages(),
         head in headers(),
         flips in btree_set(any::<u16>(), 1..=5),
     ) {
-        let mut bad = unsigned(head, said.body());
+        let mut bad = unsigned(head, message.body());
         let good = bad.clone();
         for flip in flips {
             let bit = usize::from(flip) % (8 * bad.len());
@@ -86,12 +86,12 @@ proptest! {
 
     #[test]
     fn a_burst_of_up_to_32_bits_is_always_noticed(
-        said in messages(),
+        message in messages(),
         head in headers(),
         start in any::<u16>(),
         burst in 1..=u32::MAX,
     ) {
-        let mut bad = unsigned(head, said.body());
+        let mut bad = unsigned(head, message.body());
         let start = usize::from(start) % (8 * bad.len() - 31);
         for bit in (0..32).filter(|bit| burst >> bit & 1 == 1) {
             bad[(start + bit) / 8] ^= 1 << ((start + bit) % 8);
@@ -101,11 +101,11 @@ proptest! {
 
     #[test]
     fn damage_on_the_wire_is_noticed(
-        said in messages(),
+        message in messages(),
         head in headers(),
         damage in vec((any::<u16>(), 1..=u8::MAX), 1..=6),
     ) {
-        let good = wire(head, said.body());
+        let good = wire(head, message.body());
         let mut bad = good.clone();
         for (at, change) in damage {
             let at = usize::from(at) % (bad.len() - 1);

@@ -81,7 +81,7 @@ fn the_ladders_of_the_document_are_golden_vectors() {
 }
 
 #[test]
-fn every_rejected_stream_is_counted_as_it_says() {
+fn every_rejected_stream_is_counted_as_documented() {
     let rejected = vectors().rejected;
     assert!(rejected.len() >= 224, "{}", rejected.len());
     for vector in rejected {
@@ -124,7 +124,7 @@ fn digest_by_the_rules(mission: &Mission, interference: &[f32]) -> u16 {
 }
 
 #[test]
-fn the_digest_is_what_the_document_says() {
+fn the_digest_follows_the_document() {
     let base = paper(8);
     let Interference::Source(interferer) = base.interference else {
         panic!("the paper's mission has an interferer");

@@ -4,9 +4,9 @@ use host_tests::fixtures::paper;
 use uav_relay::MAX_FRAME;
 use uav_relay::{Auth, Duration, Event, Instant, Key, Mission, Port, Relay, Settings, Wiring};
 
-use super::bench::{Bench, between};
+use super::bench::{Bench, frame_between};
 use super::kinds::{FIRST, claim, one_of_each};
-use super::said::Said;
+use super::message::WireMessage;
 
 const NOW: Instant = Instant::from_millis(1_000);
 
@@ -18,19 +18,19 @@ const PORTS: [(Wiring, Port); 2] = [
 ];
 
 /// Delivers a frame to relay 4 of 8. Returns the index claims and echoes of claims that it sends.
-fn hears(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, Said)> {
+fn receive(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, WireMessage)> {
     let now = bench.now;
     bench.handle_bytes(now, port, bytes);
-    bench.sends_with_claims()
+    bench.sent_with_claims()
 }
 
 /// Returns relay 4 of 8, a sweep message in its name, and the number of its index claim. The relay answered that
 /// message by a claim, as another node may have its index.
-fn relay_4(wiring: Wiring, port: Port) -> (Bench, Said, u32) {
+fn relay_4(wiring: Wiring, port: Port) -> (Bench, WireMessage, u32) {
     let mut bench = Bench::new(4, 8, wiring);
     bench.now = NOW;
     let sweep = one_of_each(FIRST, bench.mission)[0].clone();
-    let out = hears(&mut bench, port, &between(4, 5, &sweep));
+    let out = receive(&mut bench, port, &frame_between(4, 5, &sweep));
     assert_eq!(bench.events(), [], "it may be an echo");
     let number = out[0].1.number("number") as u32;
     assert_eq!(out, [(out[0].0, claim(number, 0, 0))]);
@@ -44,7 +44,11 @@ fn a_neighbours_claim_is_echoed_to_its_number() {
     for (port, from) in [(Port::Upstream, 3), (Port::Downstream, 5)] {
         let (mut bench, _, _) = relay_4(Wiring::Pair, Port::Upstream);
         for flags in 0..2 {
-            let out = hears(&mut bench, port, &between(from, 4, &claim(7, 9, flags)));
+            let out = receive(
+                &mut bench,
+                port,
+                &frame_between(from, 4, &claim(7, 9, flags)),
+            );
             assert_eq!(out, [(port, claim(7, 9, flags | ECHO))]);
         }
         assert!(!bench.is_passive() && bench.events().is_empty());
@@ -67,11 +71,11 @@ fn the_smaller_claim_turns_passive_and_the_larger_answers() {
             ] {
                 let mut after = bench.clone();
                 let bytes = if echo {
-                    between(3, 4, &claim(number, heard, ECHO))
+                    frame_between(3, 4, &claim(number, heard, ECHO))
                 } else {
-                    between(4, 3, &claim(number, heard, 0))
+                    frame_between(4, 3, &claim(number, heard, 0))
                 };
-                let out = hears(&mut after, port, &bytes);
+                let out = receive(&mut after, port, &bytes);
                 let passive = number > own && heard == own;
                 assert_eq!(after.is_passive(), passive, "{number} {heard} {echo}");
                 let told = (heard == own).then_some(Event::DuplicateIndex { node: 4 });
@@ -90,12 +94,12 @@ fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
         let (mut bench, sweep, own) = relay_4(wiring, port);
         bench.now = NOW + Duration::from_millis(200);
         for bytes in [
-            between(4, 3, &claim(own, 0, 0)),
-            between(3, 4, &claim(own, 0, ECHO)),
-            between(4, 5, &sweep),
-            between(4, 3, &claim(own, 0, 0)),
+            frame_between(4, 3, &claim(own, 0, 0)),
+            frame_between(3, 4, &claim(own, 0, ECHO)),
+            frame_between(4, 5, &sweep),
+            frame_between(4, 3, &claim(own, 0, 0)),
         ] {
-            assert_eq!(hears(&mut bench, port, &bytes), []);
+            assert_eq!(receive(&mut bench, port, &bytes), []);
             assert_eq!(bench.events(), []);
             assert!(!bench.is_passive());
         }

@@ -7,10 +7,10 @@ use uav_relay_decode::value::{Fields, Value};
 use uav_relay_decode::{range, walk};
 
 use super::golden::vectors;
-use super::said::FORMAT;
+use super::message::FORMAT;
 
 /// Values of each field that the test vectors have, as text. The key is the message's name and the field's.
-type Seen = BTreeMap<String, BTreeSet<String>>;
+type BoundsSeen = BTreeMap<String, BTreeSet<String>>;
 
 /// Returns the name under which a message's fields are collected. Messages with the same fields share a name.
 fn layout_of(message: &str) -> &str {
@@ -22,16 +22,16 @@ fn layout_of(message: &str) -> &str {
     }
 }
 
-fn note(path: &str, fields: &Fields<'_>, seen: &mut Seen) {
+fn note(path: &str, fields: &Fields<'_>, seen: &mut BoundsSeen) {
     for (field, value) in &fields.0 {
         note_one(&format!("{path}.{}", field.name), value, seen);
     }
 }
 
-fn note_one(path: &str, value: &Value<'_>, seen: &mut Seen) {
+fn note_one(path: &str, value: &Value<'_>, seen: &mut BoundsSeen) {
     let text = match value {
         Value::None => "none".to_owned(),
-        Value::Bool(said) => said.to_string(),
+        Value::Bool(value) => value.to_string(),
         Value::Group(fields) => {
             note(path, fields, seen);
             "some".to_owned()
@@ -60,7 +60,7 @@ fn note_one(path: &str, value: &Value<'_>, seen: &mut Seen) {
 }
 
 /// Collects the values of a field that some test vector must have.
-fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut Seen) {
+fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut BoundsSeen) {
     let mut want = |text: String| {
         all.entry(path.to_owned()).or_default().insert(text);
     };
@@ -70,8 +70,8 @@ fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut Seen) {
     };
     match kind {
         Kind::Bool => {
-            for said in ["false", "true"] {
-                want(said.to_owned());
+            for value in ["false", "true"] {
+                want(value.to_owned());
             }
         }
         Kind::Option(of) => {
@@ -111,8 +111,8 @@ fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut Seen) {
 }
 
 #[test]
-fn the_vectors_hold_both_bounds_of_every_field() {
-    let (mut seen, mut all) = (Seen::new(), Seen::new());
+fn the_vectors_contain_both_bounds_of_every_field() {
+    let (mut seen, mut all) = (BoundsSeen::new(), BoundsSeen::new());
     for layout in &FORMAT.messages {
         for field in &layout.fields {
             let path = format!("{}.{}", layout_of(&layout.name), field.name);

@@ -6,7 +6,7 @@ use uav_relay::{Event, Port, Settings, ViewId, Wiring};
 
 use super::bench::Bench;
 use super::kinds::one_of_each;
-use super::said::Said;
+use super::message::WireMessage;
 use super::votes::*;
 
 #[test]
@@ -19,19 +19,19 @@ fn a_proposal_passes_three_relays_and_the_decision_returns() {
     let proposal = |place| proposed(view, (mission, 0), place, 3);
     let decision = |place| granted(view, (mission, 0), place, 3);
     // A view is requested: the head, which has no predecessor, proposes the first one.
-    let mut out = head.hears(down, &a_hello(0, mission, 1, FORMS | READY));
-    out.extend(head.ticks());
+    let mut out = head.receive(down, &loaded_hello(0, mission, 1, FORMS | READY));
+    out.extend(head.advance_1_ms());
     assert_eq!(out, [(down, proposal(1))]);
-    assert_eq!(middle.hears(up, &proposal(1)), [(down, proposal(2))]);
+    assert_eq!(middle.receive(up, &proposal(1)), [(down, proposal(2))]);
     assert_eq!(middle.view(), ViewId::LOADED, "not before it is decided");
     // The proposal is repeated while its result is unknown.
     let busy = &one_of_each(mark(view), mission)[2];
-    assert_eq!(middle.hears(up, &proposal(1)), [(up, busy.clone())]);
-    assert_eq!(tail.hears(up, &proposal(2)), [(up, decision(3))]);
-    assert_eq!(middle.hears(down, &decision(3)), [(up, decision(2))]);
+    assert_eq!(middle.receive(up, &proposal(1)), [(up, busy.clone())]);
+    assert_eq!(tail.receive(up, &proposal(2)), [(up, decision(3))]);
+    assert_eq!(middle.receive(down, &decision(3)), [(up, decision(2))]);
     // The answer was lost and is repeated.
-    assert_eq!(middle.hears(up, &proposal(1)), [(up, decision(2))]);
-    head.hears(down, &decision(2));
+    assert_eq!(middle.receive(up, &proposal(1)), [(up, decision(2))]);
+    head.receive(down, &decision(2));
     for (bench, index) in chain.iter_mut().zip(1..) {
         assert_eq!((bench.view().bits(), bench.index()), (view, index));
         assert_eq!(bench.stats().views, 1);
@@ -45,7 +45,7 @@ fn a_proposal_passes_three_relays_and_the_decision_returns() {
 fn a_decision_that_is_not_awaited_is_stale() {
     let mut waiting = Bench::new(4, 8, Wiring::Pair);
     let (view, of) = (id(2, 1), (waiting.mission, 0));
-    waiting.hears(Port::Upstream, &proposed(view, of, 3, 8));
+    waiting.receive(Port::Upstream, &proposed(view, of, 3, 8));
     for (decided, place, relays) in [
         (view, 4, 8),
         (view, 6, 8),
@@ -58,15 +58,15 @@ fn a_decision_that_is_not_awaited_is_stale() {
     ] {
         let mut after = waiting.clone();
         let decision = granted(decided, of, place, relays);
-        assert_eq!(after.hears(Port::Downstream, &decision), []);
+        assert_eq!(after.receive(Port::Downstream, &decision), []);
         assert_eq!(after.counted(), ["received", "stale"], "{decision:?}");
         assert_eq!(after.view(), ViewId::LOADED);
     }
     let decision = granted(view, of, 5, 5);
-    waiting.hears(Port::Downstream, &decision);
+    waiting.receive(Port::Downstream, &decision);
     let (agreed, relays) = (waiting.view().bits(), waiting.mission().relays());
     assert_eq!((agreed, relays), (view, 5));
-    waiting.hears(Port::Downstream, &decision);
+    waiting.receive(Port::Downstream, &decision);
     assert_eq!(waiting.stats().stale, 1);
 }
 
@@ -79,11 +79,11 @@ fn last_of_20(quorum: bool) -> Bench {
 }
 
 /// Returns the decision by which the last relay answers a proposal.
-fn decided_by(last: &mut Bench, proposal: &Said) -> Said {
-    let mut out = last.hears(Port::Upstream, proposal);
-    let (port, said) = out.pop().unwrap();
-    assert!(out.is_empty() && port == Port::Upstream && said.is("Decision"));
-    said
+fn decided_by(last: &mut Bench, proposal: &WireMessage) -> WireMessage {
+    let mut out = last.receive(Port::Upstream, proposal);
+    let (port, message) = out.pop().unwrap();
+    assert!(out.is_empty() && port == Port::Upstream && message.is("Decision"));
+    message
 }
 
 /// Checks the quorum: more than half of the earlier view's members, or half of them with its proposer. A view is the
@@ -148,12 +148,12 @@ fn a_member_adds_its_vote() {
 /// Checks that the last relay decides again for a view that was accepted and may have been agreed on. A view is the
 /// agreed membership of the chain.
 #[test]
-fn a_view_that_may_have_been_agreed_on_is_decided_again() {
+fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);
     let of = (last.mission, 0);
     // Proposal by which the view of relay 3 was decided, and its size.
     let successor = |proposal: u32, relays: u16| json!({ "proposal": proposal, "view": id(4, 3), "relays": relays });
-    let accepts = |decided: &Said, relays: u16| {
+    let accepts = |decided: &WireMessage, relays: u16| {
         let accepted = json!({ "view": id(4, 3), "relays": relays });
         assert_eq!(*decided, decided.with(json!({ "accepted": accepted })));
     };
@@ -179,15 +179,15 @@ fn a_view_that_may_have_been_agreed_on_is_decided_again() {
 fn a_leader_continues_after_an_earlier_view_is_decided() {
     let mut head = Bench::new(1, 8, Wiring::Pair);
     let of = (head.mission, 0);
-    head.hears(
+    head.receive(
         Port::Downstream,
-        &a_hello(id(1, 2), head.mission, 1, FORMS | READY),
+        &loaded_hello(id(1, 2), head.mission, 1, FORMS | READY),
     );
-    head.ticks();
+    head.advance_1_ms();
     let before = json!({ "view": id(1, 2), "relays": 7 });
     let decision =
         refused(id(2, 1), of, 2, 8).with(json!({ "accepted": before, "usable_in_ds": 40 }));
-    let mut out = head.hears(Port::Downstream, &decision);
+    let mut out = head.receive(Port::Downstream, &decision);
     assert_eq!(head.view(), ViewId::LOADED);
     assert_eq!(head.counted(), ["received"]);
     // All have accepted the view, so its members decide on the next one; this relay does not vote.
@@ -195,6 +195,6 @@ fn a_leader_continues_after_an_earlier_view_is_decided() {
         "agreed_view": id(1, 2), "agreed_relays": 7, "votes": 0, "lease_left_ds": u16::MAX,
         "earlier_lease_left_ds": u16::MAX, "proposer": false,
     }));
-    out.extend(head.ticks());
+    out.extend(head.advance_1_ms());
     assert_eq!(out, [(Port::Downstream, next)]);
 }

@@ -6,7 +6,7 @@ use uav_relay::{Interference, Method, MissionConfig, Port, Profile, Settings, Wi
 
 use super::bench::Bench;
 use super::kinds::{FIELD, FIRST, SECOND, mission, one_of_each, source};
-use super::said::Said;
+use super::message::WireMessage;
 use super::votes::FORMS;
 
 const UP: Port = Port::Upstream;
@@ -23,10 +23,10 @@ fn profiles_that_are_not_awaited_are_stale() {
             ..paper(8)
         };
         let mut bench = Bench::of(config, 4, Wiring::Pair);
-        let said = &one_of_each(FIRST, bench.mission)[tag];
-        bench.hears(DOWN, said);
+        let message = &one_of_each(FIRST, bench.mission)[tag];
+        bench.receive(DOWN, message);
         assert_eq!(bench.setpoint(), None);
-        assert_eq!(bench.counted(), ["received", "stale"], "{said:?}");
+        assert_eq!(bench.counted(), ["received", "stale"], "{message:?}");
     }
 }
 
@@ -46,20 +46,26 @@ fn fourth(differs: bool) -> Bench {
 }
 
 /// Returns a message that collects relays' profiles, or its result, with those of the relays `indices`.
-fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Said {
+fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> WireMessage {
     let seat = |index: &u16| json!({ "relay": index, "altitude_m": 30.0, "power_w": 0.5 });
     let seats: Vec<_> = indices.iter().map(seat).collect();
     let fields =
         json!({ "number": number, "view_digest": bench.mission, "after": after, "seats": seats });
-    Said::new(name, &fields)
+    WireMessage::new(name, &fields)
 }
 
 /// Returns a message that collects relays' profiles, or its result, with the profile of one more relay.
-fn and(said: &Said, name: &str, index: u16, altitude_m: f32, power_w: f32) -> Said {
-    let mut fields = json!(said.fields());
+fn with_profile(
+    message: &WireMessage,
+    name: &str,
+    index: u16,
+    altitude_m: f32,
+    power_w: f32,
+) -> WireMessage {
+    let mut fields = json!(message.fields());
     let seat = json!({ "relay": index, "altitude_m": altitude_m, "power_w": power_w });
     fields["seats"].as_array_mut().unwrap().push(seat);
-    Said::new(name, &fields)
+    WireMessage::new(name, &fields)
 }
 
 #[test]
@@ -68,19 +74,19 @@ fn a_collection_is_forwarded_and_its_result_returned() {
         let mut bench = fourth(differs);
         let told = of(&bench, "Gather", FIRST, 0, &[1, 3]);
         let own = if differs {
-            and(&told, "Gather", 4, 33.0, 1.0)
+            with_profile(&told, "Gather", 4, 33.0, 1.0)
         } else {
             told.clone()
         };
-        assert_eq!(bench.hears(UP, &told), [(DOWN, own.clone())]);
+        assert_eq!(bench.receive(UP, &told), [(DOWN, own.clone())]);
         // The collection is repeated while its result is pending.
         let busy = one_of_each(FIRST, bench.mission)[2].clone();
-        assert_eq!(bench.hears(UP, &told), [(UP, busy)]);
-        let all = and(&own, "Gathered", 6, 0.0, 2.0);
-        assert_eq!(bench.hears(DOWN, &all), [(UP, all.clone())]);
+        assert_eq!(bench.receive(UP, &told), [(UP, busy)]);
+        let all = with_profile(&own, "Gathered", 6, 0.0, 2.0);
+        assert_eq!(bench.receive(DOWN, &all), [(UP, all.clone())]);
         assert_eq!(bench.setpoint(), None, "no relay moves");
         // The collection is repeated after its result.
-        assert_eq!(bench.hears(UP, &told), [(UP, all)]);
+        assert_eq!(bench.receive(UP, &told), [(UP, all)]);
         assert_eq!(bench.counted(), ["received", "repeated"]);
     }
 }
@@ -101,40 +107,40 @@ fn a_full_roster_is_continued_by_the_next_pass() {
     let eight = [1, 2, 3, 4, 5, 6, 7, 8];
     for (name, port, to) in [("Gather", UP, DOWN), ("Gathered", DOWN, UP)] {
         let full = of(&bench, name, FIRST, 0, &eight);
-        assert_eq!(bench.hears(port, &full), [(to, full)]);
+        assert_eq!(bench.receive(port, &full), [(to, full)]);
     }
     // Some relays have not been asked, so a sweep is too early; and a collection behind other relays is stale.
     let aside = one_of_each(SECOND, bench.mission)[5].clone();
-    for said in [aside, of(&bench, "Gather", SECOND, 7, &[8])] {
+    for message in [aside, of(&bench, "Gather", SECOND, 7, &[8])] {
         let mut after = bench.clone();
-        assert_eq!(after.hears(UP, &said), []);
-        assert_eq!(after.counted(), ["received", "stale"], "{said:?}");
+        assert_eq!(after.receive(UP, &message), []);
+        assert_eq!(after.counted(), ["received", "stale"], "{message:?}");
     }
     let next = of(&bench, "Gather", SECOND, 8, &[9]);
-    let own = and(&next, "Gather", 10, 20.0, 1.0);
-    assert_eq!(bench.hears(UP, &next), [(DOWN, own)]);
+    let own = with_profile(&next, "Gather", 10, 20.0, 1.0);
+    assert_eq!(bench.receive(UP, &next), [(DOWN, own)]);
 }
 
 /// Checks that a relay that does not know the collected profiles refuses a pass and requests a view. Such a relay has
 /// missed a collection, for example by a reboot.
 #[test]
-fn a_pass_of_unknown_profiles_is_stale_and_asks_for_a_view() {
+fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
     let fresh = fourth(false);
-    let asked = |said: &Said| said.is("Hello") && said.has(FORMS);
+    let asked = |message: &WireMessage| message.is("Hello") && message.has(FORMS);
     let first = of(&fresh, "Gather", FIRST, 0, &[2]);
-    for (told, said) in [
+    for (told, message) in [
         (true, of(&fresh, "Gather", FIRST, 0, &[3])),
         (true, one_of_each(SECOND, fresh.mission)[5].clone()),
         (false, of(&fresh, "Gather", FIRST, 2, &[3])),
     ] {
         let mut bench = fresh.clone();
         if told {
-            assert_eq!(bench.hears(UP, &first).len(), 1);
+            assert_eq!(bench.receive(UP, &first).len(), 1);
         }
-        let mut out = bench.hears(UP, &said);
-        assert_eq!(bench.counted(), ["received", "stale"], "{said:?}");
-        out.extend(bench.settles());
-        assert!(out.iter().any(|(_, said)| asked(said)), "{out:?}");
+        let mut out = bench.receive(UP, &message);
+        assert_eq!(bench.counted(), ["received", "stale"], "{message:?}");
+        out.extend(bench.advance_1_s());
+        assert!(out.iter().any(|(_, message)| asked(message)), "{out:?}");
     }
 }
 
@@ -144,8 +150,8 @@ fn a_pass_of_unknown_profiles_is_stale_and_asks_for_a_view() {
 fn a_collection_with_its_receivers_profile_is_stale() {
     for index in [4, 5] {
         let mut bench = fourth(false);
-        let said = of(&bench, "Gather", FIRST, 0, &[index]);
-        assert_eq!(bench.hears(UP, &said), []);
+        let message = of(&bench, "Gather", FIRST, 0, &[index]);
+        assert_eq!(bench.receive(UP, &message), []);
         assert_eq!(bench.counted(), ["received", "stale"]);
     }
 }
@@ -156,7 +162,7 @@ fn a_collection_with_its_receivers_profile_is_stale() {
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let mut bench = fourth(false);
     let gather = of(&bench, "Gather", FIRST, 0, &[2]);
-    assert_eq!(bench.hears(UP, &gather).len(), 1);
+    assert_eq!(bench.receive(UP, &gather).len(), 1);
     for (number, after, indices) in [
         (SECOND, 0, &[2, 6][..]),
         (FIRST, 1, &[2, 6]),
@@ -166,12 +172,12 @@ fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     ] {
         let mut other = bench.clone();
         let roster = of(&bench, "Gathered", number, after, indices);
-        assert_eq!(other.hears(DOWN, &roster), []);
+        assert_eq!(other.receive(DOWN, &roster), []);
         assert_eq!(other.counted(), ["received", "stale"], "{roster:?}");
         assert_eq!(other.phase(), bench.phase());
     }
     let fits = of(&bench, "Gathered", FIRST, 0, &[2, 8]);
-    assert_eq!(bench.hears(DOWN, &fits), [(UP, fits.clone())]);
-    assert_eq!(bench.hears(DOWN, &fits), []);
+    assert_eq!(bench.receive(DOWN, &fits), [(UP, fits.clone())]);
+    assert_eq!(bench.receive(DOWN, &fits), []);
     assert_eq!(bench.counted(), ["received", "stale"]);
 }

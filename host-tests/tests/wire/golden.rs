@@ -10,7 +10,7 @@ use uav_relay_decode::vectors::Vectors;
 use uav_relay_decode::{range, write};
 
 use super::meaning::message;
-use super::said::{FORMAT, Said};
+use super::message::{FORMAT, WireMessage};
 
 pub(crate) fn vectors() -> Vectors {
     let vectors = Vectors::load().unwrap();
@@ -65,13 +65,13 @@ fn both_codecs_write_and_read_the_vectors() {
         // The second codec.
         let by_the_tables = write::write(&FORMAT, &vector.message, &vector.fields);
         assert_eq!(by_the_tables.as_ref(), Ok(body), "{name}");
-        let said = Said::read(body).unwrap();
-        let shown = serde_json::to_value(said.fields()).unwrap();
+        let wire_message = WireMessage::read(body).unwrap();
+        let shown = serde_json::to_value(wire_message.fields()).unwrap();
         assert!(is_same(&shown, &vector.fields), "{name}: {shown}");
         assert_eq!(unsigned(header, body), vector.plain, "{name}");
         assert_eq!(stuffed(&vector.plain), vector.wire, "{name}");
         // The crate.
-        let message = message(&said);
+        let message = message(&wire_message);
         assert_eq!(written(&message), *body, "{name}");
         let mut frame = [0xAA; MAX_FRAME];
         let len = frame::encode(header, &message, &mut frame);

@@ -5,15 +5,15 @@ use uav_relay::{Event, Mission, Port, Wiring};
 
 use super::bench::Bench;
 use super::kinds::{FIRST, level, one_of_each};
+use super::message::WireMessage;
 use super::offer::{mission_id, upload};
-use super::said::Said;
-use super::signed::{Met, settings};
-use super::votes::{ASKS, FLIES, FORMS, FRESH, READY, hello, near};
+use super::signed::{SignedBench, settings};
+use super::votes::{ASKS, FLIES, FORMS, FRESH, READY, hello, with_neighbours};
 
 /// Returns relay `own` of eight with a key, which has authenticated a ground station at `port`.
-fn with_ground(own: u16, ground: u16, port: Port) -> Met {
+fn with_ground(own: u16, ground: u16, port: Port) -> SignedBench {
     let mission = Mission::try_new(paper(8)).unwrap();
-    Met::new(mission, own, settings(wiring(port)), &[(ground, port)])
+    SignedBench::new(mission, own, settings(wiring(port)), &[(ground, port)])
 }
 
 const fn wiring(port: Port) -> Wiring {
@@ -24,7 +24,7 @@ const fn wiring(port: Port) -> Wiring {
 }
 
 #[test]
-fn ground_stations_offer_and_ask_and_are_told() {
+fn ground_stations_offer_request_and_get_replies() {
     for (own, ground, port) in [
         (1, 0, Port::Upstream),
         (8, 9, Port::Downstream),
@@ -35,10 +35,10 @@ fn ground_stations_offer_and_ask_and_are_told() {
     ] {
         let mut met = with_ground(own, ground, port);
         let base = met.base;
-        let mut hears = |said: &Said| {
-            let mut out = met.hears(0, said);
+        let mut hears = |message: &WireMessage| {
+            let mut out = met.receive(0, message);
             out.retain(|(to, _)| *to == ground);
-            let told: Vec<Said> = out.into_iter().map(|(_, said)| said).collect();
+            let told: Vec<WireMessage> = out.into_iter().map(|(_, message)| message).collect();
             (told, met.events(), met.clone())
         };
         // Its other side is still silent; and a leader awaits no pass. The hello counts the relays connected away from the
@@ -46,11 +46,11 @@ fn ground_stations_offer_and_ask_and_are_told() {
         let (flags, behind) = if own == 1 { (0, 8) } else { (FRESH, 1) };
         let (told, ..) = hears(&hello(base, 0, (1, 1), READY));
         assert_eq!(told, [], "it has not asked");
-        let first = near(0, behind, &hello(base, 0, (base, 0), flags | FLIES));
+        let first = with_neighbours(0, behind, &hello(base, 0, (base, 0), flags | FLIES));
         let (told, events, _) = hears(&hello(base, 0, (1, 1), ASKS | FORMS));
         assert_eq!((told, events), (vec![first], vec![]), "{own}");
         let newer = upload(1, base);
-        let holds = near(0, behind, &hello(base, 0, mission_id(&newer), flags));
+        let holds = with_neighbours(0, behind, &hello(base, 0, mission_id(&newer), flags));
         for events in [vec![Event::Uploaded], vec![]] {
             let (told, is, after) = hears(&newer);
             assert_eq!((told, is), (vec![holds.clone()], events), "{own}");
@@ -65,32 +65,32 @@ fn ground_stations_offer_and_ask_and_are_told() {
 fn messages_that_the_ground_may_not_send_are_misaddressed() {
     let met = with_ground(1, 0, Port::Upstream);
     let base = met.base;
-    for said in one_of_each(FIRST, base) {
+    for message in one_of_each(FIRST, base) {
         let mut after = met.clone();
-        after.hears(0, &said);
-        let expected = match said.name() {
+        after.receive(0, &message);
+        let expected = match message.name() {
             "Hello" | "Offer" | "Level" => "received",
             _ => "misaddressed",
         };
-        assert_eq!(after.counted(), [expected], "{said:?}");
+        assert_eq!(after.counted(), [expected], "{message:?}");
         // The relay does not listen.
-        let refused = u32::from(said.is("Level"));
-        assert_eq!(after.stats().samples_rejected, refused, "{said:?}");
+        let refused = u32::from(message.is("Level"));
+        assert_eq!(after.stats().samples_rejected, refused, "{message:?}");
     }
-    for said in [
+    for message in [
         upload(1, base ^ 1),
         hello(base ^ 1, 0, (1, 1), ASKS),
         level(base ^ 1),
     ] {
         let mut after = met.clone();
-        assert_eq!(after.hears(0, &said), []);
-        assert_eq!(after.counted(), ["mission", "received"], "{said:?}");
+        assert_eq!(after.receive(0, &message), []);
+        assert_eq!(after.counted(), ["mission", "received"], "{message:?}");
         assert_eq!(after.held(), None);
     }
 }
 
 #[test]
-fn the_ground_is_heard_by_the_nearest_with_a_key_alone() {
+fn only_near_relays_with_a_key_accept_the_ground() {
     for (own, ground, port) in [
         (2_u16, 0, Port::Upstream),
         (7, 9, Port::Downstream),
@@ -105,7 +105,7 @@ fn the_ground_is_heard_by_the_nearest_with_a_key_alone() {
         };
         for (own, settings, port) in [(own, far, port), (near, unsigned, Port::Shared)] {
             let mut bench = Bench::with(paper(8), own, settings);
-            let bytes = super::bench::between(ground, own, &upload(1, bench.mission));
+            let bytes = super::bench::frame_between(ground, own, &upload(1, bench.mission));
             let now = bench.now;
             bench.handle_bytes(now, port, &bytes);
             assert_eq!(bench.counted(), ["misaddressed"], "{own}");

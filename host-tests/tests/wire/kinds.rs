@@ -5,9 +5,9 @@ use serde_json::json;
 use uav_relay::{Band, Field, FieldPoint, Interference, MissionConfig, Port, Wiring};
 
 use super::bench::Bench;
+use super::message::WireMessage;
 use super::offer::upload;
-use super::said::Said;
-use super::votes::{FLIES, a_hello, granted, id, proposed};
+use super::votes::{FLIES, granted, id, loaded_hello, proposed};
 
 const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
@@ -49,13 +49,13 @@ pub(crate) fn source() -> MissionConfig {
 }
 
 /// Returns one message of each tag, in the order of the tags. Passes have the number `number`; digests are `mission`.
-pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
+pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
     let pass = json!({ "number": number, "view_digest": mission });
     let of = |name: &str, more: serde_json::Value| {
         let mut fields = pass.clone();
         let more = more.as_object().unwrap().clone();
         fields.as_object_mut().unwrap().extend(more);
-        Said::new(name, &fields)
+        WireMessage::new(name, &fields)
     };
     let sweep = |name: &str, extra: &str, number: f64| {
         let mut more = json!({
@@ -91,7 +91,7 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
     vec![
         sweep("Sweep", "", 0.0),
         of("Verdict", verdict),
-        Said::new("Busy", &json!({ "number": number })),
+        WireMessage::new("Busy", &json!({ "number": number })),
         beat(mission, 0, 0),
         sweep("Measured", "upsilon_per_w", 1e8),
         sweep("Aside", "y_m", -12.5),
@@ -99,10 +99,10 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
         gather("Gathered", 5),
         of("Token", token),
         of("Moved", moved),
-        a_hello(view, mission, 4, FLIES).with(json!({ "hears": 1 })),
+        loaded_hello(view, mission, 4, FLIES).with(json!({ "hears": 1 })),
         proposed(view, (mission, 0), 3, 8),
         granted(view, (mission, 0), 5, 8),
-        Said::new("Fence", &fence),
+        WireMessage::new("Fence", &fence),
         upload(2, mission),
         of("Pulse", json!({ "lease_ds": 150 })),
         of("Pulsed", json!({ "done": true })),
@@ -115,20 +115,20 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<Said> {
 }
 
 /// Returns a heartbeat with the numbers of its request and of its reply; 0 for none.
-pub(crate) fn beat(mission: u16, ask: u16, answer: u16) -> Said {
+pub(crate) fn beat(mission: u16, ask: u16, answer: u16) -> WireMessage {
     let fields = json!({ "mission": mission, "request": ask, "reply": answer });
-    Said::new("Heartbeat", &fields)
+    WireMessage::new("Heartbeat", &fields)
 }
 
 /// Returns an interference report as a ground station sends it.
-pub(crate) fn level(mission: u16) -> Said {
-    Said::new("Level", &json!({ "mission": mission, "power_w": 1e-9 }))
+pub(crate) fn level(mission: u16) -> WireMessage {
+    WireMessage::new("Level", &json!({ "mission": mission, "power_w": 1e-9 }))
 }
 
 /// Returns an index claim with its number, by a node that has received a claim with the number `other`.
-pub(crate) fn claim(number: u32, other: u32, flags: u8) -> Said {
+pub(crate) fn claim(number: u32, other: u32, flags: u8) -> WireMessage {
     let fields = json!({ "number": number, "other_number": other, "flags": flags });
-    Said::new("Claim", &fields)
+    WireMessage::new("Claim", &fields)
 }
 
 /// Returns relay 4 of 8, the port at which it receives passes, and the port to which it forwards them.
@@ -149,8 +149,8 @@ pub(crate) fn ways(interference: Interference) -> (Port, Port) {
 /// Gives the relay a position: delivers the pass `number` and its result.
 pub(crate) fn place(bench: &mut Bench, (from, to): (Port, Port), number: u16) {
     let kinds = one_of_each(number, bench.mission);
-    bench.hears(from, &kinds[0]);
-    bench.hears(to, &kinds[1]);
+    bench.receive(from, &kinds[0]);
+    bench.receive(to, &kinds[1]);
     bench.events();
     assert!(bench.setpoint().is_some());
 }

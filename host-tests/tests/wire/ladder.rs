@@ -5,7 +5,7 @@ use uav_relay::optimiser::ladder::Ladder;
 use uav_relay_decode::range::targets;
 
 use super::config;
-use super::said::Said;
+use super::message::WireMessage;
 use super::strategies::kinds;
 
 fn bits(targets: &[f32]) -> Vec<u32> {
@@ -24,7 +24,7 @@ fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
 }
 
 /// Returns the codes by which a sweep message gives its target SIRs: anchor, gap and growth.
-fn ladder_of(sweep: &Said) -> (f32, u8, u8) {
+fn ladder_of(sweep: &WireMessage) -> (f32, u8, u8) {
     let code = |name| sweep.number(name) as u8;
     let anchor = sweep.number("anchor") as f32;
     (anchor.abs(), code("gap"), code("growth"))
@@ -64,7 +64,7 @@ fn a_fused_multiply_add_would_give_other_bits() {
 }
 
 #[test]
-fn the_gap_codes_are_what_the_document_says() {
+fn the_gap_codes_follow_the_document() {
     for gap in 1..=u8::MAX {
         let (e, m) = (i32::from(gap >> 3), f32::from(gap & 7));
         let value = (1.0 + m / 8.0) * 2_f32.powi(e - 25);

@@ -16,8 +16,8 @@ use uav_relay::{
 };
 use uav_relay_decode::value::{Fields, Value};
 
+use super::message::{WireMessage, list, number};
 use super::offer;
-use super::said::{Said, list, number};
 
 /// Fields of a message, or of a group in it, which are read in the types of the crate.
 struct Of<'a>(&'a Fields<'static>);
@@ -82,12 +82,12 @@ impl Of<'_> {
     }
 }
 
-/// Returns the crate's message with the values that `said` has by the tables of the format.
-pub(crate) fn message(said: &Said) -> Message {
-    let fields = said.fields();
+/// Returns the crate's message with the values that `wire_message` has by the tables of the format.
+pub(crate) fn message(wire_message: &WireMessage) -> Message {
+    let fields = wire_message.fields();
     let of = Of(&fields);
-    match said.name() {
-        "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(said.name(), &of)),
+    match wire_message.name() {
+        "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(wire_message.name(), &of)),
         "Verdict" => Message::Verdict(Answer {
             number: of.word("number"),
             view_digest: of.word("view_digest"),
@@ -134,7 +134,7 @@ pub(crate) fn message(said: &Said) -> Message {
             worst_sir: of.real("worst_sir"),
         }),
         "Hello" => Message::Hello(hello(&of)),
-        "Proposal" | "Decision" => vote(said.name(), &of),
+        "Proposal" | "Decision" => vote(wire_message.name(), &of),
         "Fence" => Message::Fence {
             line_digest: of.word("line_digest"),
             fence: Fence {
@@ -152,7 +152,7 @@ pub(crate) fn message(said: &Said) -> Message {
             },
         },
         "Offer" => Message::Offer {
-            upload: upload(said, &of),
+            upload: upload(wire_message, &of),
             offer_number: of.word("offer_number"),
         },
         "Pulse" => Message::Pulse(Pulse {
@@ -165,7 +165,7 @@ pub(crate) fn message(said: &Said) -> Message {
             view_digest: of.word("view_digest"),
             done: of.flag("done", 0),
         }),
-        "Sense" | "Sensed" => sense(said, &of),
+        "Sense" | "Sensed" => sense(wire_message, &of),
         "Level" => Message::Level {
             mission: of.word("mission"),
             power_w: of.real("power_w"),
@@ -276,8 +276,8 @@ fn vote(name: &str, of: &Of<'_>) -> Message {
 }
 
 /// Decodes an upload with the crate, and checks each number. Only the crate can construct an upload.
-fn upload(said: &Said, of: &Of<'_>) -> Upload {
-    let upload = Upload::decode(&offer::kept(said)).unwrap();
+fn upload(wire_message: &WireMessage, of: &Of<'_>) -> Upload {
+    let upload = Upload::decode(&offer::kept(wire_message)).unwrap();
     let config = upload.config();
     let band = |least, most| Band {
         least_m: of.real(least),
@@ -328,14 +328,14 @@ fn upload(said: &Said, of: &Of<'_>) -> Upload {
     assert_eq!(sites, offer::SITES.map(|name| number(of.0, name) as i32));
     assert_eq!(
         (upload.id().digest, upload.id().version),
-        offer::mission_id(said)
+        offer::mission_id(wire_message)
     );
     upload
 }
 
 /// Decodes summed measurements with the crate, and checks each number. Only relays can add measurements up.
-fn sense(said: &Said, of: &Of<'_>) -> Message {
-    let message = Message::decode(said.body()).unwrap();
+fn sense(wire_message: &WireMessage, of: &Of<'_>) -> Message {
+    let message = Message::decode(wire_message.body()).unwrap();
     let (Message::Sense(heard) | Message::Sensed(heard)) = &message else {
         panic!("{message:?}");
     };
@@ -379,6 +379,9 @@ fn sense(said: &Said, of: &Of<'_>) -> Message {
         ["rx_power_w", "rx_measurements"].map(|name| of.real(name))
     );
     assert_eq!(*off, of.word("excluded"));
-    assert_eq!(matches!(message, Message::Sense(_)), said.is("Sense"));
+    assert_eq!(
+        matches!(message, Message::Sense(_)),
+        wire_message.is("Sense")
+    );
     message
 }

@@ -3,7 +3,7 @@
 use uav_relay::wire::message::{Message, MessageError};
 
 use super::golden::{vectors, written};
-use super::said::Said;
+use super::message::WireMessage;
 
 const ENCODING: Result<(), MessageError> = Err(MessageError::Encoding);
 const VALUE: Result<(), MessageError> = Err(MessageError::Value);
@@ -104,7 +104,7 @@ fn octets(body: &[u8]) -> Vec<[u8; 8]> {
 fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     let read = Message::decode(body);
     let verdict = read.as_ref().map(|_| ()).map_err(|error| *error);
-    assert_eq!(verdict, Said::verdict(body), "{name}: {body:02x?}");
+    assert_eq!(verdict, WireMessage::verdict(body), "{name}: {body:02x?}");
     if let Ok(message) = read {
         assert_eq!(written(&message), body, "{name}");
     }
@@ -113,9 +113,9 @@ fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
 
 /// Numbers of bodies by verdict: accepted, wrongly encoded, out of range.
 #[derive(Default, Debug)]
-struct Seen([usize; 3]);
+struct VerdictCounts([usize; 3]);
 
-impl Seen {
+impl VerdictCounts {
     fn compared(&mut self, body: &[u8], name: &str) {
         let verdict = compared(body, name);
         let verdicts = [Ok(()), ENCODING, VALUE];
@@ -124,8 +124,8 @@ impl Seen {
 }
 
 #[test]
-fn any_number_at_any_offset_is_judged_as_the_tables_say() {
-    let mut seen = Seen::default();
+fn numbers_at_any_offset_are_checked_as_in_the_tables() {
+    let mut seen = VerdictCounts::default();
     for vector in vectors().frames {
         let (name, body) = (&vector.name, &vector.body);
         let mut changed = |at: usize, bytes: &[u8]| {
@@ -162,8 +162,8 @@ fn any_number_at_any_offset_is_judged_as_the_tables_say() {
 }
 
 #[test]
-fn damaged_bodies_are_judged_as_the_tables_say() {
-    let mut seen = Seen::default();
+fn damaged_bodies_are_checked_as_in_the_tables() {
+    let mut seen = VerdictCounts::default();
     for vector in vectors().frames {
         let (name, body) = (&vector.name, &vector.body);
         for at in 0..body.len() {

@@ -3,7 +3,7 @@
 use serde_json::json;
 use uav_relay_decode::envelope::sealed;
 
-use super::said::Said;
+use super::message::WireMessage;
 
 /// Names of the fields with the sites of Tx and Rx; all are 0 for a mission without sites.
 pub(crate) const SITES: [&str; 6] = [
@@ -25,7 +25,7 @@ pub(crate) const BYTES: usize = 113;
 pub(crate) const KEPT: usize = 111;
 
 /// Returns an offer of mission `version` that eight relays loaded with `base` can fly.
-pub(crate) fn upload(version: u16, base: u16) -> Said {
+pub(crate) fn upload(version: u16, base: u16) -> WireMessage {
     let fields = json!({
         "version": version, "base": base, "relays": 8, "distance_m": 1000.0, "min_separation_m": 4.0,
         "tx_power_w": 80.0, "altitude_m": 20.0, "power_w": 1.0,
@@ -35,23 +35,23 @@ pub(crate) fn upload(version: u16, base: u16) -> Said {
         "noise_w": 0.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
         "rx_lat_e7": 0, "rx_lon_e7": 0, "rx_amsl_mm": 0, "offer_number": 0,
     });
-    Said::new("Offer", &fields)
+    WireMessage::new("Offer", &fields)
 }
 
 /// Returns the offer with the sites of Tx and Rx: latitude, longitude and height of each.
-pub(crate) fn with_sites(offer: &Said, sites: [i32; 6]) -> Said {
+pub(crate) fn with_sites(offer: &WireMessage, sites: [i32; 6]) -> WireMessage {
     let sites = SITES.into_iter().zip(sites);
     offer.with(sites.map(|(name, number)| (name, json!(number))).collect())
 }
 
 /// Returns the part of an offer that a relay stores across a reboot.
-pub(crate) fn kept(offer: &Said) -> Vec<u8> {
+pub(crate) fn kept(offer: &WireMessage) -> Vec<u8> {
     offer.body()[..KEPT].to_vec()
 }
 
 /// Returns the digest and version of an offered mission. The digest is from a CRC-32C of the mission, and then of
 /// that with the sites, if any.
-pub(crate) fn mission_id(offer: &Said) -> (u16, u16) {
+pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
     // Zero noise is left out.
     let end = if offer.number("noise_w") > 0.0 {
         SITES_AT
@@ -63,7 +63,7 @@ pub(crate) fn mission_id(offer: &Said) -> (u16, u16) {
 }
 
 /// Returns the mission digest `digest` combined with the offer's sites; unchanged without sites.
-pub(crate) fn between(offer: &Said, digest: u16) -> u16 {
+pub(crate) fn between(offer: &WireMessage, digest: u16) -> u16 {
     let sites = &offer.body()[SITES_AT..KEPT];
     if sites.iter().all(|byte| *byte == 0) {
         return digest;

@@ -15,7 +15,7 @@ use uav_relay_decode::envelope::{before, sealed, stuffed, unsigned};
 use super::config;
 use super::golden::{only_frame, written};
 use super::meaning::message;
-use super::said::{FORMAT, Said};
+use super::message::{FORMAT, WireMessage};
 use super::strategies::{bodies, headers, kinds, messages};
 
 proptest! {
@@ -24,31 +24,31 @@ proptest! {
     /// Checks that both codecs agree on random messages, and the overhead of a frame. It is a header, a CRC, a
     /// stuffing byte and a delimiter.
     #[test]
-    fn both_codecs_write_the_same_and_read_each_other(said in messages(), head in headers()) {
-        let message = message(&said);
-        prop_assert_eq!(written(&message), said.body(), "bytes distinguish -0 from 0");
+    fn both_codecs_write_the_same_and_read_each_other(wire_message in messages(), head in headers()) {
+        let message = message(&wire_message);
+        prop_assert_eq!(written(&message), wire_message.body(), "bytes distinguish -0 from 0");
         let mut frame = [0; MAX_FRAME];
         let len = frame::encode(head, &message, &mut frame);
-        prop_assert_eq!(len, said.body().len() + 16);
+        prop_assert_eq!(len, wire_message.body().len() + 16);
         prop_assert!(len + TAG <= MAX_FRAME);
         let frame = &frame[..len];
         prop_assert_eq!(frame.iter().position(|&byte| byte == 0), Some(len - 1));
-        let plain = unsigned(head, said.body());
+        let plain = unsigned(head, wire_message.body());
         prop_assert_eq!(frame, stuffed(&plain));
         prop_assert_eq!(only_frame(frame), plain.clone());
         let (head_read, message_read) = frame::decode(&plain).unwrap();
         prop_assert_eq!(head_read, head);
-        prop_assert_eq!(written(&message_read), said.body());
+        prop_assert_eq!(written(&message_read), wire_message.body());
         prop_assert_eq!(message_read, message);
         let decoded = uav_relay_decode::frame::read(&FORMAT, frame, len);
         prop_assert_eq!((decoded.refusal, decoded.header), (None, Some(head)));
-        prop_assert_eq!((decoded.name, decoded.fields), (Some(said.name()), said.fields()));
+        prop_assert_eq!((decoded.name, decoded.fields), (Some(wire_message.name()), wire_message.fields()));
     }
 
     #[test]
-    fn a_buffer_one_byte_short_is_refused(said in messages()) {
-        let message = message(&said);
-        let mut body = vec![0; said.body().len()];
+    fn a_buffer_one_byte_short_is_refused(wire_message in messages()) {
+        let message = message(&wire_message);
+        let mut body = vec![0; wire_message.body().len()];
         prop_assert_eq!(message.encode(&mut body), Some(body.len()));
         body.pop();
         prop_assert_eq!(message.encode(&mut body), None);
@@ -68,12 +68,12 @@ proptest! {
 }
 
 /// Checks that the crate decodes a body to the meaning of its fields, or refuses it as the tables do.
-fn is_judged_by_the_tables(body: &[u8]) {
+fn check_by_tables(body: &[u8]) {
     let read = Message::decode(body);
-    match Said::read(body) {
-        Ok(said) => {
+    match WireMessage::read(body) {
+        Ok(wire_message) => {
             assert_eq!(read.as_ref().map(written), Ok(body.to_vec()));
-            assert_eq!(read, Ok(message(&said)));
+            assert_eq!(read, Ok(message(&wire_message)));
         }
         Err(error) => assert_eq!(read, Err(error), "{body:02x?}"),
     }
@@ -83,19 +83,19 @@ proptest! {
     #![proptest_config(config(8000))]
 
     #[test]
-    fn any_body_is_judged_by_the_tables(
+    fn any_body_is_checked_as_in_the_tables(
         body in bodies(),
         noise in vec(any::<u8>(), 0..300),
     ) {
-        is_judged_by_the_tables(&body);
-        is_judged_by_the_tables(&noise);
+        check_by_tables(&body);
+        check_by_tables(&noise);
         // A valid CRC among random ones has probability 2^-32; these draws have none.
         let expected = if noise.len() < 14 { FrameError::Short } else { FrameError::Crc };
         prop_assert_eq!(frame::decode(&noise), Err(expected));
     }
 
     #[test]
-    fn any_bytes_with_a_good_crc_are_judged_by_the_tables(
+    fn any_bytes_with_a_good_crc_are_checked_as_in_the_tables(
         bytes in vec(any::<u8>(), 0..240),
         version in prop_oneof![3 => Just(Some(0x10)), 1 => Just(None)],
         flags in prop_oneof![3 => Just(Some(0)), 1 => Just(Some(0x10)), 1 => Just(None)],
@@ -120,15 +120,15 @@ proptest! {
             match bytes[10..].len().checked_sub(tag) {
                 None => Err(FrameError::Short),
                 Some(_) if bytes[3] >> 4 == 3 => Err(FrameError::Message(MessageError::Encoding)),
-                Some(body) => Said::read(&bytes[10..10 + body]).map_err(FrameError::Message),
+                Some(body) => WireMessage::read(&bytes[10..10 + body]).map_err(FrameError::Message),
             }
         };
         let read = frame::decode(&sealed(bytes.clone()));
         match expected {
             Err(error) => prop_assert_eq!(read, Err(error)),
-            Ok(said) => {
+            Ok(wire_message) => {
                 let (head, read) = read.unwrap();
-                prop_assert_eq!(read, message(&said));
+                prop_assert_eq!(read, message(&wire_message));
                 bytes[3] &= 0x0F;
                 prop_assert_eq!(before(head, 0, &[]), &bytes[..10]);
             }
@@ -137,7 +137,7 @@ proptest! {
 }
 
 #[test]
-fn the_draws_reach_messages_and_both_refusals() {
+fn random_bodies_reach_messages_and_both_errors() {
     /// First unused message tag; all later tags are counted with it.
     const NONE: usize = 21;
 
@@ -147,7 +147,7 @@ fn the_draws_reach_messages_and_both_refusals() {
     for _ in 0..16_000 {
         let body = bodies().new_tree(&mut runner).unwrap().current();
         let tag = body.first().map_or(NONE, |&tag| usize::from(tag).min(NONE));
-        let what = match Said::verdict(&body) {
+        let what = match WireMessage::verdict(&body) {
             Ok(()) => 0,
             Err(MessageError::Encoding) => 1,
             Err(_) => 2,
@@ -163,7 +163,7 @@ fn the_draws_reach_messages_and_both_refusals() {
 }
 
 #[test]
-fn node_numbers_that_do_not_fit_are_not_written() {
+fn node_numbers_out_of_range_are_not_encoded() {
     let message = Message::Busy { number: 1 };
     for (number, fits) in [(4094, true), (4095, false), (4096, false), (65535, false)] {
         for [sender, destination] in [[number, 2], [1, number]] {
@@ -181,7 +181,7 @@ fn node_numbers_that_do_not_fit_are_not_written() {
 
 /// Checks that a sweep message with a joint solution is encoded as `Aside`, without measured values.
 #[test]
-fn a_sweep_by_the_joint_method_is_an_aside_even_on_the_line() {
+fn joint_sweeps_are_asides_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {
         number: 1,
         view_digest: 2,

@@ -10,11 +10,11 @@ use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig,
 use uav_relay_decode::write;
 
 use super::meaning;
+use super::message::{FORMAT, WireMessage};
 use super::offer::{BYTES, KEPT, kept, mission_id, upload};
-use super::said::{FORMAT, Said};
 
 /// Returns true if the crate accepts an offer's body. Otherwise the reason must be a value out of range.
-fn taken(body: &[u8]) -> bool {
+fn is_accepted(body: &[u8]) -> bool {
     match Message::decode(body) {
         Ok(message) => {
             assert!(matches!(message, Message::Offer { .. }));
@@ -31,7 +31,7 @@ fn taken(body: &[u8]) -> bool {
 /// Checks that an offer is refused if its relays do not fit on the line with its least separation. It tries f32
 /// separations around the limit.
 #[test]
-fn an_offer_needs_room_for_its_relays() {
+fn an_offer_needs_space_for_its_relays() {
     let mut seen = [0; 2];
     for relays in [2_u16, 3, 8, 9, 100, 333, 1000] {
         for distance_m in [1.0_f32, 35.7, 1000.0, 99_999.0] {
@@ -44,8 +44,8 @@ fn an_offer_needs_room_for_its_relays() {
                 fields["distance_m"] = distance_m.into();
                 fields["min_separation_m"] = min_separation_m.into();
                 let body = write::write(&FORMAT, "Offer", &fields).unwrap();
-                let fits = taken(&body);
-                assert_eq!(fits, Said::verdict(&body).is_ok(), "{fields}");
+                let fits = is_accepted(&body);
+                assert_eq!(fits, WireMessage::verdict(&body).is_ok(), "{fields}");
                 seen[usize::from(fits)] += 1;
                 min_separation_m = min_separation_m.next_up();
             }

@@ -17,7 +17,7 @@ use uav_relay_decode::envelope::sealed;
 use super::bench::{Bench, OF_FRAMES, of_frames};
 use super::config;
 use super::kinds::FIELD;
-use super::said::Said;
+use super::message::WireMessage;
 use super::strategies::pieces;
 use super::stream::{chunks, unstuffed};
 
@@ -66,10 +66,10 @@ fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port
     if flags != 0 {
         return "version";
     }
-    let Ok(said) = Said::read(&checked[10..]) else {
+    let Ok(message) = WireMessage::read(&checked[10..]) else {
         return "malformed";
     };
-    match said.name() {
+    match message.name() {
         "Hello" | "Claim" => "received",
         // Only Tx and Rx send that.
         "Level" => "misaddressed",
@@ -139,11 +139,11 @@ fn fed_with_anything(
                     let rest = stream.iter().rposition(|&byte| byte == 0);
                     stream.drain(..rest.map_or(0, |end| end + 1));
                 }
-                bench.sends();
+                bench.sent();
                 bench.now = bench.now + Duration::from_millis(wait_ms);
                 let now = bench.now;
                 bench.handle_timeout(now);
-                bench.sends();
+                bench.sent();
             }
             prop_assert_eq!(of_frames(bench.stats()), wanted.clone());
             prop_assert_eq!(bench.setpoint(), None);
@@ -176,7 +176,7 @@ fn every_frame_is_counted_once() {
 }
 
 #[test]
-fn bytes_at_a_port_that_is_not_wired_are_dropped() {
+fn bytes_at_an_unused_port_are_dropped() {
     let all = &[Port::Upstream, Port::Downstream, Port::Shared];
     for wiring in [Wiring::Pair, Wiring::Shared] {
         fed_with_anything(paper(8).interference, 4, wiring, all, &["received"]);

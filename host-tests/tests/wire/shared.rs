@@ -4,13 +4,13 @@ use uav_relay::{Port, Wiring};
 
 use super::bench::Bench;
 use super::kinds::{FIRST, one_of_each};
-use super::said::Said;
-use super::votes::{ASKS, FORMS, FRESH, a_hello, id, near};
+use super::message::WireMessage;
+use super::votes::{ASKS, FORMS, FRESH, id, loaded_hello, with_neighbours};
 
 const AIR: Port = Port::Shared;
 
 /// Returns relay 6 of 12 on a shared channel, and a sweep message for it.
-fn sixth() -> (Bench, Said) {
+fn sixth() -> (Bench, WireMessage) {
     let bench = Bench::new(6, 12, Wiring::Shared);
     let sweep = one_of_each(FIRST, bench.mission)[0].clone();
     (bench, sweep)
@@ -19,14 +19,14 @@ fn sixth() -> (Bench, Said) {
 /// Returns the hello of a node that receives its nearest node and has chosen the neighbour `neighbour`.
 ///
 /// The hello requests nothing.
-fn chose(bench: &Bench, neighbour: u16) -> Said {
-    near(1, 1, &a_hello(0, bench.mission, neighbour, 0))
+fn hello_choosing(bench: &Bench, neighbour: u16) -> WireMessage {
+    with_neighbours(1, 1, &loaded_hello(0, bench.mission, neighbour, 0))
 }
 
 /// Checks that a relay on a shared channel accepts hellos of the four nearest nodes on each side. Other frames of
 /// nodes that are not its neighbours count as misaddressed.
 #[test]
-fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
+fn on_a_channel_the_four_nearest_of_each_side_are_received() {
     for sender in 0..=14_u16 {
         let (bench, sweep) = sixth();
         let heard = (1..=12).contains(&sender) && (1..=4).contains(&sender.abs_diff(6));
@@ -37,10 +37,10 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         } else {
             0
         };
-        let answer = near(mask, 1, &a_hello(0, bench.mission, neighbour, FRESH));
+        let answer = with_neighbours(mask, 1, &loaded_hello(0, bench.mission, neighbour, FRESH));
         let expected = Vec::from_iter(heard.then_some((AIR, answer)));
         let mut after = bench.clone();
-        let out = after.hears_from(sender, AIR, &a_hello(0, bench.mission, 0, ASKS));
+        let out = after.receive_from(sender, AIR, &loaded_hello(0, bench.mission, 0, ASKS));
         let counter = if heard { "received" } else { "misaddressed" };
         assert_eq!(after.counted(), [counter], "{sender}");
         if sender == neighbour {
@@ -50,7 +50,7 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
         }
         assert_eq!(out, expected, "{sender}");
         let mut after = bench.clone();
-        let out = after.hears_from(sender, AIR, &sweep);
+        let out = after.receive_from(sender, AIR, &sweep);
         assert_eq!(after.counted(), ["misaddressed"], "{sender}");
         assert_eq!(out, expected, "{sender}");
         assert_eq!(after.setpoint(), None);
@@ -59,17 +59,17 @@ fn on_a_shared_channel_the_four_nearest_on_each_side_are_heard() {
 
 /// Checks a neighbour that reports no neighbour of its own. Messages to it wait until it chooses this relay again.
 #[test]
-fn a_neighbour_back_with_a_newer_view_makes_the_relay_ask() {
+fn a_returning_neighbours_newer_view_causes_a_request() {
     for (newest, calls) in [(0, false), (id(5, 1), true)] {
         let (mut bench, _) = sixth();
         let mission = bench.mission;
-        let hello = |neighbour| near(1, 1, &a_hello(newest, mission, neighbour, 0));
-        assert_eq!(bench.hears(AIR, &hello(0)), [], "{newest}");
-        assert_eq!(bench.ticks(), [], "{newest}");
-        let mut out = bench.hears(AIR, &hello(6));
-        out.extend(bench.ticks());
+        let hello = |neighbour| with_neighbours(1, 1, &loaded_hello(newest, mission, neighbour, 0));
+        assert_eq!(bench.receive(AIR, &hello(0)), [], "{newest}");
+        assert_eq!(bench.advance_1_ms(), [], "{newest}");
+        let mut out = bench.receive(AIR, &hello(6));
+        out.extend(bench.advance_1_ms());
         // The node now has a neighbour on its other side; node 5 has reported none, so this relay separates no link.
-        let call = a_hello(newest, mission, 5, ASKS | FORMS | FRESH);
+        let call = loaded_hello(newest, mission, 5, ASKS | FORMS | FRESH);
         assert_eq!(out, Vec::from_iter(calls.then_some((AIR, call))));
     }
 }
@@ -77,12 +77,12 @@ fn a_neighbour_back_with_a_newer_view_makes_the_relay_ask() {
 /// Checks that a relay holds a received pass back while its next neighbour has chosen another node. It forwards the
 /// pass afterwards.
 #[test]
-fn a_pass_waits_for_a_neighbour_that_takes_another() {
+fn a_pass_waits_for_a_neighbour_busy_with_another() {
     let (mut bench, sweep) = sixth();
-    bench.hears(AIR, &chose(&bench.clone(), 5));
-    assert_eq!(bench.hears_from(5, AIR, &sweep), []);
+    bench.receive(AIR, &hello_choosing(&bench.clone(), 5));
+    assert_eq!(bench.receive_from(5, AIR, &sweep), []);
     assert_eq!(bench.counted(), ["received"]);
-    let out = bench.hears(AIR, &chose(&bench.clone(), 6));
+    let out = bench.receive(AIR, &hello_choosing(&bench.clone(), 6));
     assert_eq!(out.len(), 1);
     assert!(out[0].0 == AIR && out[0].1.is("Sweep"), "{out:?}");
     assert_eq!(out[0].1.number("number"), f64::from(FIRST));
@@ -103,13 +103,13 @@ fn a_one_way_link_is_ignored_unless_it_was_established() {
     ] {
         let (mut bench, sweep) = sixth();
         if !linked {
-            bench.hears(AIR, &chose(&bench.clone(), 5));
+            bench.receive(AIR, &hello_choosing(&bench.clone(), 5));
         }
-        let hello = near(hears, 1, &chose(&bench, 6));
-        let mut out = bench.hears(AIR, &hello);
-        out.extend(bench.hears_from(5, AIR, &sweep));
+        let hello = with_neighbours(hears, 1, &hello_choosing(&bench, 6));
+        let mut out = bench.receive(AIR, &hello);
+        out.extend(bench.receive_from(5, AIR, &sweep));
         assert_eq!(bench.counted(), ["received"]);
-        let waiting = !out.iter().any(|(_, said)| said.is("Sweep"));
+        let waiting = !out.iter().any(|(_, message)| message.is("Sweep"));
         assert_eq!(waiting, waits, "{linked}, {hears:b}: {out:?}");
     }
 }

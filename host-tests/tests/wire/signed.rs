@@ -15,7 +15,7 @@ use uav_relay::{Duration, Event, Instant, Mission, Port, Relay, Settings, Upload
 use uav_relay_decode::envelope::{before, sealed, stuffed};
 
 use super::bench::{counted, events};
-use super::said::{Said, plain_of};
+use super::message::{WireMessage, plain_of};
 use super::votes::{ASKS, hello};
 
 pub(crate) const NOW: Instant = Instant::ZERO;
@@ -41,14 +41,14 @@ pub(crate) fn settings(wiring: Wiring) -> Settings {
 
 /// Test bench: a relay with a key, and peers that it has authenticated.
 #[derive(Clone, Debug)]
-pub(crate) struct Met {
+pub(crate) struct SignedBench {
     pub(crate) relay: Relay,
     peers: Vec<Peer>,
     /// Digest of the mission with which the relay was loaded.
     pub(crate) base: u16,
 }
 
-impl Deref for Met {
+impl Deref for SignedBench {
     type Target = Relay;
 
     fn deref(&self) -> &Relay {
@@ -56,13 +56,13 @@ impl Deref for Met {
     }
 }
 
-impl DerefMut for Met {
+impl DerefMut for SignedBench {
     fn deref_mut(&mut self) -> &mut Relay {
         &mut self.relay
     }
 }
 
-impl Met {
+impl SignedBench {
     /// Creates relay `own` of `mission`, which is idle. It has authenticated the nodes of `peers`, each at its port.
     pub(crate) fn new(
         mission: Mission,
@@ -76,10 +76,10 @@ impl Met {
             base: digest(&mission),
         };
         for &(node, port) in peers {
-            let peer = Peer::meets(&mut met.relay, own, node, port);
+            let peer = Peer::authenticate(&mut met.relay, own, node, port);
             met.peers.push(peer);
         }
-        met.sends(NOW);
+        met.sent(NOW);
         met.events();
         met
     }
@@ -97,33 +97,41 @@ impl Met {
 
     /// Delivers a message of peer `peer`. Returns what the relay then sends. A mission offer is changed to answer the
     /// relay's current hello.
-    pub(crate) fn hears(&mut self, peer: usize, said: &Said) -> Vec<(u16, Said)> {
-        if said.is("Offer") {
-            let answer = self.number(peer, NOW);
-            return self.hears_as_it_is(peer, NOW, &said.with(json!({ "offer_number": answer })));
+    pub(crate) fn receive(
+        &mut self,
+        peer: usize,
+        message: &WireMessage,
+    ) -> Vec<(u16, WireMessage)> {
+        if message.is("Offer") {
+            let answer = self.offer_number(peer, NOW);
+            return self.receive_unchanged(
+                peer,
+                NOW,
+                &message.with(json!({ "offer_number": answer })),
+            );
         }
-        self.hears_as_it_is(peer, NOW, said)
+        self.receive_unchanged(peer, NOW, message)
     }
 
     /// Delivers a message of peer `peer` unchanged. Returns what the relay then sends.
-    pub(crate) fn hears_as_it_is(
+    pub(crate) fn receive_unchanged(
         &mut self,
         peer: usize,
         now: Instant,
-        said: &Said,
-    ) -> Vec<(u16, Said)> {
-        self.deliver(peer, now, said);
-        self.sends(now)
+        message: &WireMessage,
+    ) -> Vec<(u16, WireMessage)> {
+        self.deliver(peer, now, message);
+        self.sent(now)
     }
 
-    fn deliver(&mut self, peer: usize, now: Instant, said: &Said) {
+    fn deliver(&mut self, peer: usize, now: Instant, message: &WireMessage) {
         let peer = &mut self.peers[peer];
-        let frame = peer.frame(SIGNED, said.body());
+        let frame = peer.frame(SIGNED, message.body());
         self.relay.handle_bytes(now, peer.port, &frame);
     }
 
     /// Returns the number in the hello with which the relay would answer a request of peer `peer`.
-    pub(crate) fn number(&self, peer: usize, now: Instant) -> u16 {
+    pub(crate) fn offer_number(&self, peer: usize, now: Instant) -> u16 {
         let mut asked = self.clone();
         let node = asked.peers[peer].node;
         let asks = hello(asked.base, 0, (asked.base, 0), ASKS);
@@ -134,34 +142,34 @@ impl Met {
             frames(&mut asked.relay, at)
         });
         let hello = out.into_iter().flatten().find_map(|(to, flags, body)| {
-            let said = Said::read(&body).ok()?;
-            ((to, flags) == (node, SIGNED) && said.is("Hello")).then_some(said)
+            let message = WireMessage::read(&body).ok()?;
+            ((to, flags) == (node, SIGNED) && message.is("Hello")).then_some(message)
         });
         hello.unwrap().number("offer_number") as u16
     }
 
     /// Returns the destinations and messages that the relay sends at `now`. Handshakes are left out, and numbers of
     /// hellos are set to 0.
-    pub(crate) fn sends(&mut self, now: Instant) -> Vec<(u16, Said)> {
-        let unnumbered = |said: Said| {
-            if !said.is("Hello") {
-                return said;
+    pub(crate) fn sent(&mut self, now: Instant) -> Vec<(u16, WireMessage)> {
+        let unnumbered = |message: WireMessage| {
+            if !message.is("Hello") {
+                return message;
             }
-            assert_ne!(said.number("offer_number"), 0.0);
-            said.with(json!({ "offer_number": 0 }))
+            assert_ne!(message.number("offer_number"), 0.0);
+            message.with(json!({ "offer_number": 0 }))
         };
         frames(&mut self.relay, now)
             .into_iter()
             .filter(|(_, flags, _)| *flags == SIGNED)
-            .map(|(to, _, body)| (to, unnumbered(Said::read(&body).unwrap())))
+            .map(|(to, _, body)| (to, unnumbered(WireMessage::read(&body).unwrap())))
             .collect()
     }
 
     /// Returns the destinations and messages that the relay sends a millisecond after `now`.
-    pub(crate) fn sends_after(&mut self, now: Instant) -> Vec<(u16, Said)> {
+    pub(crate) fn sent_after(&mut self, now: Instant) -> Vec<(u16, WireMessage)> {
         let later = now + Duration::from_millis(1);
         self.relay.handle_timeout(later);
-        self.sends(later)
+        self.sent(later)
     }
 
     pub(crate) fn events(&mut self) -> Vec<Event> {
@@ -192,7 +200,7 @@ struct Peer {
 
 impl Peer {
     /// Creates peer `node`, and authenticates it and `relay` by handshakes.
-    fn meets(relay: &mut Relay, own: u16, node: u16, port: Port) -> Self {
+    fn authenticate(relay: &mut Relay, own: u16, node: u16, port: Port) -> Self {
         let mut peer = Self {
             node,
             relay: own,

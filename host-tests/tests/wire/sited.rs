@@ -10,9 +10,9 @@ use uav_relay::{
 use super::adopted::adopts;
 use super::bench::events;
 use super::kinds::one_of_each;
+use super::message::WireMessage;
 use super::offer::{between, kept, mission_id, upload, with_sites};
-use super::said::Said;
-use super::signed::{Met, NOW, settings};
+use super::signed::{NOW, SignedBench, settings};
 use super::uploads::fourth;
 use super::votes::{FLIES, REFUSED, WHOLE, hello};
 
@@ -40,7 +40,7 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
 
 /// Returns an upload of version 2 with sites a kilometre apart, and these sites. The receiver is `east` units of 1e-7
 /// degrees farther east.
-fn farther(base: u16, east: i32) -> (Said, [i32; 6]) {
+fn farther(base: u16, east: i32) -> (WireMessage, [i32; 6]) {
     let mut sites = A_KILOMETRE;
     sites[4] += east;
     (with_sites(&upload(2, base), sites), sites)
@@ -55,7 +55,7 @@ fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
             sited,
             ..settings(Wiring::Pair)
         };
-        let mut met = Met::fourth_with(settings);
+        let mut met = SignedBench::fourth_with(settings);
         let near = |east| farther(met.base, east);
         // A unit is 7.5 mm: 4.5 cm are tolerated, 6 cm are not.
         let (longer, kilometre) = near(0);
@@ -73,15 +73,15 @@ fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
         let good = [near(6), near(-6)];
         for (refused, ((offer, six), why)) in (1..).zip(cases) {
             for told in [vec![Event::UploadRefused { why }], vec![]] {
-                let out = met.hears(1, &offer);
+                let out = met.receive(1, &offer);
                 assert_eq!(met.events(), told, "{offer:?}");
                 // The relay answers with a hello that names the refused mission.
                 assert_eq!(out.len(), 1, "{out:?}");
-                let said = &out[0].1;
+                let message = &out[0].1;
                 let holds = ["latest_mission", "latest_mission_version"]
-                    .map(|name| said.number(name) as u16);
+                    .map(|name| message.number(name) as u16);
                 assert_eq!((holds[0], holds[1]), mission_id(&offer));
-                assert!(said.has(REFUSED) && !said.has(FLIES) && !said.has(WHOLE));
+                assert!(message.has(REFUSED) && !message.has(FLIES) && !message.has(WHOLE));
                 assert_eq!(met.held(), None);
             }
             assert_eq!(met.stats().mission, 2 * refused);
@@ -95,7 +95,7 @@ fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
         }
         for (good, _) in good {
             let mut after = met.clone();
-            after.hears(1, &good);
+            after.receive(1, &good);
             assert_eq!(after.events(), [Event::Uploaded]);
             assert_eq!(after.held(), Some(mission_id(&good)));
         }
@@ -104,17 +104,17 @@ fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
 
 #[test]
 fn the_sites_are_those_of_the_mission_that_is_flown() {
-    let mut met = Met::fourth();
+    let mut met = SignedBench::fourth();
     let base = met.base;
     let (first, _) = farther(base, 0);
     let of = mission_id(&first);
     assert_ne!(of, mission_id(&upload(2, base)), "it is another mission");
-    met.hears(0, &first);
+    met.receive(0, &first);
     assert_eq!((met.sites(), met.held()), (None, Some(of)));
     adopts(&mut met, &first);
     assert_eq!(met.sites(), Some(sites(A_KILOMETRE)));
     // A newer mission that is held is not flown.
-    met.hears(0, &upload(3, base));
+    met.receive(0, &upload(3, base));
     assert_eq!(met.sites(), Some(sites(A_KILOMETRE)));
     // The stored mission applies after a reboot.
     for (stored, expected) in [(first, Some(sites(A_KILOMETRE))), (upload(3, base), None)] {
@@ -126,7 +126,7 @@ fn the_sites_are_those_of_the_mission_that_is_flown() {
 }
 
 /// Returns relay 4 of eight with a motion guard and a large geofence.
-fn guarded() -> Met {
+fn guarded() -> SignedBench {
     let mission = Mission::try_new(paper(8)).unwrap();
     // The geofence has room for all offers here.
     let mut guard = GuardConfig::of(&mission, mission.config().common);
@@ -137,12 +137,12 @@ fn guarded() -> Met {
         most_altitude_m: 1e3,
         ..guard.fence
     };
-    let mut met = Met::fourth_with(Settings {
+    let mut met = SignedBench::fourth_with(Settings {
         guard: Some(guard),
         ..settings(Wiring::Pair)
     });
     for peer in [0, 1] {
-        met.hears(peer, &hello(met.base, 4, (met.base, 0), 0));
+        met.receive(peer, &hello(met.base, 4, (met.base, 0), 0));
     }
     met.events();
     met
@@ -155,13 +155,13 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     let (first, _) = farther(base, 0);
     let line = between(&first, base);
     assert_ne!(line, base);
-    let stale = |met: &Met, line: u16| {
+    let stale = |met: &SignedBench, line: u16| {
         let fence = one_of_each(1, line)[13].with(json!({
             "association": 700, "number": 0, "x_m": 300.0, "target_m": 310.0, "y_m": 0.0,
             "altitude_m": 20.0, "apart_m": 0.0, "flags": 0,
         }));
         let mut after = met.clone();
-        after.hears(0, &fence);
+        after.receive(0, &fence);
         assert_eq!(after.events(), []);
         let (before, stats) = (met.stats(), after.stats());
         (stats.stale - before.stale, stats.mission - before.mission)

@@ -8,7 +8,7 @@ use uav_relay_decode::draw::Draw;
 use uav_relay_decode::envelope::{sealed, stuffed};
 use uav_relay_decode::write::write_fields;
 
-use super::said::{FORMAT, Said, wire};
+use super::message::{FORMAT, WireMessage, wire};
 
 const MAX_NODE: u16 = 4094;
 
@@ -24,7 +24,7 @@ pub(crate) fn headers() -> impl Strategy<Value = Header> {
 }
 
 /// Draws valid messages of the kinds `names`. A draw shrinks to a message of zeros.
-pub(crate) fn kinds(names: &'static [&'static str]) -> BoxedStrategy<Said> {
+pub(crate) fn kinds(names: &'static [&'static str]) -> BoxedStrategy<WireMessage> {
     (proptest::sample::select(names), vec(any::<u8>(), 0..400))
         .prop_map(|(name, bytes)| {
             let mut messages = (0_u8..).zip(&FORMAT.messages);
@@ -33,20 +33,20 @@ pub(crate) fn kinds(names: &'static [&'static str]) -> BoxedStrategy<Said> {
             let mut source = || bytes.next().unwrap_or(0);
             let mut body = vec![tag];
             write_fields(&Draw::new(&mut source).valid(layout), &mut body);
-            Said::read(&body).unwrap_or_else(|error| panic!("{error}: {name} {body:02x?}"))
+            WireMessage::read(&body).unwrap_or_else(|error| panic!("{error}: {name} {body:02x?}"))
         })
         .boxed()
 }
 
 /// Draws valid messages of all kinds.
-pub(crate) fn messages() -> BoxedStrategy<Said> {
+pub(crate) fn messages() -> BoxedStrategy<WireMessage> {
     let names = FORMAT.messages.iter().map(|layout| layout.name.as_str());
     kinds(names.collect::<Vec<_>>().leak())
 }
 
 /// Draws message bodies that are valid, nearly valid or invalid.
 pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
-    let valid = || messages().prop_map(|said| said.body().to_vec());
+    let valid = || messages().prop_map(|message| message.body().to_vec());
     let changed = || (valid(), any::<Index>());
     let replaced = (changed(), any::<u8>()).prop_map(|((mut body, at), byte)| {
         let at = at.index(body.len());
@@ -108,7 +108,7 @@ pub(crate) fn bodies() -> BoxedStrategy<Vec<u8>> {
 /// Draws pieces of a byte stream: valid, damaged and oversized frames, noise, and delimiters.
 pub(crate) fn pieces(heads: impl Strategy<Value = Header> + 'static) -> BoxedStrategy<Vec<u8>> {
     let heads = heads.boxed();
-    let good = (heads.clone(), messages()).prop_map(|(head, said)| wire(head, said.body()));
+    let good = (heads.clone(), messages()).prop_map(|(head, message)| wire(head, message.body()));
     let good = good.boxed();
     let sealed_body = (heads, bodies()).prop_map(|(head, body)| wire(head, &body));
     let sealed_noise = vec(any::<u8>(), 0..=124).prop_map(|bytes| stuffed(&sealed(bytes)));

@@ -100,7 +100,7 @@ fn fixed_stream() -> Vec<u8> {
 }
 
 #[test]
-fn every_chunk_size_gives_the_same() {
+fn every_chunk_size_gives_the_same_frames() {
     let stream = fixed_stream();
     let outcomes = deframed(&stream);
     assert_eq!(outcomes, by_the_rules(&stream));
@@ -200,7 +200,7 @@ proptest! {
     #![proptest_config(config(6000))]
 
     #[test]
-    fn what_cobs_decodes_is_decoded_the_same(stuffed in vec(1..=u8::MAX, 1..=MAX_DECODED)) {
+    fn decoding_agrees_with_the_cobs_crate(stuffed in vec(1..=u8::MAX, 1..=MAX_DECODED)) {
         let small: Vec<u8> = stuffed.iter().map(|byte| (byte - 1) % 9 + 1).collect();
         for stuffed in [stuffed, small] {
             let expected = cobs::decode_vec(&stuffed).map_err(|_| DeframeError::Truncated);
@@ -210,7 +210,7 @@ proptest! {
     }
 
     #[test]
-    fn any_stream_gives_what_the_rules_say(stream in streams()) {
+    fn any_stream_is_split_as_the_rules_say(stream in streams()) {
         prop_assert_eq!(deframed(&stream), by_the_rules(&stream));
     }
 }
@@ -219,7 +219,7 @@ proptest! {
     #![proptest_config(config(300))]
 
     #[test]
-    fn every_way_of_cutting_gives_the_same(stream in streams(), cuts in vec(0..60_usize, 1..8)) {
+    fn every_split_of_a_stream_gives_the_same(stream in streams(), cuts in vec(0..60_usize, 1..8)) {
         prop_assume!(cuts.iter().any(|&cut| cut > 0));
         prop_assert_eq!(state_after(&stream, &cuts), state_after(&stream, &[stream.len() + 1]));
     }

@@ -5,7 +5,7 @@ use uav_relay::{Event, Instant, Port, Wiring};
 
 use super::bench::Bench;
 use super::kinds::{FIRST, beat, one_of_each};
-use super::said::Said;
+use super::message::WireMessage;
 use super::votes::*;
 
 const UP: Port = Port::Upstream;
@@ -16,8 +16,8 @@ const DOWN: Port = Port::Downstream;
 fn in_view(view: u32) -> (Bench, u16) {
     let mut bench = Bench::new(4, 8, Wiring::Pair);
     let of = (bench.mission, 0);
-    bench.hears(UP, &proposed(view, of, 3, 8));
-    bench.hears(DOWN, &granted(view, of, 5, 8));
+    bench.receive(UP, &proposed(view, of, 3, 8));
+    bench.receive(DOWN, &granted(view, of, 5, 8));
     bench.events();
     assert_eq!(bench.view().bits(), view);
     let own = bench.mission.wrapping_add(mark(view));
@@ -30,13 +30,13 @@ fn agreed_in_view(view: u32) -> (Bench, u16) {
     let (mut bench, own) = in_view(view);
     let at = Instant::from_millis(5);
     for (kind, port) in [(0, UP), (1, DOWN)] {
-        bench.hears(port, &one_of_each(FIRST, own)[kind]);
+        bench.receive(port, &one_of_each(FIRST, own)[kind]);
         while bench.poll_timeout().is_some_and(|due| due < at) {
             bench.handle_timeout(at);
         }
     }
     bench.now = at;
-    bench.sends();
+    bench.sent();
     assert!(bench.events().contains(&Event::Converged));
     (bench, own)
 }
@@ -50,7 +50,11 @@ fn passes_have_the_digest_of_their_view() {
         let (agreed, _) = agreed_in_view(view);
         let hello = |neighbour: u16| {
             let behind = if neighbour == 3 { 5 } else { 4 };
-            near(1, behind, &a_hello(view, bench.mission, neighbour, ASKS))
+            with_neighbours(
+                1,
+                behind,
+                &loaded_hello(view, bench.mission, neighbour, ASKS),
+            )
         };
         for off in [0, 1, 64, 0xFFC0, 65, 0xFFBF, 0x4000] {
             let known = off == 0;
@@ -63,8 +67,8 @@ fn passes_have_the_digest_of_their_view() {
                     bench.clone()
                 };
                 let kinds = one_of_each(FIRST, own.wrapping_add(off));
-                let mut out = after.hears(port, &kinds[kind]);
-                out.extend(after.ticks());
+                let mut out = after.receive(port, &kinds[kind]);
+                out.extend(after.advance_1_ms());
                 let expected = match (known, neighbour) {
                     (true, 5) => &["received", "stale"][..],
                     (true, _) => &["received"],
@@ -72,7 +76,10 @@ fn passes_have_the_digest_of_their_view() {
                 };
                 assert_eq!(after.counted(), expected, "{view:x}, {off}, {kind}");
                 if known {
-                    assert!(!out.iter().any(|(_, said)| said.is("Hello")), "{out:?}");
+                    assert!(
+                        !out.iter().any(|(_, message)| message.is("Hello")),
+                        "{out:?}"
+                    );
                 } else {
                     assert_eq!(out, [(port, hello(neighbour))], "{view:x}, {off}, {kind}");
                 }
@@ -84,10 +91,10 @@ fn passes_have_the_digest_of_their_view() {
 /// Checks that a relay requests a new membership view when it receives a pass of another view. Both views are of the
 /// same mission.
 #[test]
-fn a_pass_of_another_view_has_the_relay_ask_for_one() {
+fn a_pass_of_another_view_causes_a_view_request() {
     let (mut bench, own) = in_view(id(2, 1));
     for port in [UP, DOWN] {
-        bench.hears(port, &a_hello(0, bench.mission, 4, 0));
+        bench.receive(port, &loaded_hello(0, bench.mission, 4, 0));
     }
     for (kind, port, calls) in [
         (0, UP, true),
@@ -97,23 +104,24 @@ fn a_pass_of_another_view_has_the_relay_ask_for_one() {
         (16, DOWN, false),
     ] {
         let mut after = bench.clone();
-        let said = &one_of_each(FIRST, own.wrapping_add(1))[kind];
-        let mut out = after.hears(port, said);
-        out.extend(after.ticks());
-        assert_eq!(asks_for_a_view(&out), calls, "{said:?}");
+        let message = &one_of_each(FIRST, own.wrapping_add(1))[kind];
+        let mut out = after.receive(port, message);
+        out.extend(after.advance_1_ms());
+        assert_eq!(asks_for_a_view(&out), calls, "{message:?}");
     }
 }
 
-fn asks_for_a_view(out: &[(Port, Said)]) -> bool {
-    let asks = |said: &Said| said.is("Hello") && said.has(FORMS);
-    out.iter().any(|(port, said)| *port == UP && asks(said))
+fn asks_for_a_view(out: &[(Port, WireMessage)]) -> bool {
+    let asks = |message: &WireMessage| message.is("Hello") && message.has(FORMS);
+    out.iter()
+        .any(|(port, message)| *port == UP && asks(message))
 }
 
 #[test]
 fn heartbeats_have_the_digest_of_the_mission_in_every_view() {
     let (mut bench, own) = in_view(id(7, 1));
     for (mission, expected) in [(bench.mission, 0), (own, 1)] {
-        bench.hears(UP, &beat(mission, 0, 0));
+        bench.receive(UP, &beat(mission, 0, 0));
         assert_eq!(bench.stats().mission, expected);
     }
 }
@@ -126,21 +134,25 @@ fn a_late_proposal_of_an_old_view_changes_nothing() {
     let of = (bench.mission, 0);
     // View 5 from another place than before.
     for (nth, view, place) in [(1, id(5, 2), 2), (2, id(5, 1), 3), (3, id(3, 9), 3)] {
-        assert_eq!(bench.hears(UP, &proposed(view, of, place, 8)), []);
-        assert_eq!(bench.ticks(), []);
+        assert_eq!(bench.receive(UP, &proposed(view, of, place, 8)), []);
+        assert_eq!(bench.advance_1_ms(), []);
         assert_eq!((bench.stats().stale, bench.view().bits()), (nth, id(5, 2)));
         assert_eq!((bench.index(), bench.mission().relays()), (4, 8));
         assert_eq!(bench.events(), []);
     }
-    let mut out = bench.hears(UP, &proposed(id(4, 1), of, 3, 8));
-    out.extend(bench.ticks());
-    let hello = near(1, 5, &a_hello(id(6, 4), bench.mission, 3, ASKS | FORMS));
+    let mut out = bench.receive(UP, &proposed(id(4, 1), of, 3, 8));
+    out.extend(bench.advance_1_ms());
+    let hello = with_neighbours(
+        1,
+        5,
+        &loaded_hello(id(6, 4), bench.mission, 3, ASKS | FORMS),
+    );
     assert_eq!(out, [(UP, hello)]);
     assert_eq!((bench.stats().stale, bench.view().bits()), (4, id(5, 2)));
 }
 
 #[test]
-fn a_view_request_is_forwarded_unless_it_is_of_an_older_view() {
+fn a_view_request_is_forwarded_unless_its_view_is_older() {
     let view = id(3, 2);
     let (bench, _) = in_view(view);
     for (newest, fresh, calls) in [
@@ -154,10 +166,10 @@ fn a_view_request_is_forwarded_unless_it_is_of_an_older_view() {
     ] {
         let mut after = bench.clone();
         let flags = FORMS | if fresh { FRESH } else { 0 };
-        let mut out = after.hears(DOWN, &a_hello(newest, bench.mission, 4, flags));
-        out.extend(after.ticks());
+        let mut out = after.receive(DOWN, &loaded_hello(newest, bench.mission, 4, flags));
+        out.extend(after.advance_1_ms());
         let known = newest.max(view);
-        let on = near(1, 5, &a_hello(known, bench.mission, 3, ASKS | FORMS));
+        let on = with_neighbours(1, 5, &loaded_hello(known, bench.mission, 3, ASKS | FORMS));
         let expected = Vec::from_iter(calls.then_some((UP, on)));
         assert_eq!(out, expected, "{newest:x} {fresh}");
     }
@@ -166,7 +178,7 @@ fn a_view_request_is_forwarded_unless_it_is_of_an_older_view() {
 /// Checks that an accepted membership view counts as agreed only after a pass or lease renewal in it. All members
 /// have accepted it then.
 #[test]
-fn a_view_counts_once_a_pass_or_renewal_of_it_has_come() {
+fn a_view_counts_after_its_first_pass_or_renewal() {
     let view = id(3, 2);
     let (bench, own) = in_view(view);
     let of = (bench.mission, 0);
@@ -181,9 +193,9 @@ fn a_view_counts_once_a_pass_or_renewal_of_it_has_come() {
     ] {
         let mut after = bench.clone();
         if let Some(kind) = begun {
-            after.hears(UP, &one_of_each(FIRST, own)[kind]);
+            after.receive(UP, &one_of_each(FIRST, own)[kind]);
         }
-        let out = after.hears(UP, &proposed(id(4, 1), of, 3, 8));
+        let out = after.receive(UP, &proposed(id(4, 1), of, 3, 8));
         assert_eq!(out, [(DOWN, expected)], "{begun:?}");
     }
 }
@@ -197,9 +209,13 @@ fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
     let pulsed =
         |number: u16, done: bool| kinds[16].with(json!({ "number": number, "done": done }));
     let at = Instant::from_millis;
-    let mut hears = |ms, port, said: &Said, expected: &[(Port, Said)]| {
+    let mut hears = |ms, port, message: &WireMessage, expected: &[(Port, WireMessage)]| {
         bench.now = at(ms);
-        assert_eq!(bench.hears(port, said), expected, "{ms} ms: {said:?}");
+        assert_eq!(
+            bench.receive(port, message),
+            expected,
+            "{ms} ms: {message:?}"
+        );
         (bench.lease(), bench.stats().stale, bench.stats().repeated)
     };
     hears(10, UP, &pulse(9), &[(DOWN, pulse(9))]);
@@ -210,12 +226,12 @@ fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
     let (lease, stale, _) = hears(35, UP, &pulse(9), &[(UP, pulsed(9, true))]);
     assert_eq!(lease, None, "the others may not have taken part yet");
     // Other messages are stale.
-    for (nth, port, said) in [
+    for (nth, port, message) in [
         (1, UP, pulse(8)),
         (2, DOWN, pulsed(9, true)),
         (3, DOWN, pulsed(8, true)),
     ] {
-        assert_eq!(hears(40, port, &said, &[]).1, stale + nth, "{said:?}");
+        assert_eq!(hears(40, port, &message, &[]).1, stale + nth, "{message:?}");
     }
     let (lease, ..) = hears(50, UP, &pulse(10), &[(DOWN, pulse(10))]);
     assert_eq!(lease, Some(at(10 + 16_000)), "from when it was forwarded");
@@ -224,10 +240,10 @@ fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
     assert_eq!(lease, Some(at(16_010)));
     let mut out = Vec::new();
     while bench.lease().is_some() {
-        out = bench.wakes();
+        out = bench.advance_to_timeout();
     }
     assert_eq!(bench.now, at(16_010));
     assert!(bench.events().contains(&Event::LeaseLapsed));
-    out.extend(bench.ticks());
+    out.extend(bench.advance_1_ms());
     assert!(asks_for_a_view(&out), "{out:?}");
 }

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::said::Said;
+use super::message::WireMessage;
 
 pub(crate) const ASKS: u8 = 1;
 pub(crate) const FORMS: u8 = 2;
@@ -29,18 +29,23 @@ pub(crate) const RELIED: u16 = 150;
 
 /// Returns the proposal of membership view `view` as the relay at position `place` forwards it. All relays up to
 /// `place` have booted and voted for it.
-pub(crate) fn proposed(view: u32, (mission, version): (u16, u16), place: u16, relays: u16) -> Said {
+pub(crate) fn proposed(
+    view: u32,
+    (mission, version): (u16, u16),
+    place: u16,
+    relays: u16,
+) -> WireMessage {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,
         "agreed_view": 0, "agreed_relays": relays, "votes": place.min(relays), "lease_left_ds": RELIED,
         "earlier_lease_left_ds": 0, "proposer": true, "successor": null,
     });
-    Said::new("Proposal", &fields)
+    WireMessage::new("Proposal", &fields)
 }
 
 /// Returns the decision that accepts a proposed membership view of `relays` relays. The relay at position `place`
 /// sends it, and the view's positions may be used at once.
-pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Said {
+pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> WireMessage {
     let accepted = json!({ "view": view, "relays": relays });
     let changes = json!({ "base_relays": relays, "accepted": accepted });
     refused(view, of, place, relays).with(changes)
@@ -48,27 +53,32 @@ pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Sai
 
 /// Returns the decision that refuses a membership view, as only `there` of eight relays have voted. The relay at
 /// position `place` sends it.
-pub(crate) fn refused(view: u32, (mission, version): (u16, u16), place: u16, there: u16) -> Said {
+pub(crate) fn refused(
+    view: u32,
+    (mission, version): (u16, u16),
+    place: u16,
+    there: u16,
+) -> WireMessage {
     let fields = json!({
         "mission": mission, "version": version, "proposed_view": view, "place": place,
         "base_view": 0, "base_relays": 8, "accepted": null, "reached": there, "usable_in_ds": 0,
     });
-    Said::new("Decision", &fields)
+    WireMessage::new("Decision", &fields)
 }
 
 /// Returns the hello of a node that receives no other node and knows only membership view 0. The node holds the
 /// uploaded mission `holds`: its digest and version.
-pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> Said {
+pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> WireMessage {
     let (digest, version) = holds;
     let fields = json!({
         "mission": mission, "neighbour": neighbour, "behind": 1, "latest_view": 0, "latest_mission": digest,
         "latest_mission_version": version, "offer_number": 0, "hears": 0, "flags": flags,
     });
-    Said::new("Hello", &fields)
+    WireMessage::new("Hello", &fields)
 }
 
 /// Returns the hello of a node that receives no other node, and holds and flies the loaded mission.
-pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> Said {
+pub(crate) fn loaded_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> WireMessage {
     let hello = hello(mission, neighbour, (mission, 0), flags | FLIES);
     hello.with(json!({ "latest_view": newest }))
 }
@@ -76,6 +86,6 @@ pub(crate) fn a_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> S
 /// Returns a hello with the nodes that its sender receives, and with its number of connected relays.
 ///
 /// Bit 0 of `hears` is the nearest node. `behind` counts the connected relays with the sender.
-pub(crate) fn near(hears: u8, behind: u16, hello: &Said) -> Said {
+pub(crate) fn with_neighbours(hears: u8, behind: u16, hello: &WireMessage) -> WireMessage {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }

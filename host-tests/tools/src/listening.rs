@@ -10,7 +10,7 @@ use uav_relay_scenario::{Interference as Known, Scenario, Source};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::drones::FlightSpec;
 use uav_relay_sim::simulator::setup::Setup;
-use uav_relay_sim::simulator::true_interference::{Stand, TrueInterference};
+use uav_relay_sim::simulator::true_interference::{Snapshot, TrueInterference};
 
 use super::figures::sheet::FigureError;
 use super::multi_interferer::optimum;
@@ -114,12 +114,12 @@ impl RandomScene {
         let mut setup = Setup::new(self.mission(guess)?);
         setup.seed = self.seed;
         setup.settings.listen = Some(Listen::default());
-        let mut sky = TrueInterference::of(self.scene()?);
-        sky.seed = self.seed;
-        sky.period = Duration::from_millis(5_000);
-        sky.until = Instant::from_millis(120_000);
+        let mut true_interference = TrueInterference::of(self.scene()?);
+        true_interference.seed = self.seed;
+        true_interference.period = Duration::from_millis(5_000);
+        true_interference.until = Instant::from_millis(120_000);
         setup.deadline = Instant::from_millis(200_000);
-        setup.sky = Some(sky);
+        setup.true_interference = Some(true_interference);
         Ok(setup)
     }
 
@@ -132,8 +132,8 @@ impl RandomScene {
             .map(|index| [5.0 * f64::from(index), 0.0, 20.0])
             .collect();
         setup.flight = Some(FlightSpec::multicopters(start, 0.0, 0.0));
-        if let Some(sky) = &mut setup.sky {
-            sky.period = Duration::from_millis(1_000);
+        if let Some(true_interference) = &mut setup.true_interference {
+            true_interference.period = Duration::from_millis(1_000);
         }
         Ok(setup)
     }
@@ -142,7 +142,7 @@ impl RandomScene {
 /// Returns the chain's true SIR after each agreement on positions, linear.
 ///
 /// The first agreement precedes all measurements. `stands` are the states of the simulated chain in order.
-pub fn by_agreement(scene: &Scene, stands: &[Stand]) -> Vec<f64> {
+pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
     let mut sirs = Vec::new();
     for stand in stands {
         if stand.agreements as usize > sirs.len()
@@ -173,7 +173,7 @@ pub fn shares(
         let wild = RandomScene::new(seed, relays, sources);
         let outcome = run(setup(&wild)?)?;
         let best = wild.optimum()?;
-        let sirs = by_agreement(&wild.scene()?, &outcome.stands);
+        let sirs = by_agreement(&wild.scene()?, &outcome.snapshots);
         let last = *sirs.last().ok_or(FigureError::Unsettled(
             "a chain that measures the interferer",
         ))?;
@@ -195,8 +195,8 @@ pub fn unknown(wild: &RandomScene) -> Result<Setup, FigureError> {
 /// Returns the simulation of [`unknown`] with 1 dB of shadowing, independent at each position.
 pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
-    if let Some(sky) = &mut setup.sky {
-        sky.shadow_db = 1.0;
+    if let Some(true_interference) = &mut setup.true_interference {
+        true_interference.shadow_db = 1.0;
     }
     Ok(setup)
 }
@@ -263,24 +263,24 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     let mut setup = wild.flown(Interference::Unknown)?;
     setup.settings.listen = Some(Listen::following(relays));
     let none = FigureError::Unsettled("a chain that tracks a moving interferer");
-    let Some(sky) = &mut setup.sky else {
+    let Some(true_interference) = &mut setup.true_interference else {
         return Err(none);
     };
-    sky.velocity_mps = [speed_mps, 0.0];
+    true_interference.velocity_mps = [speed_mps, 0.0];
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "some minutes"
     )]
     let span_ms = (span_s * 1e3) as u64;
-    sky.until = Instant::from_millis(span_ms);
-    let sky = sky.clone();
+    true_interference.until = Instant::from_millis(span_ms);
+    let true_interference = true_interference.clone();
     let outcome = run(setup)?;
     let begun = Instant::from_millis(u64::from(BEGUN_S) * 1_000);
     let (mut followed, mut stayed, mut moments) = (0.0, 0.0, 0.0);
     let mut first = None;
-    for stand in outcome.stands.iter().filter(|stand| stand.at >= begun) {
-        let scene = sky.scene_at(stand.at);
+    for stand in outcome.snapshots.iter().filter(|stand| stand.at >= begun) {
+        let scene = true_interference.scene_at(stand.at);
         let places = wild.with(&scene).told()?;
         let best = scene.chain_sir(&places);
         let first = first.get_or_insert(places);

@@ -88,7 +88,7 @@ fn with_the_papers_channel(function: &str) -> Vec<Case> {
 }
 
 #[test]
-fn the_theorems_of_the_reference_come_out_of_the_command() {
+fn the_command_prints_the_references_theorems() {
     for (function, options) in [
         ("theorem1", "--uavs 1"),
         ("theorem3", "--uavs 1 --altitude free"),
@@ -122,7 +122,7 @@ fn the_theorems_of_the_reference_come_out_of_the_command() {
 
 /// Checks that a single relay with lateral room is placed beside the line, at the reference's optimum.
 #[test]
-fn one_relay_aside_is_the_judges_of_three_dimensions() {
+fn one_lateral_relay_agrees_with_the_3d_reference() {
     let side = example("side.toml");
     let report = json(&format!("--scenario {side} --uavs 1 --altitude free"));
     assert_eq!(report["theorem"].as_u64(), Some(4), "{report}");
@@ -148,7 +148,7 @@ fn one_relay_aside_is_the_judges_of_three_dimensions() {
 }
 
 #[test]
-fn the_counts_of_the_reference_come_out_of_the_command() {
+fn the_command_prints_the_references_counts() {
     for case in with_the_papers_channel("min_uavs") {
         let file = scenario(&case, &interferer(&case));
         let target = format!("{:?}", case.arg("gamma").unwrap());
@@ -210,7 +210,7 @@ fn rates_are_divided_by_the_slots() {
 }
 
 #[test]
-fn a_rate_is_met_by_the_fewest_relays_or_refused_with_the_largest() {
+fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
     let report = json("--target-rate-bps 6e6 --bandwidth-hz 1e7");
     assert_eq!(report["uavs"].as_u64(), Some(1), "{report}");
     assert!(number(&report["rate_bps"]) >= 6e6);
@@ -504,7 +504,7 @@ fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
 }
 
 #[test]
-fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
+fn an_unreachable_target_is_status_1_and_names_the_maximum() {
     let output = plan("--target-sir-db 60 --json");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -527,7 +527,7 @@ fn what_cannot_be_had_is_status_1_and_says_what_the_most_is() {
 }
 
 #[test]
-fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
+fn the_table_names_method_and_proof_and_a_picture_is_drawn() {
     let svg = tempfile::NamedTempFile::new().unwrap();
     let path = svg.path().to_str().unwrap();
     let output = plan(&format!("--uavs 8 --svg {path}"));
@@ -551,7 +551,7 @@ fn the_table_says_how_and_how_sure_and_the_picture_is_drawn() {
 }
 
 #[test]
-fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
+fn several_interferers_get_a_rated_hypothetical_one() {
     let case = &with_the_papers_channel("hyp_msi")[0];
     let two = |x: [f64; 2], y: f64| {
         x.map(|x| format!("[[interferer]]\npower_w = 40.0\nx_m = {x:?}\ny_m = {y:?}\n"))
@@ -596,7 +596,7 @@ fn several_interferers_get_a_hypothetical_one_and_a_verdict_on_it() {
 }
 
 #[test]
-fn the_joint_optimum_comes_out_where_altitudes_are_free() {
+fn free_altitudes_give_the_joint_optimum() {
     let altitudes = example("altitudes.toml");
     let free = json(&format!("--scenario {altitudes} --uavs 8 --altitude free"));
     assert!(
@@ -625,7 +625,7 @@ fn example(name: &str) -> String {
 }
 
 #[test]
-fn what_is_not_there_is_not_planned() {
+fn invalid_requests_are_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let map = folder.path().join("map");
     let map = map.to_str().unwrap();
@@ -687,7 +687,7 @@ fn what_is_not_there_is_not_planned() {
 }
 
 #[test]
-fn maps_are_written_where_there_is_an_earth() {
+fn maps_are_written_for_scenarios_with_sites() {
     let folder = tempfile::tempdir().unwrap();
     let [geojson, kml] = ["plan.geojson", "plan.kml"]
         .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
@@ -707,7 +707,7 @@ fn maps_are_written_where_there_is_an_earth() {
 }
 
 #[test]
-fn what_is_asked_in_decibels_is_answered_in_decibels() {
+fn a_target_in_decibels_is_answered_in_decibels() {
     let (status, line) = refusal("--target-sir-db 60");
     assert_eq!(status, 1);
     assert!(line.starts_with("no number of relays, up to 1000, gives every hop an SIR of 60 dB: the highest SIR is 20.980 dB, with "), "{line}");
@@ -768,7 +768,7 @@ fn json_has_both_units() {
 }
 
 #[test]
-fn a_case_is_told_as_what_it_means_for_the_drone() {
+fn a_theorems_case_is_explained_for_the_drone() {
     let json = json("--uavs 1");
     let table = said("--uavs 1");
     let words = json["case_words"].as_str().unwrap();
@@ -877,7 +877,7 @@ fn json_of(file: &tempfile::NamedTempFile) -> Value {
 ///
 /// It is 1.380649e-23 J/K x 290 K x 20 MHz x 10^0.6 = 3.1879483e-13 W, which is -94.96489 dBm.
 #[test]
-fn the_noise_is_k_t_b_f_and_says_of_what() {
+fn the_noise_is_k_t_b_f_and_names_its_terms() {
     let noisy = "\n[noise]\nbandwidth_hz = 20e6\nfigure_db = 6.0\n";
     let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let plain = std::fs::read_to_string(example("scenario.toml")).unwrap();
@@ -930,7 +930,7 @@ fn unheard(tool: &str, arguments: &str) -> Option<i32> {
 }
 
 #[test]
-fn nobody_reads_and_the_status_is_the_same() {
+fn a_closed_output_does_not_change_the_status() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let [plan, provision, figures] = [

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_bound_is_an_error() {
+    fn a_call_without_a_bound_is_an_error() {
         let round = IMAGE.replace("bx\tlr", "bl\t0x8000300 <right> @ imm = #0x10");
         let calls = Calls::read(&round, std::iter::empty()).unwrap();
         assert!(matches!(

@@ -312,7 +312,7 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
 /// an f32's step.
 ///
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
-/// `the_best_of_equals_in_a_field` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
+/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
 /// each three square roots for every point of the field and relay.
 #[cfg(feature = "internals")]
 #[doc(hidden)]

@@ -9,7 +9,7 @@
 //! they are equal where (1 - r) x^2 - 2 D x + C = 0, C = D^2 + (1 - r) h^2. The root between Tx and Rx is x = C / (D + sqrt(D^2 -
 //! (1 - r) C)), in a form without a special case for r = 1 (x = D / 2). The discriminant is r D^2 - (1 - r)^2 h^2.
 //!
-//! Accuracy: `noise_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SNR.
+//! Accuracy: `one_relay_in_noise_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SNR.
 //!
 //! # Field: Algorithm 3, as corrected, and its limit
 //!

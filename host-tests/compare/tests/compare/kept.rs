@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn the_results_have_the_run_that_is_kept() {
+fn results_contain_the_stored_run() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = std::fs::read_to_string(root.join("../../examples/RESULTS.md")).unwrap();
     let folder = TempDir::new().unwrap();
@@ -37,7 +37,7 @@ fn the_results_have_the_run_that_is_kept() {
 ///
 /// With a lateral range this crate has more than twice as many starts to try.
 #[test]
-fn the_kept_run_is_twenty_times_as_fast_as_one_good_start() {
+fn slsqp_from_one_start_takes_20_times_our_time() {
     let kept = include_str!("../../rivals/measured.json");
     let kept: Value = serde_json::from_str(kept).unwrap();
     for solved in kept["problems"].as_array().unwrap() {
@@ -59,7 +59,7 @@ fn the_kept_run_is_twenty_times_as_fast_as_one_good_start() {
 }
 
 #[test]
-fn json_is_given_back_as_it_was() {
+fn json_round_trip_is_the_identity() {
     let (sir, chain) = (2.25, [[350.5, 0.0, 20.0], [400.25, 0.5, 20.0]]);
     let own = run("own", 1e-5, sir, &chain);
     let mut rival = run("rival", 1.5, sir, &chain);
@@ -85,7 +85,7 @@ fn with_path(folder: &Path) -> Output {
 }
 
 #[test]
-fn without_python_it_says_so() {
+fn missing_python_is_reported() {
     let folder = TempDir::new().unwrap();
     let line = refusal(&with_path(folder.path()), 2);
     assert!(line.starts_with("python3 is not on PATH: "), "{line}");
@@ -93,7 +93,7 @@ fn without_python_it_says_so() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn without_venv_pip_or_packages_it_says_so() {
+fn missing_venv_pip_or_packages_are_reported() {
     use std::os::unix::fs::symlink;
 
     let folder = TempDir::new().unwrap();

@@ -127,7 +127,7 @@ fn wrong_options_are_named() {
 }
 
 #[test]
-fn the_table_has_a_line_a_solver_and_says_where_and_when() {
+fn the_table_has_a_row_per_solver_and_host_and_date() {
     let (sir, chain) = best_of_eight();
     let own = run("own", 1.26e-5, sir, &chain);
     let mut quick = run("quick", 0.00251, sir, &chain);
@@ -158,7 +158,7 @@ fn the_table_has_a_line_a_solver_and_says_where_and_when() {
 }
 
 #[test]
-fn the_sir_is_that_of_the_places() {
+fn the_reported_sir_is_that_of_the_positions() {
     let (sir, chain) = best_of_eight();
     assert!(
         line_of_rival(run("rival", 1.0, sir, &chain)).starts_with("2.465536 | less than 1e-8 |")
@@ -183,7 +183,7 @@ fn the_sir_is_that_of_the_places() {
 }
 
 #[test]
-fn the_altitudes_that_were_chosen_are_judged() {
+fn chosen_altitudes_count_in_the_sir() {
     let corridor = Corridor::plane(20.0, 300.0);
     let link = Link {
         y_i: 150.0,
@@ -215,7 +215,7 @@ fn the_altitudes_that_were_chosen_are_judged() {
 }
 
 #[test]
-fn a_chain_that_breaks_a_rule_does_not_count() {
+fn an_invalid_chain_does_not_count() {
     let (sir, best) = best_of_eight();
     let broken = |change: &dyn Fn(&mut Vec<[f64; 3]>)| {
         let mut chain = best.clone();
@@ -257,7 +257,7 @@ fn a_chain_that_breaks_a_rule_does_not_count() {
 }
 
 #[test]
-fn good_enough_is_checked() {
+fn the_good_enough_limit_is_applied() {
     let (sir, chain) = best_of_eight();
     let mut moved = chain.clone();
     moved[3][0] -= 0.01;
@@ -276,7 +276,7 @@ fn good_enough_is_checked() {
 }
 
 #[test]
-fn the_sides_that_were_chosen_are_judged() {
+fn chosen_lateral_offsets_count_in_the_sir() {
     let corridor = Corridor {
         left_m: -280.0,
         right_m: 280.0,

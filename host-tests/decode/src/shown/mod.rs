@@ -6,8 +6,8 @@ mod text;
 use std::fmt::Write as _;
 
 use crate::frame::Frame;
-use crate::members::TagCheck;
 use crate::source::Packet;
+use crate::tags::TagCheck;
 
 pub use json::json;
 pub use text::text;

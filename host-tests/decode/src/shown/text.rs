@@ -82,7 +82,7 @@ fn lines(fields: &Fields<'_>, indent: usize, ranges: bool, out: &mut String) {
                 }
                 continue;
             }
-            plain => _ = write!(out, "{:<VALUE$}", said(field, plain)),
+            plain => _ = write!(out, "{:<VALUE$}", value_text(field, plain)),
         }
         if *value != Value::None {
             let unit = field.scale().map_or(field.unit.as_str(), |_| "");
@@ -97,7 +97,7 @@ fn lines(fields: &Fields<'_>, indent: usize, ranges: bool, out: &mut String) {
     }
 }
 
-fn said(field: &Field, value: &Value<'_>) -> String {
+fn value_text(field: &Field, value: &Value<'_>) -> String {
     match value {
         Value::Unsigned(number) => scaled(field, number.to_string(), *number as f64),
         Value::Signed(number) => scaled(field, number.to_string(), *number as f64),
@@ -114,7 +114,10 @@ fn said(field: &Field, value: &Value<'_>) -> String {
         Value::Word(value, word) => word.map_or_else(|| value.to_string(), str::to_owned),
         Value::None => "none".to_owned(),
         Value::List(values) => {
-            let values: Vec<String> = values.iter().map(|value| said(field, value)).collect();
+            let values: Vec<String> = values
+                .iter()
+                .map(|value| value_text(field, value))
+                .collect();
             format!("[{}]", values.join(", "))
         }
         // A group has its own lines.

@@ -10,9 +10,9 @@ use pcap_file::pcapng::blocks::interface_description::{
 };
 use pcap_file::pcapng::blocks::section_header::SectionHeaderOption;
 use pcap_file::pcapng::{Block, PcapNgReader};
-use uav_relay_capture::{Cut, Direction, LINK_TYPE, Piece};
+use uav_relay_capture::{Direction, FrameSplitter, LINK_TYPE, Piece};
 
-use super::{Item, Packet, Trouble};
+use super::{Item, Packet, SourceError};
 
 struct Interface {
     name: String,
@@ -24,8 +24,8 @@ struct Interface {
 pub(super) fn read<E>(
     input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,
-) -> Result<(), Trouble<E>> {
-    let mut reader = PcapNgReader::new(input).map_err(trouble)?;
+) -> Result<(), SourceError<E>> {
+    let mut reader = PcapNgReader::new(input).map_err(source_error)?;
     let comment = reader
         .section()
         .options
@@ -35,11 +35,11 @@ pub(super) fn read<E>(
             _ => None,
         });
     if let Some(comment) = comment {
-        take(Item::Comment(&comment)).map_err(Trouble::Taken)?;
+        take(Item::Comment(&comment)).map_err(SourceError::Taken)?;
     }
     let mut interfaces: Vec<Interface> = Vec::new();
     while let Some(block) = reader.next_block() {
-        match block.map_err(trouble)? {
+        match block.map_err(source_error)? {
             Block::SectionHeader(_) => interfaces.clear(),
             Block::InterfaceDescription(block) => interfaces.push(interface(&block)),
             Block::EnhancedPacket(packet) => {
@@ -56,15 +56,15 @@ pub(super) fn read<E>(
     Ok(())
 }
 
-fn trouble<E>(error: PcapError) -> Trouble<E> {
+fn source_error<E>(error: PcapError) -> SourceError<E> {
     match error {
         PcapError::IoError(error) if error.kind() != ErrorKind::UnexpectedEof => {
-            Trouble::Read(error)
+            SourceError::Read(error)
         }
         PcapError::IoError(_) | PcapError::IncompleteBuffer => {
-            Trouble::Capture("it ends inside a block".to_owned())
+            SourceError::Capture("it ends inside a block".to_owned())
         }
-        error => Trouble::Capture(error.to_string()),
+        error => SourceError::Capture(error.to_string()),
     }
 }
 
@@ -91,7 +91,7 @@ fn pieces<E>(
     packet: &EnhancedPacketBlock<'_>,
     interface: &Interface,
     take: &mut impl FnMut(Item<'_>) -> Result<(), E>,
-) -> Result<(), Trouble<E>> {
+) -> Result<(), SourceError<E>> {
     let mut comment = "";
     let mut direction = Direction::Unknown;
     for option in &packet.options {
@@ -121,9 +121,9 @@ fn pieces<E>(
             wire: piece.bytes,
             len: piece.len + missing,
         }))
-        .map_err(Trouble::Taken)
+        .map_err(SourceError::Taken)
     };
-    let mut cut = Cut::default();
+    let mut cut = FrameSplitter::default();
     cut.push(&packet.data, |piece| one(piece, 0))?;
     match cut.rest() {
         Some(rest) => one(rest, missing),

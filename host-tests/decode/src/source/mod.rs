@@ -5,7 +5,7 @@ mod capture;
 use std::io::{self, Read};
 use std::time::Duration;
 
-use uav_relay_capture::{Cut, Direction, Piece};
+use uav_relay_capture::{Direction, FrameSplitter, Piece};
 
 /// First bytes of every pcapng capture. No frame starts with them: the second header byte, here 0d, would be 1x.
 const CAPTURE: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
@@ -38,7 +38,7 @@ pub struct Packet<'a> {
 
 /// Error while reading a capture or byte stream.
 #[derive(Debug)]
-pub enum Trouble<E> {
+pub enum SourceError<E> {
     /// Read error of the capture or byte stream.
     Read(io::Error),
     /// Malformed capture, with the fault.
@@ -50,11 +50,11 @@ pub enum Trouble<E> {
 /// Passes all items of `input`, a capture or a byte stream, to `take`.
 ///
 /// # Errors
-/// [`Trouble`]; the items before it have been passed on.
+/// [`SourceError`]; the items before it have been passed on.
 pub fn read<E>(
     mut input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,
-) -> Result<(), Trouble<E>> {
+) -> Result<(), SourceError<E>> {
     // Reads no more bytes than needed, because a single frame on a line may be all that comes.
     let mut begin = Vec::new();
     while begin.len() < CAPTURE.len() && CAPTURE.starts_with(&begin) {
@@ -63,7 +63,7 @@ pub fn read<E>(
             Ok(0) => break,
             Ok(_) => begin.extend(byte),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(Trouble::Read(error)),
+            Err(error) => return Err(SourceError::Read(error)),
         }
     }
     if begin == CAPTURE {
@@ -77,29 +77,29 @@ fn stream<E>(
     begin: &[u8],
     mut input: impl Read,
     take: &mut impl FnMut(Item<'_>) -> Result<(), E>,
-) -> Result<(), Trouble<E>> {
-    let mut cut = Cut::default();
+) -> Result<(), SourceError<E>> {
+    let mut cut = FrameSplitter::default();
     let mut bytes = begin.to_vec();
     let mut buffer = [0; 4_096];
     loop {
-        cut.push(&bytes, |piece| take(bare(piece)))
-            .map_err(Trouble::Taken)?;
+        cut.push(&bytes, |piece| take(item_without_time(piece)))
+            .map_err(SourceError::Taken)?;
         let read = match input.read(&mut buffer) {
             Ok(0) => break,
             Ok(read) => read,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => 0,
-            Err(error) => return Err(Trouble::Read(error)),
+            Err(error) => return Err(SourceError::Read(error)),
         };
         bytes.clear();
         bytes.extend(buffer.iter().take(read));
     }
     match cut.rest() {
-        Some(rest) => take(bare(rest)).map_err(Trouble::Taken),
+        Some(rest) => take(item_without_time(rest)).map_err(SourceError::Taken),
         None => Ok(()),
     }
 }
 
-fn bare(piece: Piece<'_>) -> Item<'_> {
+fn item_without_time(piece: Piece<'_>) -> Item<'_> {
     Item::Packet(Packet {
         at: None,
         interface: "",

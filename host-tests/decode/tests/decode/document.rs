@@ -5,7 +5,7 @@ use uav_relay_decode::vectors::Vectors;
 use super::{lines, name, secret};
 
 #[test]
-fn the_fields_of_the_first_example_stand_with_their_names() {
+fn the_first_example_is_decoded_with_field_names() {
     let text = lines(&[], &super::HEARTBEAT).join("\n");
     let wanted = "\
 frame 1  Heartbeat  1 -> 2  network 7  counter 0  23 bytes
@@ -16,7 +16,7 @@ frame 1  Heartbeat  1 -> 2  network 7  counter 0  23 bytes
 }
 
 #[test]
-fn all_vectors_are_decoded_and_none_is_refused() {
+fn all_test_vectors_are_decoded() {
     let vectors = Vectors::load().unwrap().frames;
     let stream: Vec<u8> = vectors
         .iter()

@@ -50,7 +50,7 @@ fn a_capture_is_read_from_a_file_and_from_a_pipe() {
 }
 
 #[test]
-fn a_capture_that_breaks_off_is_shown_as_far_as_it_goes() {
+fn a_truncated_capture_is_shown_up_to_its_end() {
     let whole = capture("");
     let output = piped(&["--json"], &whole[..whole.len() - 10]);
     let line = String::from_utf8(output.stderr).unwrap();

@@ -7,7 +7,7 @@ use super::{HEARTBEAT, decode, lines};
 
 /// Checks that each frame is printed at once. If the program buffered one, this would block until the test times out.
 #[test]
-fn each_frame_is_printed_before_the_next_one_comes() {
+fn each_frame_is_printed_at_once() {
     let mut child = decode().arg("--json").spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     let mut output = BufReader::new(child.stdout.take().unwrap());
@@ -29,7 +29,7 @@ fn each_frame_is_printed_before_the_next_one_comes() {
 }
 
 #[test]
-fn after_noise_the_next_frame_is_whole_again() {
+fn the_next_frame_after_noise_is_decoded() {
     let long = [&[9; 5_000][..], &[0]].concat();
     let cut = [&HEARTBEAT[..13], &[0]].concat();
     let mut changed = HEARTBEAT;
@@ -67,7 +67,7 @@ fn after_noise_the_next_frame_is_whole_again() {
 }
 
 #[test]
-fn a_reader_that_has_had_enough_ends_it_quietly() {
+fn a_closed_standard_output_ends_it_without_an_error() {
     for arguments in [&[][..], &["--json"], &["--help"], &["--dissector", "-"]] {
         let mut child = decode().args(arguments).spawn().unwrap();
         drop(child.stdout.take());
@@ -86,7 +86,7 @@ fn a_reader_that_has_had_enough_ends_it_quietly() {
 }
 
 #[test]
-fn nobody_who_reads_its_errors_is_no_panic() {
+fn a_closed_standard_error_causes_no_panic() {
     let mut child = decode().arg("/nowhere").spawn().unwrap();
     drop(child.stderr.take());
     assert_eq!(child.wait().unwrap().code(), Some(2));

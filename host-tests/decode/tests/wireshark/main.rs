@@ -36,7 +36,7 @@ const EACH: usize = 200;
 const HURT: usize = 2_000;
 
 #[test]
-fn the_dissector_is_that_of_the_tables() {
+fn the_dissector_is_generated_from_the_tables() {
     let written = dissector::lua(&Format::load().unwrap());
     assert!(
         std::fs::read_to_string(DISSECTOR).unwrap() == written,
@@ -65,7 +65,7 @@ fn dissected(frames: &[Vec<u8>]) -> Vec<pdml::Packet> {
 }
 
 #[test]
-fn random_frames_of_every_kind_say_what_cargo_decode_says() {
+fn tshark_and_cargo_decode_agree_on_random_frames() {
     let format = Format::load().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let frames: Vec<Vec<u8>> = (0..EACH * (format.messages.len() + 1))
@@ -121,7 +121,7 @@ fn rejected() -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn hurt_frames_are_refused_for_the_same_reason() {
+fn tshark_and_cargo_decode_reject_for_the_same_reason() {
     let format = Format::load().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut frames: Vec<Vec<u8>> = (0..HURT)

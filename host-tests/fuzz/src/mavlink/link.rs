@@ -17,11 +17,11 @@ use super::wire::{
 use crate::heap::without;
 use crate::input::Input;
 
-const MOST_OPERATIONS: usize = 256;
+const MAX_OPERATIONS: usize = 256;
 
 /// Maximum number of frames that the link may have to send at once. They are twice a heartbeat, three requests, an
 /// answer, a target, three lines, four numbers.
-const MOST_FRAMES: usize = 26;
+const MAX_FRAMES: usize = 26;
 
 /// Maximum distance of a flight target from the line, m: 5 km, and the error of a flat earth there.
 const AROUND_M: f64 = 5_040.0;
@@ -57,7 +57,7 @@ pub(super) fn operate(input: &mut Input<'_>, signs: bool) {
         return;
     };
     link.settle();
-    for _ in 0..MOST_OPERATIONS {
+    for _ in 0..MAX_OPERATIONS {
         if input.is_empty() {
             return;
         }
@@ -96,20 +96,22 @@ impl Link {
         match input.below(if self.peer.is_some() { 19 } else { 15 }) {
             0 => {
                 let lengths = input.word();
-                self.hear(input.piece(), lengths);
+                self.deliver_bytes(input.piece(), lengths);
             }
             1 | 2 => self.heartbeat(input),
             3 => match input.below(7) {
-                6 => self.clears(input),
-                landed => self.says(input, &frame(EXTENDED_STATE, [1, 1], &[0, landed], 0)),
+                6 => self.clear_lost_relay(input),
+                landed => {
+                    self.deliver_frame(input, &frame(EXTENDED_STATE, [1, 1], &[0, landed], 0))
+                }
             },
             4 => {
-                let place = near(input);
+                let place = nearby_place(input);
                 self.position(input, place);
             }
             5 => {
                 let raw = input.piece().to_vec();
-                self.says(input, &frame(GLOBAL_POSITION, [1, 1], &sized(raw, 28), 0));
+                self.deliver_frame(input, &frame(GLOBAL_POSITION, [1, 1], &sized(raw, 28), 0));
             }
             6 => {
                 let mut payload = vec![0; 4];
@@ -117,7 +119,7 @@ impl Link {
                 let off = i32::from(input.byte() / 8);
                 payload.extend(lat.wrapping_add(off).to_le_bytes());
                 payload.extend(lon.to_le_bytes());
-                self.says(
+                self.deliver_frame(
                     input,
                     &frame(POSITION_TARGET, [1, 1], &sized(payload, 51), 0),
                 );
@@ -130,7 +132,7 @@ impl Link {
                 }
             }
             10 => {
-                let setpoint = input.flag().then(|| any(input));
+                let setpoint = input.flag().then(|| any_place(input));
                 without(|| self.autopilot.handle_setpoint(self.now, setpoint));
             }
             11 => {
@@ -142,7 +144,7 @@ impl Link {
                 self.autopilot.handle_bearing(look);
             }
             12 => {
-                let (sir, place) = (input.any_number(), any(input));
+                let (sir, place) = (input.any_number(), any_place(input));
                 without(|| {
                     self.autopilot
                         .handle_values(self.now, Some(sir), Some(place));
@@ -160,8 +162,11 @@ impl Link {
                 }
             }
             15 => {
-                let before = self.peer.as_ref().and_then(|peer| peer.before(input));
-                self.hear(&before.unwrap_or_default(), 0);
+                let before = self
+                    .peer
+                    .as_ref()
+                    .and_then(|peer| peer.recorded_frame(input));
+                self.deliver_bytes(&before.unwrap_or_default(), 0);
             }
             16 => {
                 if let Some(peer) = &mut self.peer {
@@ -172,25 +177,25 @@ impl Link {
             17 => self.now = self.now + Duration::from_millis(u64::from(input.long())),
             _ => {
                 let frame = frame(ACK, [1, 1], &sized(input.piece().to_vec(), 10), 0);
-                self.says(input, &frame);
+                self.deliver_frame(input, &frame);
             }
         }
     }
 
     /// Delivers a frame of the autopilot to the link. If the link signs, the frame is signed as `input` chooses.
-    fn says(&mut self, input: &mut Input<'_>, frame: &[u8]) {
+    fn deliver_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) {
         match &mut self.peer {
             Some(peer) => {
-                let signed = peer.signs(input, frame);
-                self.hear(&signed, 0);
+                let signed = peer.sign_frame(input, frame);
+                self.deliver_bytes(&signed, 0);
             }
-            None => self.hear(frame, 0),
+            None => self.deliver_bytes(frame, 0),
         }
     }
 
     /// Delivers bytes to the link in one piece, and to a clone in pieces of two alternating lengths. The results must
     /// be equal.
-    fn hear(&mut self, bytes: &[u8], lengths: u16) {
+    fn deliver_bytes(&mut self, bytes: &[u8], lengths: u16) {
         let mut other = self.autopilot.clone();
         without(|| self.autopilot.handle_bytes(self.now, bytes));
         let mut rest = bytes;
@@ -217,7 +222,7 @@ impl Link {
         });
         assert_eq!(one, other, "by how the bytes are cut");
         if let Some(peer) = &mut self.peer {
-            peer.heard(self.now, bytes);
+            peer.expect_bytes(self.now, bytes);
             assert_eq!(self.autopilot.refused(), peer.refused, "of {bytes:?}");
         }
     }
@@ -239,11 +244,11 @@ impl Link {
         let armed = if input.below(4) == 3 { 0 } else { 128 };
         let mut payload = mode.to_le_bytes().to_vec();
         payload.extend([2, autopilot, armed | 1, 4, 3]);
-        self.says(input, &frame(HEARTBEAT, [1, component], &payload, 0));
+        self.deliver_frame(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
     /// Reports a lost relay to the link, and delivers an operator's command to clear that relay or others.
-    fn clears(&mut self, input: &mut Input<'_>) {
+    fn clear_lost_relay(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {
             Side::Upstream
@@ -266,7 +271,7 @@ impl Link {
         payload.extend(31_010_u16.to_le_bytes());
         let component = if input.below(4) == 3 { 1 } else { 191 };
         payload.extend([1, component, input.below(2)]);
-        self.says(input, &frame(COMMAND, [255, 190], &payload, 0));
+        self.deliver_frame(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
     /// Delivers the drone's position, perhaps with a delayed or wrong time stamp.
@@ -285,7 +290,7 @@ impl Link {
         for number in [point.lat_e7, point.lon_e7, point.amsl_mm] {
             payload.extend(number.to_le_bytes());
         }
-        self.says(
+        self.deliver_frame(
             input,
             &frame(GLOBAL_POSITION, [1, 1], &sized(payload, 28), 0),
         );
@@ -299,14 +304,14 @@ impl Link {
             match &mut self.peer {
                 Some(peer) => {
                     assert_eq!(frame.get(2), Some(&1));
-                    let unsigned = peer.sent(self.now, &frame);
+                    let unsigned = peer.check_sent(self.now, &frame);
                     // The checksum covers the signed flag.
-                    self.look_at(&unsigned, 1);
+                    self.check_frame(&unsigned, 1);
                 }
-                None => self.look_at(&frame, 0),
+                None => self.check_frame(&frame, 0),
             }
             frames += 1;
-            assert!(frames <= MOST_FRAMES, "it never ends");
+            assert!(frames <= MAX_FRAMES, "it never ends");
         }
         while let Some(position) = self.autopilot.poll_position() {
             let Placement {
@@ -344,7 +349,7 @@ impl Link {
     /// Checks a frame sent by the link, from which the signature was removed.
     ///
     /// `covered_flags` are the flags that its checksum covers.
-    fn look_at(&mut self, frame: &[u8], covered_flags: u8) {
+    fn check_frame(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()
         else {
@@ -368,7 +373,7 @@ impl Link {
         assert_eq!(sum, checksum(&covered, extra).to_le_bytes());
         let payload = sized(payload.to_vec(), longest);
         if id == SET_POSITION.0 {
-            self.look_at_target(&payload);
+            self.check_target(&payload);
         } else if id == VALUE.0 {
             assert!(float(&payload, 4).is_finite(), "{payload:?}");
         }
@@ -376,7 +381,7 @@ impl Link {
 
     /// Checks a flight target that the link has sent. It must be finite, near the line, within the speed limit, and
     /// permitted in the link's state.
-    fn look_at_target(&mut self, payload: &[u8]) {
+    fn check_target(&mut self, payload: &[u8]) {
         let state = self.autopilot.state();
         let may = matches!(state, State::Engaged | State::Blind)
             || state == State::Standby && self.kind != Some(Kind::ArduCopter);
@@ -411,7 +416,7 @@ impl Link {
     }
 }
 
-fn near(input: &mut Input<'_>) -> Placement {
+fn nearby_place(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.even(-5_100.0, 6_500.0),
         y_m: input.even(-5_100.0, 5_100.0),
@@ -420,7 +425,7 @@ fn near(input: &mut Input<'_>) -> Placement {
 }
 
 /// Reads a position near the line; a coordinate is now and then an arbitrary number.
-fn any(input: &mut Input<'_>) -> Placement {
+fn any_place(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, 1_400.0)),
         y_m: input.mostly(|input| input.even(-100.0, 100.0)),

@@ -73,7 +73,7 @@ impl Peer {
 
     /// Signs a frame of the autopilot, mostly correctly. Otherwise leaves it unsigned, uses another key or an old
     /// stamp, damages it, or replays one.
-    pub(super) fn signs(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
+    pub(super) fn sign_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();
         let (key, link) = match how {
             // Ten links, more than the senders remembered.
@@ -97,7 +97,7 @@ impl Peer {
                 }
             }
             240..=255 => {
-                if let Some(old) = self.before(input) {
+                if let Some(old) = self.recorded_frame(input) {
                     return old;
                 }
             }
@@ -110,7 +110,7 @@ impl Peer {
         frame
     }
 
-    pub(super) fn before(&self, input: &mut Input<'_>) -> Option<Vec<u8>> {
+    pub(super) fn recorded_frame(&self, input: &mut Input<'_>) -> Option<Vec<u8>> {
         let at = usize::from(input.byte()) % self.history.len().max(1);
         self.history.get(at).cloned()
     }
@@ -129,12 +129,12 @@ impl Peer {
     }
 
     /// Processes bytes that the tested link has received, and counts the frames that the link must reject.
-    pub(super) fn heard(&mut self, now: Instant, bytes: &[u8]) {
+    pub(super) fn expect_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let mut parser = self.parser.clone();
         for &byte in bytes {
             parser.push(byte);
             while let Some(taken) =
-                parser.next_frame(|received, frame| self.takes(now, &received, frame))
+                parser.next_frame(|received, frame| self.accepts(now, &received, frame))
             {
                 self.refused = self.refused.saturating_add(u32::from(!taken));
             }
@@ -142,7 +142,7 @@ impl Peer {
         self.parser = parser;
     }
 
-    fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
+    fn accepts(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         match received.message {
             // Unknown messages, and those of a radio, need no signature.
             None | Some(Incoming::RadioStatus { .. }) => return true,
@@ -195,7 +195,7 @@ impl Peer {
     ///
     /// # Panics
     /// The signature is wrong.
-    pub(super) fn sent(&mut self, now: Instant, frame: &[u8]) -> Vec<u8> {
+    pub(super) fn check_sent(&mut self, now: Instant, frame: &[u8]) -> Vec<u8> {
         self.advance(now);
         let Some((unsigned, [link, stamp @ ..])) = frame.split_last_chunk::<SIGNATURE>() else {
             unreachable!("{frame:?}");

@@ -9,9 +9,9 @@ const SUMS: usize = 18;
 impl Body<'_, '_> {
     pub(super) fn hearing(&mut self) {
         self.pass();
-        self.question();
+        self.request_number();
         if self.small(0, 4) == 4 {
-            let distance_m = self.known.distance_m;
+            let distance_m = self.state.distance_m;
             self.float(|input| input.scaled(1e-6, 1e9));
             self.float(|input| input.even(-distance_m, 2.0 * distance_m));
             self.float(|input| input.even(-distance_m, distance_m));

@@ -38,7 +38,7 @@ impl Body<'_, '_> {
     /// Appends the number of the hello that the offer answers: mostly the relay's last hello.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
-            0..240 => self.known.asked,
+            0..240 => self.state.offer_number,
             _ => self.input.word(),
         };
         self.word(answer);
@@ -59,7 +59,7 @@ impl Body<'_, '_> {
 
     /// Appends a mission version: that which the tested relay holds, one of the next three, or any.
     fn version(&mut self) {
-        let held = self.known.held.version;
+        let held = self.state.held.version;
         let version = match self.input.byte() {
             up @ 0..240 => held.wrapping_add(u16::from(up % 4)),
             _ => self.input.word(),
@@ -70,7 +70,7 @@ impl Body<'_, '_> {
     /// Appends a number of relays: that of the loaded mission, or any.
     fn all(&mut self) {
         let relays = match self.input.byte() {
-            0..240 => self.known.relays,
+            0..240 => self.state.relays,
             _ => self.input.word(),
         };
         self.word(relays);
@@ -95,7 +95,7 @@ impl Body<'_, '_> {
     fn wild(&mut self) {
         let distance_m = self.input.scaled(1.0, 1e6);
         self.float(|_| distance_m);
-        let apart = distance_m / f32::from(self.known.relays.max(1));
+        let apart = distance_m / f32::from(self.state.relays.max(1));
         self.float(|input| input.even(0.0, apart));
         self.power();
         let (one, other) = (self.input.scaled(0.1, 1e5), self.input.scaled(0.1, 1e5));

@@ -7,7 +7,7 @@ use crate::input::Input;
 
 /// State of the tested relay that its neighbour may know.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Known {
+pub struct RelayState {
     /// Digest of the mission that the tested relay was loaded with.
     pub digest: u16,
     /// Number of relays in the mission that the tested relay was loaded with.
@@ -23,7 +23,7 @@ pub struct Known {
     /// Association number in the tested relay's last fence message, 0 for none.
     pub association: u16,
     /// Offer number in the tested relay's last hello, 0 for none.
-    pub asked: u16,
+    pub offer_number: u16,
     /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
 }
@@ -31,7 +31,7 @@ pub struct Known {
 pub(super) struct Body<'a, 'b> {
     pub(super) bytes: Vec<u8>,
     pub(super) input: &'a mut Input<'b>,
-    pub(super) known: &'a Known,
+    pub(super) state: &'a RelayState,
 }
 
 impl Body<'_, '_> {
@@ -39,9 +39,9 @@ impl Body<'_, '_> {
     /// number, or any.
     pub(super) fn number(&mut self) {
         let number = match self.input.byte() {
-            0..96 => self.known.number.wrapping_add(1),
-            96..192 => self.known.number,
-            behind @ 192..248 => self.known.number.wrapping_sub(u16::from(behind - 190)),
+            0..96 => self.state.number.wrapping_add(1),
+            96..192 => self.state.number,
+            behind @ 192..248 => self.state.number.wrapping_sub(u16::from(behind - 190)),
             _ => self.input.word(),
         };
         self.bytes.extend_from_slice(&number.to_le_bytes());
@@ -49,7 +49,7 @@ impl Body<'_, '_> {
 
     pub(super) fn digest(&mut self) {
         let wrong = u16::from(self.input.byte() == u8::MAX);
-        self.word(self.known.digest ^ wrong);
+        self.word(self.state.digest ^ wrong);
     }
 
     pub(super) fn word(&mut self, word: u16) {
@@ -59,19 +59,19 @@ impl Body<'_, '_> {
     /// Appends a pass (message round) number, and the digest of mission and view, rarely of another view.
     pub(super) fn pass(&mut self) {
         self.number();
-        let mark = mark(self.known.view);
+        let mark = mark(self.state.view);
         let mark = match self.input.byte() {
             u8::MAX => self.input.word(),
             up @ 240.. => mark.wrapping_add(u16::from(up - 240)),
             _ => mark,
         };
-        self.word(self.known.flown.wrapping_add(mark));
+        self.word(self.state.flown.wrapping_add(mark));
     }
 
     /// Appends the name of a view (membership of the chain). It is the tested relay's, one of the next from a
     /// possible proposer, an earlier one, or any.
     pub(super) fn view(&mut self) {
-        let own = self.known.view;
+        let own = self.state.view;
         let view = match self.input.byte() {
             0..32 => own.bits(),
             up @ 32..224 => {
@@ -94,7 +94,7 @@ impl Body<'_, '_> {
     }
 
     /// Appends a sequence number, as of a heartbeat's request or reply: mostly 0 (none) to 11.
-    pub(super) fn question(&mut self) {
+    pub(super) fn request_number(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
             _ => self.input.word(),
@@ -156,12 +156,12 @@ impl Body<'_, '_> {
     }
 
     pub(super) fn place(&mut self) {
-        let distance_m = self.known.distance_m;
+        let distance_m = self.state.distance_m;
         self.float(|input| input.even(0.0, distance_m));
     }
 
     /// Appends a lateral position y, m, within 1e5 or 100 to either side.
-    pub(super) fn beside(&mut self) {
+    pub(super) fn lateral(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));
     }
@@ -184,21 +184,21 @@ impl Body<'_, '_> {
     /// Appends the number of a lease renewal and the digest of mission and view. The number is mostly one of the
     /// first, the digest rarely wrong.
     pub(super) fn pulse_number(&mut self) {
-        self.question();
+        self.request_number();
         let wrong = u16::from(self.input.byte() == u8::MAX);
-        let digest = self.known.flown.wrapping_add(mark(self.known.view));
+        let digest = self.state.flown.wrapping_add(mark(self.state.view));
         self.word(digest ^ wrong);
     }
 
     /// Returns version and digest of a mission: that held by the tested relay, the loaded one, or another. The other
     /// one is newer, older or arbitrary.
     pub(super) fn mission_id(&mut self) -> MissionId {
-        let held = self.known.held;
+        let held = self.state.held;
         match self.input.byte() {
             0..128 => held,
             128..192 => MissionId {
                 version: 0,
-                digest: self.known.digest,
+                digest: self.state.digest,
             },
             192..216 => MissionId {
                 version: held.version.wrapping_add(1),
@@ -219,7 +219,7 @@ impl Body<'_, '_> {
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),
-            96..192 => self.known.association,
+            96..192 => self.state.association,
             _ => self.input.word(),
         };
         self.word(word);

@@ -22,7 +22,7 @@ use std::ops::RangeInclusive;
 
 use rand::{Rng, RngExt};
 
-use crate::reference::{Link, Station, path_loss_factor};
+use crate::reference::{Link, Relay, path_loss_factor};
 
 /// Differences between the relays of a random chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     } else {
         log_uniform(rng, 0.1, 1e3)
     };
-    let common = Station {
+    let common = Relay {
         altitude_m,
         power_w: log_uniform(rng, 0.01, 100.0),
     };
@@ -182,7 +182,7 @@ fn aside(rng: &mut impl Rng) -> f64 {
     }
 }
 
-fn relays(rng: &mut impl Rng, style: &Style, common: Station) -> Vec<Station> {
+fn relays(rng: &mut impl Rng, style: &Style, common: Relay) -> Vec<Relay> {
     let (fewest, most) = (*style.relays.start(), *style.relays.end());
     let draw = log_uniform(rng, f64::from(fewest), f64::from(most) + 0.999);
     let n = (fewest..=most)

@@ -43,7 +43,7 @@ impl Corridor {
 
 /// Relay with a fixed lateral position and altitude, inside the corridor or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hold {
+pub struct FixedCrossSection {
     /// Index of the relay in the link, from 0.
     pub relay: usize,
     /// Fixed lateral position, the offset from the vertical plane through Tx and Rx, m.
@@ -52,9 +52,9 @@ pub struct Hold {
     pub altitude_m: f64,
 }
 
-impl Hold {
+impl FixedCrossSection {
     /// Returns the corridor of one relay: a single point if `held` fixes its lateral position and altitude.
-    pub(crate) fn room(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
+    pub(crate) fn corridor_of(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
         let own = held.iter().find(|hold| hold.relay == relay);
         own.map_or(corridor, |hold| Corridor {
             least_m: hold.altitude_m,
@@ -128,11 +128,16 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
 
 /// Returns true if a chain keeps the relays' order, corridor, fixed positions and minimum separation. The separation
 /// may be short by 1e-9 of itself, for rounding.
-pub fn keeps_rules(link: &Link, corridor: Corridor, held: &[Hold], places: &[Place]) -> bool {
+pub fn keeps_rules(
+    link: &Link,
+    corridor: Corridor,
+    held: &[FixedCrossSection],
+    places: &[Place],
+) -> bool {
     let mut each = (0..).zip(places);
     let within = each.all(|(relay, place)| {
         (0.0..=link.distance_m).contains(&place.x_m)
-            && Hold::room(held, relay, corridor).contains(place, 0.0)
+            && FixedCrossSection::corridor_of(held, relay, corridor).contains(place, 0.0)
     });
     let mut neighbours = places.iter().zip(places.iter().skip(1));
     let least_m = link.min_separation_m * (1.0 - 1e-9);

@@ -2,7 +2,7 @@
 
 /// Relay in a reference link: altitude and transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Station {
+pub struct Relay {
     /// Altitude above the ground of Tx, Rx and the interferer, m, > 0.
     pub altitude_m: f64,
     /// Transmit power, W, > 0.
@@ -33,7 +33,7 @@ pub struct Link {
     /// Noise power of every receiver, W, >= 0; if above 0, SIR means SINR.
     pub noise_w: f64,
     /// Relays 1 to N, in order from Tx to Rx.
-    pub relays: Vec<Station>,
+    pub relays: Vec<Relay>,
 }
 
 /// Returns the free-space path-loss factor (4 pi f / c)^2 times an excess loss, 1/m^2.
@@ -62,7 +62,7 @@ impl Link {
             eta: mu_los,
             noise_w: 0.0,
             relays: vec![
-                Station {
+                Relay {
                     altitude_m: 20.0,
                     power_w: 1.0
                 };

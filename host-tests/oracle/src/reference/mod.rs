@@ -36,4 +36,4 @@ mod sets;
 mod sirs;
 pub mod stochastic;
 
-pub use link::{Link, Station, path_loss_factor};
+pub use link::{Link, Relay, path_loss_factor};

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::{Interference, Scenario};
 
-use super::options::given;
+use super::options::given_option;
 use crate::command::{Failure, number, whole};
 use crate::simulator::route::DataLink;
 use crate::simulator::traffic::TrafficSpec;
@@ -48,10 +48,10 @@ impl Data {
     /// They are unknown in a random field, and after an upload. `uploads` is true if the run has one.
     pub(super) fn agree(&self, interference: &Interference, uploads: bool) -> Result<(), Failure> {
         let told = [
-            given("--bandwidth-hz", self.bandwidth_hz),
-            given("--offer-bps", self.offer_bps),
-            given("--packet-bytes", self.packet_bytes),
-            given("--queue-packets", self.queue_packets),
+            given_option("--bandwidth-hz", self.bandwidth_hz),
+            given_option("--offer-bps", self.offer_bps),
+            given_option("--packet-bytes", self.packet_bytes),
+            given_option("--queue-packets", self.queue_packets),
         ];
         let line = match (told.into_iter().flatten().next(), self.traffic) {
             (Some(option), None) => format!("{option}: would be ignored without --traffic"),

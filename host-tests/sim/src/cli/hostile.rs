@@ -26,11 +26,11 @@ use crate::simulator::setup::{Partition, Setup};
 )]
 pub struct Hostile {
     /// Relay I goes silent at second S of virtual time; the others form a new chain. Repeatable
-    #[arg(long, value_name = "I@S", value_parser = one)]
-    pub kill: Vec<One>,
+    #[arg(long, value_name = "I@S", value_parser = relay_event)]
+    pub kill: Vec<RelayEvent>,
     /// Relay I reboots at second S; of its state it keeps only persisted data such as an uploaded mission. Repeatable
-    #[arg(long, value_name = "I@S", value_parser = one)]
-    boot: Vec<One>,
+    #[arg(long, value_name = "I@S", value_parser = relay_event)]
+    boot: Vec<RelayEvent>,
     /// Relays 1 to K and the others do not receive each other from second S until T, or permanently. Repeatable
     #[arg(long, value_name = "K@S[-T]", value_parser = partition, conflicts_with = "wires")]
     partition: Vec<Partition>,
@@ -63,7 +63,7 @@ pub struct Hostile {
 
 /// Relay to which an option applies, and the virtual time of the event, as in `--kill I@S`.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct One {
+pub struct RelayEvent {
     index: u16,
     at: Instant,
 }
@@ -147,13 +147,13 @@ impl Hostile {
     /// Rejects a `--kill` of a silent relay, and a `--boot` of a relay before its first `--kill`.
     fn in_order(&self) -> Result<(), Failure> {
         let kills = self.kill.iter().map(|one| (one, true));
-        let mut all: Vec<(&One, bool)> = kills
+        let mut all: Vec<(&RelayEvent, bool)> = kills
             .chain(self.boot.iter().map(|one| (one, false)))
             .collect();
         // Kills sort before boots of the same time.
         all.sort_by_key(|(one, _)| (one.index, one.at));
         for (place, (one, is_kill)) in all.iter().enumerate() {
-            let of_it = |(other, _): &&(&One, bool)| other.index == one.index;
+            let of_it = |(other, _): &&(&RelayEvent, bool)| other.index == one.index;
             let (before, after) = all.split_at(place);
             let last = before.iter().rev().find(of_it);
             let first = after
@@ -161,7 +161,7 @@ impl Hostile {
                 .skip(1)
                 .filter(of_it)
                 .find(|(_, is_kill)| *is_kill);
-            let One { index, at } = one;
+            let RelayEvent { index, at } = one;
             let at = seconds(*at);
             if *is_kill && let Some((other, true)) = last {
                 let line = format!(
@@ -185,7 +185,7 @@ impl Hostile {
             return Ok(());
         };
         let named = |option: &'static str| {
-            move |one: &One| {
+            move |one: &RelayEvent| {
                 let text = format!("{option} {}@{}", one.index, seconds(one.at));
                 (text, one.at)
             }
@@ -212,7 +212,7 @@ impl Hostile {
     /// Adds the requested failures, attack and uploads to `setup`. `sites` are those of Tx and Rx, if the scenario
     /// has them.
     pub fn prepare(&self, setup: &mut Setup, sites: Option<Sites>) -> Result<(), Failure> {
-        let pairs = |ones: &[One]| ones.iter().map(|one| (one.index, one.at)).collect();
+        let pairs = |ones: &[RelayEvent]| ones.iter().map(|one| (one.index, one.at)).collect();
         setup.kills = pairs(&self.kill);
         setup.boots = pairs(&self.boot);
         setup.partitions.clone_from(&self.partition);
@@ -241,10 +241,10 @@ impl Hostile {
     }
 }
 
-fn one(text: &str) -> Result<One, String> {
+fn relay_event(text: &str) -> Result<RelayEvent, String> {
     let form = "must be I@S, a relay (1 to N) and seconds after the start (0 to 1e6)";
     let (index, at) = text.split_once('@').ok_or(form)?;
-    Ok(One {
+    Ok(RelayEvent {
         index: index.parse().map_err(|_| form)?,
         at: instant(at).ok_or(form)?,
     })

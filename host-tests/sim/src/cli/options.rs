@@ -111,18 +111,21 @@ impl Options {
         let rounds = "has no rounds; adjust has";
         let bracket = "has a fixed step, see --epsilon; the other methods bracket";
         let ignored: [(Option<String>, &str); 6] = [
-            (given("--epsilon", self.epsilon.filter(|_| !is_step)), step),
             (
-                given("--rounds", self.rounds.filter(|_| !is_adjust)),
+                given_option("--epsilon", self.epsilon.filter(|_| !is_step)),
+                step,
+            ),
+            (
+                given_option("--rounds", self.rounds.filter(|_| !is_adjust)),
                 rounds,
             ),
             (
-                given("--explore", self.explore_m.filter(|_| !is_adjust)),
+                given_option("--explore", self.explore_m.filter(|_| !is_adjust)),
                 rounds,
             ),
-            (self.grid.filter(|_| !is_adjust).map(grid_said), rounds),
+            (self.grid.filter(|_| !is_adjust).map(grid_text), rounds),
             (
-                given("--tolerance", self.tolerance.filter(|_| is_step)),
+                given_option("--tolerance", self.tolerance.filter(|_| is_step)),
                 bracket,
             ),
             (
@@ -146,7 +149,7 @@ impl Options {
     }
 }
 
-fn grid_said(grid: uav_relay::Local) -> String {
+fn grid_text(grid: uav_relay::Local) -> String {
     match grid {
         uav_relay::Local::Grid { columns, rows } => format!("--grid {columns}x{rows}"),
         uav_relay::Local::Fine => "--grid".to_owned(),
@@ -174,7 +177,7 @@ fn grid(text: &str) -> Result<uav_relay::Local, String> {
     })
 }
 
-pub(super) fn given(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
+pub(super) fn given_option(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
     value.map(|value| format!("{option} {value}"))
 }
 
@@ -207,10 +210,10 @@ impl Listening {
             .move_interferer
             .map(|[along, aside]| format!("{along},{aside}"));
         let told = [
-            given("--samples", self.samples),
-            given("--shadow", self.shadow),
-            given("--move-interferer", velocity),
-            given("--listen-for", self.listen_for),
+            given_option("--samples", self.samples),
+            given_option("--shadow", self.shadow),
+            given_option("--move-interferer", velocity),
+            given_option("--listen-for", self.listen_for),
         ];
         match told.into_iter().flatten().next() {
             Some(option) if !self.listen => Err(Failure::input(format!(
@@ -258,19 +261,19 @@ impl Listening {
             listen.relative_error = error;
         }
         setup.settings.listen = Some(listen);
-        let mut sky = TrueInterference::of(scene);
-        sky.samples = samples;
-        sky.shadow_db = self.shadow.unwrap_or_default();
-        sky.velocity_mps = self.move_interferer.unwrap_or_default();
-        sky.seed = setup.seed;
+        let mut true_interference = TrueInterference::of(scene);
+        true_interference.samples = samples;
+        true_interference.shadow_db = self.shadow.unwrap_or_default();
+        true_interference.velocity_mps = self.move_interferer.unwrap_or_default();
+        true_interference.seed = setup.seed;
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "10 to 1e5"
         )]
         let until = (self.listen_for.unwrap_or(120.0) * 1e3) as u64;
-        sky.until = Instant::from_millis(until);
-        setup.sky = Some(sky);
+        true_interference.until = Instant::from_millis(until);
+        setup.true_interference = Some(true_interference);
         Ok(())
     }
 

@@ -18,7 +18,7 @@ use crate::simulator::route::TrueHops;
 use crate::simulator::setup::Setup;
 use crate::simulator::traffic::{TrafficSpec, traffic};
 use crate::simulator::true_interference::beta_w;
-use crate::svg::{OtherInterferers, Picture, room};
+use crate::svg::{OtherInterferers, Picture, lateral_view};
 
 /// A run that is ready to start: its setup, and the mission with the true interference to evaluate it.
 #[derive(Debug)]
@@ -76,7 +76,7 @@ impl<'a> Prepared<'a> {
             return Err(Failure::input(line.to_owned()).into());
         }
         agree(options, &method, &scenario)?;
-        if let Some(line) = mission::left_out(&scenario, options.uavs) {
+        if let Some(line) = mission::undescribed_relay_error(&scenario, options.uavs) {
             return Err(Failure::input(format!("{name}: {line}")).into());
         }
         let tolerance = options.tolerance.unwrap_or(1e-4);
@@ -116,7 +116,7 @@ impl<'a> Prepared<'a> {
         let axis = scenario.line.map(|line| line.axis);
         options.hostile.flight.prepare(&mut setup, axis)?;
         setup.profiles = profiles;
-        setup.held = mission::held(&scenario, options.uavs);
+        setup.held = mission::fixed_altitude_relays(&scenario, options.uavs);
         let told = setup.mission;
         let data = options.data.spec(&scenario)?;
         setup.track = data.is_some();
@@ -154,7 +154,7 @@ impl<'a> Prepared<'a> {
             return Ok(chain);
         };
         let i_max_w = narrow(field.i_max_w);
-        setup.mission = mission::told_of_an_even_field(&setup.mission);
+        setup.mission = mission::with_uniform_field(&setup.mission);
         setup.settings.measure = Some(Measure {
             i_max_w,
             samples: SAMPLES,
@@ -230,7 +230,7 @@ impl<'a> Prepared<'a> {
     /// Returns the picture of the chain at the end of a run. [`report`](Self::report) must be called before.
     pub fn picture(&self, outcome: &Outcome, report: &ChainReport) -> Picture {
         let flown = report::flown(&self.setup, outcome);
-        drawn(&flown, &self.scenario, outcome, report)
+        picture_of(&flown, &self.scenario, outcome, report)
     }
 }
 
@@ -303,7 +303,7 @@ fn setup(options: &Options, mission: Mission, sites: Option<Sites>) -> Result<Se
     Ok(setup)
 }
 
-fn drawn(
+fn picture_of(
     mission: &Mission,
     scenario: &Scenario,
     outcome: &Outcome,
@@ -349,7 +349,7 @@ fn drawn(
             )
         };
     let shown: Vec<_> = interferers.iter().chain(&others).copied().collect();
-    let room = room(mission, aside, &shown);
+    let lateral_view = lateral_view(mission, aside, &shown);
     Picture {
         title_method: report.method.clone(),
         distance_m: f64::from(mission.config().distance_m),
@@ -357,7 +357,7 @@ fn drawn(
         others,
         others_are,
         nodes,
-        room,
+        lateral_view,
         hop_sir,
         lost,
         left_out,

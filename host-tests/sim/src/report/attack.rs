@@ -10,7 +10,7 @@ use crate::simulator::outcome::{Moment, Outcome, TimelineEvent};
 
 /// Counts of the attacker's frames of one kind, forged or replayed.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
-pub struct StruckReport {
+pub struct AttackCountsReport {
     /// Number of frames that the attacker sent.
     pub sent: u64,
     /// Number of the attacker's frames that a relay accepted as frames of a neighbour.
@@ -27,9 +27,9 @@ pub struct AttackReport {
     /// True if the relays signed their frames.
     pub auth: bool,
     /// Counts of the forged frames.
-    pub forged: StruckReport,
+    pub forged: AttackCountsReport,
     /// Counts of the replayed frames.
-    pub replayed: StruckReport,
+    pub replayed: AttackCountsReport,
     /// True if the run with the attack ended differently from the run without the attack.
     pub ended_otherwise: bool,
     /// Number of relays whose final position or target SIR differs from the run without the attack.
@@ -70,8 +70,8 @@ impl AttackReport {
         });
         Self {
             auth,
-            forged: struck(outcome, AttackKind::Forge),
-            replayed: struck(outcome, AttackKind::Replay),
+            forged: attack_counts(outcome, AttackKind::Forge),
+            replayed: attack_counts(outcome, AttackKind::Replay),
             ended_otherwise: outcome.ending != calm.ending,
             farthest_m: far
                 .collect::<Option<Vec<f64>>>()
@@ -161,15 +161,15 @@ fn formed(outcome: &Outcome) -> u64 {
     views.len() as u64
 }
 
-fn struck(outcome: &Outcome, kind: AttackKind) -> StruckReport {
+fn attack_counts(outcome: &Outcome, kind: AttackKind) -> AttackCountsReport {
     let counted: BTreeMap<&'static str, u64> = outcome
-        .struck
+        .attack_counts
         .counted
         .iter()
         .filter(|((of, _), _)| *of == kind)
         .map(|((_, name), count)| (*name, *count))
         .collect();
-    StruckReport {
+    AttackCountsReport {
         sent: counted.values().sum(),
         taken: counted.get("received").copied().unwrap_or_default(),
         counted,

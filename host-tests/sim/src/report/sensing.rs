@@ -11,7 +11,7 @@ use crate::simulator::chain::run;
 use crate::simulator::outcome::Outcome;
 use crate::simulator::setup::Setup;
 use crate::simulator::true_interference::TrueInterference;
-use crate::simulator::watch::alone;
+use crate::simulator::watch::without_other_relays;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
@@ -51,7 +51,7 @@ pub struct SensingReport {
 impl SensingReport {
     /// Creates the report of a run of `setup`; `None` if the relays measured no interference.
     pub fn of(setup: &Setup, outcome: &Outcome) -> Option<Self> {
-        let sky = setup.sky.as_ref()?;
+        let true_interference = setup.true_interference.as_ref()?;
         let believed = outcome.relays.first().map(|relay| relay.believed.estimate);
         let mut report = Self {
             believed: match believed {
@@ -66,8 +66,12 @@ impl SensingReport {
         };
         let mut shares = Vec::new();
         let mut still: Option<(Vec<u16>, Option<f64>)> = None;
-        for stand in outcome.stands.iter().filter(|stand| stand.agreements > 0) {
-            let scene = with_relays(sky.scene_at(stand.at), &stand.nodes);
+        for stand in outcome
+            .snapshots
+            .iter()
+            .filter(|stand| stand.agreements > 0)
+        {
+            let scene = with_relays(true_interference.scene_at(stand.at), &stand.nodes);
             let sir = scene.chain_sir(&stand.places);
             report.true_sir = Some(sir);
             report.agreements = stand.agreements;
@@ -75,7 +79,7 @@ impl SensingReport {
             let known = still.take().filter(|(nodes, _)| *nodes == stand.nodes);
             let optimum =
                 known.map_or_else(|| optimum(setup, &scene, &stand.nodes), |(_, known)| known);
-            if !moves(sky) {
+            if !moves(true_interference) {
                 still = Some((stand.nodes.clone(), optimum));
             }
             report.optimum_sir = optimum;
@@ -118,8 +122,11 @@ impl SensingReport {
     }
 }
 
-fn moves(sky: &TrueInterference) -> bool {
-    sky.velocity_mps.iter().any(|speed| speed.abs() > 0.0)
+fn moves(true_interference: &TrueInterference) -> bool {
+    true_interference
+        .velocity_mps
+        .iter()
+        .any(|speed| speed.abs() > 0.0)
 }
 
 /// Returns the scene reduced to the relays with the numbers `nodes`, from 1.
@@ -154,7 +161,7 @@ fn optimum(setup: &Setup, scene: &Scene, nodes: &[u16]) -> Option<f64> {
         mission,
         ..setup.clone()
     };
-    let mut told = alone(&told, nodes, 0)?;
+    let mut told = without_other_relays(&told, nodes, 0)?;
     told.settings.listen = None;
     let outcome = run(told).ok()?;
     let places: Option<Vec<_>> = outcome.relays.iter().map(|relay| relay.setpoint).collect();

@@ -423,17 +423,17 @@ pub(super) fn recoveries(moments: &[Moment], relays: u16) -> Vec<RecoveryReport>
         let (first, last) = view.span;
         let earlier = moments.get(from..first).unwrap_or_default();
         let later = moments.get(last..until).unwrap_or_default();
-        let detected = detected(earlier, &lost, &back);
+        let detected = detection(earlier, &lost, &back);
         let version = adopted(moments, view).filter(|version| *version > flown);
         let offered = version.and_then(|version| offered(moments, version));
         let begun = detected.or(offered);
-        let converged = converged(later, &view.members);
+        let converged = convergence(later, &view.members);
         reports.push(RecoveryReport {
             view: view.number,
             relays: u16::try_from(view.members.len()).unwrap_or(u16::MAX),
             version,
             offered_s: offered.map(|moment| seconds(moment.at)),
-            happened_s: happened(moments.get(..first).unwrap_or_default(), &lost, &back)
+            happened_s: fault_time(moments.get(..first).unwrap_or_default(), &lost, &back)
                 .map(seconds),
             detected_s: detected.map(|moment| seconds(moment.at)),
             formed_s: moments.get(last).map_or(0.0, |moment| seconds(moment.at)),
@@ -493,7 +493,7 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
 /// Returns the time of the event that caused the loss or the return of relays, `lost` and `back`.
 ///
 /// For each relay it is the latest such event in `earlier`, and the result is the first of these times.
-fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
+fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {
             let mut story = earlier.iter().rev();
@@ -513,7 +513,7 @@ fn happened(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
 /// Returns the first log entry in which a relay detects the loss or return of another one.
 ///
 /// `lost` and `back` are the numbers of lost and returned relays.
-fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
+fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
     earlier.iter().find(|moment| match moment.what {
         TimelineEvent::Lost(_) => moment.other.is_some_and(|other| lost.contains(&other)),
         TimelineEvent::Found(_) => {
@@ -524,7 +524,7 @@ fn detected<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a
 }
 
 /// Returns the last entry in which one of `members` accepts a position. `None` unless all accept one.
-fn converged<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
+fn convergence<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed = |moment: &&Moment| {
         moment.what == TimelineEvent::Converged && members.contains(&moment.relay)
     };

@@ -42,7 +42,7 @@ pub enum AttackKind {
 
 /// Counts of the attacker's frames by how the receiving relays classified them.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Struck {
+pub struct AttackCounts {
     /// Number of frames by kind, and by the counter in [`Stats`] that each incremented at its receiver.
     ///
     /// The counter `received` means that the receiver accepted the frame as one of a neighbour.
@@ -139,7 +139,7 @@ impl Attacker {
 /// Returns the name of the first counter that a frame has increased from `before` to `after`.
 ///
 /// It tells how the receiver classified the frame.
-pub(super) fn fate(before: &Stats, after: &Stats) -> &'static str {
+pub(super) fn incremented_counter(before: &Stats, after: &Stats) -> &'static str {
     type Counter = (&'static str, fn(&Stats) -> u32);
     // A received but rejected frame increments two counters; the reason for the rejection comes first.
     let counters: [Counter; 16] = [
@@ -176,7 +176,7 @@ const HELLO_BODY: usize = 17;
 
 /// Claimed sender and destination of a forged frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Way {
+pub(super) struct ForgedRoute {
     pub(super) from: u16,
     pub(super) to: u16,
 }
@@ -187,22 +187,22 @@ pub(super) struct Way {
 /// valid CRC, handshake with a guessed tag, handshake of a relay with another key.
 pub(super) fn forge(
     mission: &Mission,
-    way: Way,
+    way: ForgedRoute,
     heard: Option<&[u8]>,
     rng: &mut ChaCha8Rng,
 ) -> Vec<u8> {
     let heard = heard.and_then(unsealed);
     match (rng.random_range(0..6), heard) {
-        (0, heard) => lie(mission, way, heard, rng),
+        (0, heard) => false_message(mission, way, heard, rng),
         (1, heard) => {
-            let lie = lie(mission, way, heard, rng);
+            let lie = false_message(mission, way, heard, rng);
             let mut plain = unsealed(&lie).unwrap_or_default();
             flag(&mut plain, SIGNED);
             plain.extend(rng.random::<[u8; TAG]>());
             sealed(plain)
         }
-        (2 | 3, Some(plain)) => sealed(altered(plain, rng)),
-        (4, _) => stranger(mission, way, rng)
+        (2 | 3, Some(plain)) => sealed(with_altered_byte(plain, rng)),
+        (4, _) => foreign_handshake(mission, way, rng)
             .ok()
             .filter(|said| !said.is_empty())
             .unwrap_or_else(|| guessed_handshake(mission, way, rng)),
@@ -211,7 +211,7 @@ pub(super) fn forge(
 }
 
 /// Changes one random byte of a frame after the first eight: in the frame counter, the body or the tag.
-fn altered(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
+fn with_altered_byte(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(HEADER - 2..plain.len().max(HEADER));
     if let Some(byte) = plain.get_mut(at) {
         *byte ^= rng.random_range(1..=u8::MAX);
@@ -222,15 +222,20 @@ fn altered(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
 /// Returns a false message, well-formed and without a tag.
 ///
 /// It is a changed copy of the recorded frame `heard` if that is suitable, and otherwise made up.
-fn lie(mission: &Mission, way: Way, heard: Option<Vec<u8>>, rng: &mut ChaCha8Rng) -> Vec<u8> {
-    let twisted = heard.and_then(|plain| twisted(plain, rng));
-    twisted.unwrap_or_else(|| made_up(mission, way, rng))
+fn false_message(
+    mission: &Mission,
+    way: ForgedRoute,
+    heard: Option<Vec<u8>>,
+    rng: &mut ChaCha8Rng,
+) -> Vec<u8> {
+    let copy = heard.and_then(|plain| altered_copy(plain, rng));
+    copy.unwrap_or_else(|| random_message(mission, way, rng))
 }
 
 /// Returns a copy of a recorded frame with false values and the same or a slightly higher number.
 ///
 /// `None` unless the frame is a message that relays pass along the whole chain, or a reply to one.
-fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
+fn altered_copy(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
     let whole = with_check(plain);
     let (header, message) = frame::decode(&whole).ok()?;
     let later = |number: u16, rng: &mut ChaCha8Rng| number.wrapping_add(rng.random_range(0..=8));
@@ -269,7 +274,7 @@ fn twisted(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
 }
 
 /// Returns a frame with a false message that the attacker makes up without a recorded frame.
-fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
+fn random_message(mission: &Mission, way: ForgedRoute, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let digest = digest(mission);
     let mission_id = MissionId { version: 0, digest };
     let view =
@@ -279,7 +284,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
         relays: mission.relays(),
     };
     let place = rng.random_range(1..=mission.relays());
-    let message = match (rng.random_range(0..6), better(mission, rng)) {
+    let message = match (rng.random_range(0..6), forged_upload(mission, rng)) {
         (0, _) => Message::Heartbeat {
             mission: digest,
             request: rng.random(),
@@ -342,7 +347,7 @@ fn made_up(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
 /// Returns a forged upload: a newer mission with another interferer.
 ///
 /// `None` unless the mission has an interferer, as missions with a random field cannot be uploaded.
-fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
+fn forged_upload(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
     let config = mission.config();
     let at = mission.interferer()?;
     let interferer = Interferer {
@@ -358,8 +363,8 @@ fn better(mission: &Mission, rng: &mut ChaCha8Rng) -> Option<Upload> {
 }
 
 /// Returns a handshake with random nonces and a random tag.
-fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u8> {
-    let mut plain = unsealed(&made_up(mission, way, rng)).unwrap_or_default();
+fn guessed_handshake(mission: &Mission, way: ForgedRoute, rng: &mut ChaCha8Rng) -> Vec<u8> {
+    let mut plain = unsealed(&random_message(mission, way, rng)).unwrap_or_default();
     plain.truncate(HEADER);
     flag(&mut plain, SIGNED | HELLO);
     let mut rest = [0; HELLO_BODY + TAG];
@@ -372,7 +377,11 @@ fn guessed_handshake(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Vec<u
 }
 
 /// Returns the handshake of a relay that starts with a random key; empty in a chain of one relay.
-fn stranger(mission: &Mission, way: Way, rng: &mut ChaCha8Rng) -> Result<Vec<u8>, SetupError> {
+fn foreign_handshake(
+    mission: &Mission,
+    way: ForgedRoute,
+    rng: &mut ChaCha8Rng,
+) -> Result<Vec<u8>, SetupError> {
     let settings = Settings {
         wiring: Wiring::Shared,
         auth: Some(Auth {
@@ -403,7 +412,7 @@ pub(super) fn destination(bytes: &[u8]) -> Option<u16> {
     Some(u16::from_le_bytes([low, high]) & 0x0FFF)
 }
 
-fn header(way: Way, rng: &mut ChaCha8Rng) -> Header {
+fn header(way: ForgedRoute, rng: &mut ChaCha8Rng) -> Header {
     Header {
         network: NETWORK,
         sender: way.from,

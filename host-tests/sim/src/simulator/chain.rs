@@ -25,13 +25,13 @@ use super::medium::{Access, AirCounts, AirEvent, Medium};
 use super::outcome::{Film, Outcome, Record, RelayEnd, TimelineEvent};
 use super::route::Track;
 use super::setup::Setup;
-use super::watch::{Run, Seen, Watch};
+use super::watch::{ObservedState, Run, Watch};
 use fleet::LANDS_AFTER;
 use ground::{Station, stations};
-use judge::Touched;
+use judge::ChangedRelays;
 
 /// Largest number of events in a run, which takes some minutes to compute. It ends runs that never settle.
-const MOST_HAPPENINGS: u64 = 400_000_000;
+const MAX_EVENTS: u64 = 400_000_000;
 
 impl Chain {
     /// Creates a simulated chain of the setup's relays and switches all of them on at time 0.
@@ -49,25 +49,25 @@ impl Chain {
         (self.sweeps(), self.now)
     }
 
-    /// Processes at most `happenings` events. Returns true if the run has ended.
-    pub fn step(&mut self, happenings: u64) -> bool {
-        for _ in 0..happenings {
+    /// Processes at most `max_events` events. Returns true if the run has ended.
+    pub fn step(&mut self, max_events: u64) -> bool {
+        for _ in 0..max_events {
             if let Some(ending) = self.ending() {
                 self.outcome.ending = ending;
                 return true;
             }
-            let Some((at, relay, happening)) = self.queue.take() else {
+            let Some((at, relay, event)) = self.queue.take() else {
                 return true;
             };
-            if at > self.setup.deadline || self.happenings >= MOST_HAPPENINGS {
+            if at > self.setup.deadline || self.events >= MAX_EVENTS {
                 self.end_soak(at);
                 return true;
             }
-            self.happenings += 1;
+            self.events += 1;
             self.now = at;
-            let touched = Touched::by(&happening, relay);
-            self.happen(relay, happening);
-            self.look(touched);
+            let changed = ChangedRelays::of(&event, relay);
+            self.process_event(relay, event);
+            self.update_statistics(changed);
         }
         false
     }
@@ -108,7 +108,7 @@ impl Chain {
     /// Makes the leader compute the relays' positions again, with the measurements made so far.
     pub fn restart(&mut self) {
         let now = self.now;
-        self.holding = 0;
+        self.accepted_positions = 0;
         let index = usize::from(self.setup.mission.leader()).saturating_sub(1);
         if let Some(leader) = self.members.get_mut(index) {
             leader.relay.restart(now);
@@ -135,9 +135,9 @@ impl Chain {
             let watched = watch.end(self.now, is_judged, flown_m);
             self.outcome.watched = Some(watched);
         }
-        let lent = self.members.iter().map(|member| member.lent);
+        let controlled = self.members.iter().map(|member| member.under_relay_control);
         let places = self.fleet.iter().map(Vehicle::along);
-        self.outcome.fleet = places.zip(lent).collect();
+        self.outcome.fleet = places.zip(controlled).collect();
         self.outcome.relays = self
             .members
             .into_iter()
@@ -154,45 +154,45 @@ impl Chain {
                 version: member.relay.version(),
                 believed: member.relay.interference_estimate(),
                 sites: member.relay.sites(),
-                seen: Seen::of(&member.relay, member.killed.is_none()),
+                observed: ObservedState::of(&member.relay, member.killed.is_none()),
             })
             .collect();
         self.outcome
     }
 
-    fn happen(&mut self, index: usize, happening: QueuedEvent) {
+    fn process_event(&mut self, index: usize, event: QueuedEvent) {
         if matches!(
-            happening,
+            event,
             QueuedEvent::Kill
                 | QueuedEvent::Boot
-                | QueuedEvent::Part
+                | QueuedEvent::Partition
                 | QueuedEvent::Upload
-                | QueuedEvent::AttackKind(_)
+                | QueuedEvent::Attack(_)
         ) {
-            self.ahead -= 1;
+            self.pending_planned -= 1;
         }
-        match happening {
+        match event {
             QueuedEvent::Fly if self.fleet.is_empty() => self.fly(),
             QueuedEvent::Fly => self.fly_fleet(),
             QueuedEvent::Restart => self.restart_autopilot(index),
-            QueuedEvent::Part => self.tell_of_partitions(),
+            QueuedEvent::Partition => self.log_partitions(),
             QueuedEvent::Air(event) => self.on_air(event),
-            QueuedEvent::Listen => self.measure_all(),
-            QueuedEvent::AttackKind(kind) => self.strike(kind),
+            QueuedEvent::Measure => self.measure_all(),
+            QueuedEvent::Attack(kind) => self.send_attack(kind),
             QueuedEvent::Upload => self.begin_upload(index),
-            QueuedEvent::Heard { bytes } => self.hear(index, &bytes),
-            QueuedEvent::Ask => self.ask(index),
-            of_relay => self.happen_to(index, of_relay),
+            QueuedEvent::StationBytes { bytes } => self.station_receive(index, &bytes),
+            QueuedEvent::StationTimeout => self.station_timeout(index),
+            of_relay => self.process_relay_event(index, of_relay),
         }
     }
 
     /// Processes an event that concerns only relay `index` (from 0), such as received bytes or a timer.
-    fn happen_to(&mut self, index: usize, happening: QueuedEvent) {
+    fn process_relay_event(&mut self, index: usize, event: QueuedEvent) {
         let now = self.now;
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
-        match happening {
+        match event {
             QueuedEvent::Boot => {
                 let start = Start {
                     index: member.node,
@@ -212,7 +212,7 @@ impl Chain {
                 if let Some(vehicle) = self.fleet.get_mut(index) {
                     vehicle.boot(now);
                 }
-                self.tell(index, TimelineEvent::Booted, None);
+                self.log(index, TimelineEvent::Booted, None);
             }
             _ if member.killed.is_some() => return,
             QueuedEvent::Kill => {
@@ -220,7 +220,7 @@ impl Chain {
                 if let Some(medium) = &mut self.medium {
                     medium.switch_off(index);
                 }
-                self.tell(index, TimelineEvent::Silent, None);
+                self.log(index, TimelineEvent::Silent, None);
                 self.film(index);
                 return;
             }
@@ -262,7 +262,7 @@ impl Chain {
             self.film_frame(index, transmit.port);
             self.transmit(index, transmit.port, bytes);
         }
-        self.listen(index);
+        self.drain_events(index);
         self.check(index);
         self.film(index);
         let Some(member) = self.members.get_mut(index) else {
@@ -296,7 +296,7 @@ struct Member {
     lines: [Line; 2],
     killed: Option<Instant>,
     /// True if the relay controlled its drone at the last time step of the flight.
-    lent: bool,
+    under_relay_control: bool,
     starts: u32,
     /// Number of passes and view proposals that the relay began before its last start.
     ///
@@ -308,7 +308,7 @@ struct Member {
     /// Last setpoint that was within its limits, so that it is not checked again.
     safe: Option<Placement>,
     /// Smallest and largest coordinates of the relay's setpoints since it last had none.
-    been: Option<[Placement; 2]>,
+    setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
     /// State last recorded for the animation: true if the relay was on, and its setpoint.
@@ -326,13 +326,13 @@ pub struct Chain {
     rng: ChaCha8Rng,
     outcome: Outcome,
     now: Instant,
-    happenings: u64,
+    events: u64,
     /// Number of positions that relays have accepted since the start, or since planning was restarted.
-    holding: usize,
+    accepted_positions: usize,
     /// Number of planned events in the queue, such as failures, reboots, uploads and attacker frames.
     ///
     /// The run does not settle before all of them have happened.
-    ahead: usize,
+    pending_planned: usize,
     stations: Vec<Station>,
     attacker: Option<Attacker>,
     flight: Option<Flight>,
@@ -346,7 +346,7 @@ pub struct Chain {
     agreed: Option<Vec<Placement>>,
     agreements: u32,
     /// True once the relays have made the last measurement of the interference.
-    listened: bool,
+    measurements_done: bool,
     /// Statistics of the availability; `None` unless the run has a fixed end or a shared channel.
     watch: Option<Watch>,
     record: Option<Record>,
@@ -425,7 +425,7 @@ impl Chain {
         for (which, spec) in setup.uploads.iter().enumerate() {
             queue.put(spec.at, which, QueuedEvent::Upload);
         }
-        let mut ahead = put_fleet(&setup, &mut queue)
+        let mut pending_planned = put_fleet(&setup, &mut queue)
             + setup.kills.len()
             + setup.boots.len()
             + setup.uploads.len();
@@ -433,8 +433,8 @@ impl Chain {
         let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
         for (from, until) in parts.chain(deaf) {
             for at in [Some(from), until].into_iter().flatten() {
-                queue.put(at, 0, QueuedEvent::Part);
-                ahead += 1;
+                queue.put(at, 0, QueuedEvent::Partition);
+                pending_planned += 1;
             }
         }
         let film = setup.film.then(Film::default);
@@ -453,9 +453,9 @@ impl Chain {
                 ..Outcome::default()
             },
             now: Instant::ZERO,
-            happenings: 0,
-            holding: 0,
-            ahead,
+            events: 0,
+            accepted_positions: 0,
+            pending_planned: pending_planned,
             attacker: None,
             flight: None,
             fleet: Vec::new(),
@@ -464,23 +464,23 @@ impl Chain {
             bursts,
             agreed: None,
             agreements: 0,
-            listened: false,
+            measurements_done: false,
             watch: None,
             record,
         };
         if shared || chain.setup.soak.is_some() {
             chain.begin_watch(run);
         }
-        if let Some(sky) = &chain.setup.sky {
-            let first = Instant::ZERO + sky.period;
-            chain.queue.put(first, 0, QueuedEvent::Listen);
+        if let Some(true_interference) = &chain.setup.true_interference {
+            let first = Instant::ZERO + true_interference.period;
+            chain.queue.put(first, 0, QueuedEvent::Measure);
         }
-        chain.expect_an_attack();
+        chain.schedule_attack();
         chain.take_off();
         for index in 0..chain.members.len() {
             chain.drain(index);
         }
-        chain.look(Touched::All);
+        chain.update_statistics(ChangedRelays::All);
         Ok(chain)
     }
 }
@@ -499,13 +499,13 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
             node: index,
             lines: [Line::default(); 2],
             killed: None,
-            lent: false,
+            under_relay_control: false,
             starts: 1,
             swept: 0,
             stored: None,
             record: None,
             safe: None,
-            been: None,
+            setpoint_bounds: None,
             measured: None,
             filmed: None,
             relay,
@@ -520,8 +520,8 @@ fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     let Some(fleet) = &setup.fleet else {
         return 0;
     };
-    let mut put = |at, relay: u16, happening| {
-        queue.put(at, usize::from(relay.saturating_sub(1)), happening);
+    let mut put = |at, relay: u16, event| {
+        queue.put(at, usize::from(relay.saturating_sub(1)), event);
     };
     for &(relay, at) in &fleet.restarts {
         put(at, relay, QueuedEvent::Restart);
@@ -551,12 +551,12 @@ pub enum QueuedEvent {
     /// The relay's timer expires.
     Wake,
     /// Bytes arrive at a ground station.
-    Heard {
+    StationBytes {
         /// Bytes that arrive at the ground station.
         bytes: Vec<u8>,
     },
     /// A ground station's timer expires.
-    Ask,
+    StationTimeout,
     /// A ground station begins an upload. The event's relay index is the upload's index in the setup.
     Upload,
     /// A time step of the drones' flight.
@@ -568,15 +568,15 @@ pub enum QueuedEvent {
     /// The relay is switched on again.
     Boot,
     /// A partition or a one-way link failure begins or ends.
-    Part,
+    Partition,
     /// A radio on the shared channel reaches its next step, such as the end of a frame.
     ///
     /// The event's relay index is unused.
     Air(AirEvent),
     /// Measurement of the interference by every relay at its position.
-    Listen,
+    Measure,
     /// The attacker sends a frame to a relay.
-    AttackKind(AttackKind),
+    Attack(AttackKind),
 }
 
 /// Event in the queue, with its time and relay. Events of the same time keep their order of insertion.
@@ -585,7 +585,7 @@ struct Entry {
     at: Instant,
     order: u64,
     relay: usize,
-    happening: QueuedEvent,
+    event: QueuedEvent,
 }
 
 impl Ord for Entry {
@@ -608,13 +608,13 @@ pub struct Queue {
 }
 
 impl Queue {
-    /// Adds the event `happening` of relay `relay` (from 0) at the time `at`.
-    pub fn put(&mut self, at: Instant, relay: usize, happening: QueuedEvent) {
+    /// Adds the event `event` of relay `relay` (from 0) at the time `at`.
+    pub fn put(&mut self, at: Instant, relay: usize, event: QueuedEvent) {
         self.entries.push(Reverse(Entry {
             at,
             order: self.order,
             relay,
-            happening,
+            event,
         }));
         self.order += 1;
     }
@@ -622,7 +622,7 @@ impl Queue {
     /// Removes the earliest event and returns its time, relay (from 0) and kind; `None` if there is none.
     pub fn take(&mut self) -> Option<(Instant, usize, QueuedEvent)> {
         let Reverse(entry) = self.entries.pop()?;
-        Some((entry.at, entry.relay, entry.happening))
+        Some((entry.at, entry.relay, entry.event))
     }
 }
 

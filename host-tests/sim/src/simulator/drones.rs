@@ -182,7 +182,7 @@ impl Drone {
     }
 
     /// Returns the drone's own position estimate: the true position plus the bias.
-    pub(super) fn taken(&self) -> Point {
+    pub(super) fn estimated_position(&self) -> Point {
         sum(self.body.at, self.bias)
     }
 }
@@ -195,7 +195,7 @@ impl Flight {
         let drones = spec.start.iter().zip(&spec.speed_mps);
         let drones = drones
             .map(|(&at, &speed_mps)| {
-                let bias = off(&mut rng, spec.bias_m);
+                let bias = random_error(&mut rng, spec.bias_m);
                 Drone {
                     body: Body::hovering(at),
                     goal: sum(at, bias),
@@ -229,8 +229,8 @@ impl Flight {
     /// Returns the position that drone `index` (from 0) reports: the true position, its bias and noise, m.
     pub(super) fn reported(&mut self, index: usize) -> Option<Point> {
         let drone = self.drones.get(index)?;
-        let noise = off(&mut self.rng, drone.noise_m);
-        Some(sum(drone.taken(), noise))
+        let noise = random_error(&mut self.rng, drone.noise_m);
+        Some(sum(drone.estimated_position(), noise))
     }
 
     pub(super) fn nearest(&self, now: Instant) -> Option<Nearest> {
@@ -240,7 +240,7 @@ impl Flight {
 }
 
 /// Draws a random position error of at most `most_m` metres per axis.
-fn off(rng: &mut ChaCha8Rng, most_m: f64) -> Point {
+fn random_error(rng: &mut ChaCha8Rng, most_m: f64) -> Point {
     [0; 3].map(|_| most_m * rng.random_range(-1.0..=1.0))
 }
 

@@ -99,7 +99,7 @@ const AWAY: Duration = Duration::from_millis(3_000);
 /// Time within which a relay learns of a new flight mode or state of its autopilot.
 ///
 /// The autopilot reports both once a second.
-const TOLD_WITHIN: Duration = Duration::from_millis(1_500);
+const MODE_KNOWN_WITHIN: Duration = Duration::from_millis(1_500);
 
 /// Height that a pilot climbs after taking a drone over, to leave the chain, m.
 const ASIDE_M: f64 = 15.0;
@@ -138,7 +138,7 @@ pub(super) struct Vehicle {
     climbs_to_m: f64,
     /// True while the pilot sees no other drone moving near this one.
     pub(super) is_clear: bool,
-    told_at: Option<Instant>,
+    last_target_at: Option<Instant>,
     /// True while a PX4 is in its failsafe. It resumes OFFBOARD once it receives a stream of targets again.
     is_failing: bool,
     streamed_since: Instant,
@@ -170,11 +170,11 @@ impl Vehicle {
             bias,
             armed: false,
             landed: ON_GROUND,
-            mode: Mode::Sticks,
+            mode: Mode::Manual,
             goal: at,
             climbs_to_m: start[2],
             is_clear: true,
-            told_at: None,
+            last_target_at: None,
             is_failing: false,
             streamed_since: Instant::ZERO,
             began: Instant::ZERO,
@@ -223,7 +223,7 @@ impl Vehicle {
     /// Converts a position of the relay to the line of the run, m; `None` if it is too far from it.
     ///
     /// The lines differ if an upload has moved Tx or Rx.
-    pub(super) fn there(&self, place: Placement) -> Option<Point> {
+    pub(super) fn in_run_coordinates(&self, place: Placement) -> Option<Point> {
         let on_earth = self.line().point(place)?;
         self.spec.axis.place(on_earth).map(point)
     }
@@ -242,15 +242,15 @@ impl Vehicle {
     }
 
     /// Returns true unless the pilot has taken the drone over.
-    pub(super) fn is_lent(&self, now: Instant) -> bool {
-        !self.pilot.has_sticks(now)
+    pub(super) fn is_not_taken_over(&self, now: Instant) -> bool {
+        !self.pilot.has_control(now)
     }
 
     /// Returns true if the autopilot or the relay controls the drone in flight.
     ///
     /// False on the ground, during take-off and landing, and while the pilot controls it.
-    pub(super) fn is_in_its_hands(&self, now: Instant) -> bool {
-        self.landed == IN_AIR && self.mode != Mode::Sticks && self.is_lent(now)
+    pub(super) fn is_automatic(&self, now: Instant) -> bool {
+        self.landed == IN_AIR && self.mode != Mode::Manual && self.is_not_taken_over(now)
     }
 
     /// Restarts the autopilot in flight. It is silent for the time [`AWAY`].
@@ -260,24 +260,24 @@ impl Vehicle {
         self.is_failing = false;
         // A climb continues: no pilot would hand over a drone that stopped on the way up.
         if self.landed == IN_AIR {
-            self.goal = self.taken();
+            self.goal = self.estimated_position();
         }
-        self.told_at = None;
-        self.pilot.has_seen_a_restart(now);
+        self.last_target_at = None;
+        self.pilot.schedule_hand_over_after_restart(now);
     }
 
     /// Restarts the relay's side of the MAVLink connection, as after a reboot of the relay. Its state is lost.
     pub(super) fn boot(&mut self, now: Instant) {
         self.link = Autopilot::new(self.spec.axis, Pace::default(), now);
         self.sites = None;
-        self.pilot.has_seen_a_restart(now);
+        self.pilot.schedule_hand_over_after_restart(now);
     }
 
     pub(super) fn land(&mut self) {
         if self.landed == IN_AIR {
             self.landed = LANDING;
-            self.mode = Mode::Sticks;
-            self.goal = self.taken();
+            self.mode = Mode::Manual;
+            self.goal = self.estimated_position();
             self.goal[2] = self.bias[2];
         }
     }
@@ -302,7 +302,7 @@ impl Vehicle {
             {
                 rate.due = now + interval;
                 let id = rate.id;
-                if let Some(says) = self.says(now, id) {
+                if let Some(says) = self.message(now, id) {
                     self.sequence = self.sequence.wrapping_add(1);
                     self.link.handle_bytes(now, &says.frame(self.sequence));
                 }
@@ -317,7 +317,7 @@ impl Vehicle {
         let before = (self.landed, self.mode);
         self.decide(now);
         if before != (self.landed, self.mode) {
-            self.unknown_until = now + TOLD_WITHIN;
+            self.unknown_until = now + MODE_KNOWN_WITHIN;
         }
     }
 
@@ -325,7 +325,7 @@ impl Vehicle {
     ///
     /// A drone in flight or landing accepts them, a PX4 in any mode, and an ArduCopter only while the relay controls
     /// it.
-    fn may_be_told(&self) -> bool {
+    fn accepts_targets(&self) -> bool {
         match self.landed {
             IN_AIR | LANDING => self.kind == Kind::Px4 || self.mode == Mode::Companion,
             _ => false,
@@ -336,12 +336,14 @@ impl Vehicle {
         if !self.armed && self.pilot.has_armed(now) {
             self.armed = true;
             self.landed = TAKING_OFF;
-            self.goal = self.taken();
+            self.goal = self.estimated_position();
             self.goal[2] = self.climbs_to_m;
         }
-        if self.landed == TAKING_OFF && (self.taken()[2] - self.climbs_to_m).abs() < 0.3 {
+        if self.landed == TAKING_OFF
+            && (self.estimated_position()[2] - self.climbs_to_m).abs() < 0.3
+        {
             self.landed = IN_AIR;
-            self.pilot.is_up(now);
+            self.pilot.schedule_hand_over(now);
         }
         if self.landed == LANDING && self.body.at[2] < 0.2 {
             self.landed = ON_GROUND;
@@ -350,9 +352,9 @@ impl Vehicle {
         if self.landed != IN_AIR {
             return;
         }
-        let streamed = self.told_at.is_some_and(|at| now.since(at) <= LOST);
+        let streamed = self.last_target_at.is_some_and(|at| now.since(at) <= LOST);
         let hovers = self.body.velocity_mps.iter().all(|v| v.abs() < 0.3);
-        if let Some(mode) = self.pilot.chooses(now, hovers && self.is_clear)
+        if let Some(mode) = self.pilot.selected_mode(now, hovers && self.is_clear)
             && (mode != self.mode || mode == Mode::Companion)
         {
             let refuses = self.kind == Kind::Px4 && (!streamed || self.is_failing);
@@ -361,14 +363,14 @@ impl Vehicle {
             if mode == self.mode {
                 // The mode was selected before the link started: change it once so that the link sees the pilot's choice.
                 self.mode = Mode::Hold;
-                self.goal = self.taken();
-                self.pilot.tries_again(now);
+                self.goal = self.estimated_position();
+                self.pilot.schedule_retry(now);
             } else if refuses && mode == Mode::Companion {
-                self.pilot.tries_again(now);
+                self.pilot.schedule_retry(now);
             } else {
                 self.mode = mode;
-                self.goal = self.taken();
-                if mode == Mode::Sticks {
+                self.goal = self.estimated_position();
+                if mode == Mode::Manual {
                     self.goal[2] += ASIDE_M;
                     self.goal = self.pilot.flies_to(now).unwrap_or(self.goal);
                 }
@@ -377,8 +379,8 @@ impl Vehicle {
         if self.kind == Kind::Px4 && self.mode == Mode::Companion && !streamed {
             self.mode = Mode::Hold;
             self.is_failing = true;
-            self.pilot.has_seen_a_restart(now);
-            self.goal = self.taken();
+            self.pilot.schedule_hand_over_after_restart(now);
+            self.goal = self.estimated_position();
         }
         if !streamed {
             self.streamed_since = now;
@@ -409,43 +411,43 @@ impl Vehicle {
     }
 
     /// Returns the position that the drone believes to have, m: the true position plus a constant bias.
-    fn taken(&self) -> Point {
+    fn estimated_position(&self) -> Point {
         sum(self.body.at, self.bias)
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "wraps after 49 days")]
-    fn says(&mut self, now: Instant, id: u32) -> Option<SensorReading> {
+    fn message(&mut self, now: Instant, id: u32) -> Option<AutopilotMessage> {
         match id {
-            id::HEARTBEAT => Some(SensorReading::Heartbeat {
+            id::HEARTBEAT => Some(AutopilotMessage::Heartbeat {
                 autopilot: match self.kind {
                     Kind::Px4 => 12,
                     Kind::ArduCopter => 3,
                 },
                 armed: self.armed,
                 custom_mode: match (self.kind, self.mode) {
-                    (Kind::Px4, Mode::Sticks) => 3 << 16,
+                    (Kind::Px4, Mode::Manual) => 3 << 16,
                     (Kind::Px4, Mode::Hold) => 4 << 16 | 3 << 24,
                     (Kind::Px4, Mode::Companion) => 6 << 16,
-                    (Kind::ArduCopter, Mode::Sticks) => 16,
+                    (Kind::ArduCopter, Mode::Manual) => 16,
                     (Kind::ArduCopter, Mode::Hold) => 5,
                     (Kind::ArduCopter, Mode::Companion) => 4,
                 },
                 is_critical: self.is_failing,
             }),
-            id::EXTENDED_SYS_STATE => Some(SensorReading::State {
+            id::EXTENDED_SYS_STATE => Some(AutopilotMessage::State {
                 landed: self.landed,
             }),
             id::GLOBAL_POSITION_INT => {
-                let taken = self.taken();
+                let taken = self.estimated_position();
                 let noise = self.spec.noise_m;
                 let said = taken.map(|part| part + noise * self.rng.random_range(-1.0..=1.0));
-                Some(SensorReading::Position {
+                Some(AutopilotMessage::Position {
                     boot_ms: (now.since(self.began).as_micros() / 1_000) as u32,
                     at: self.spec.axis.point(placement(said))?,
                 })
             }
             _ if self.kind == Kind::ArduCopter && self.mode == Mode::Companion => {
-                Some(SensorReading::Target {
+                Some(AutopilotMessage::Target {
                     at: self.spec.axis.point(placement(self.goal))?,
                 })
             }
@@ -454,30 +456,30 @@ impl Vehicle {
     }
 
     /// Handles a MAVLink frame from the relay: a requested message rate, a position target or TIMESYNC.
-    pub(super) fn hear(&mut self, now: Instant, frame: &[u8]) {
+    pub(super) fn handle_frame(&mut self, now: Instant, frame: &[u8]) {
         if self.away_until.is_some() {
             return;
         }
-        match heard(frame) {
-            Some(Heard::Interval { id, interval_us }) => {
+        match parse_frame(frame) {
+            Some(RelayMessage::Interval { id, interval_us }) => {
                 for rate in self.rates.iter_mut().filter(|rate| rate.id == id) {
                     rate.interval = Some(Duration::from_micros(interval_us));
                     rate.due = now;
                 }
             }
-            Some(Heard::Target(at)) => {
-                let is_stray = !self.may_be_told() && now > self.unknown_until;
+            Some(RelayMessage::Target(at)) => {
+                let is_stray = !self.accepts_targets() && now > self.unknown_until;
                 self.strays += u64::from(is_stray);
-                self.told_at = Some(now);
+                self.last_target_at = Some(now);
                 if self.mode == Mode::Companion
                     && let Some(place) = self.spec.axis.place(at)
                 {
                     self.goal = point(place);
                 }
             }
-            Some(Heard::Sync(asked)) => {
+            Some(RelayMessage::Sync(asked)) => {
                 self.sequence = self.sequence.wrapping_add(1);
-                let answer = SensorReading::Sync { asked }.frame(self.sequence);
+                let answer = AutopilotMessage::Sync { asked }.frame(self.sequence);
                 self.link.handle_bytes(now, &answer);
             }
             None => {}
@@ -499,7 +501,7 @@ const RECOVERS_S: u64 = 10;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Mode {
     /// The pilot controls the drone.
-    Sticks,
+    Manual,
     /// The autopilot alone controls the drone: it hovers.
     Hold,
     /// The relay controls the drone by its setpoints.
@@ -530,25 +532,25 @@ impl Pilot {
     }
 
     /// Handles the end of the drone's first climb: the pilot plans to hand the drone over to the relay.
-    fn is_up(&mut self, now: Instant) {
+    fn schedule_hand_over(&mut self, now: Instant) {
         // Keep a later hand-over time: the autopilot may have restarted during the climb.
         let looked = now + Duration::from_millis(1_000 * LOOKS_S);
         self.hands_over_at = self.hands_over_at.max(Some(looked));
     }
 
     /// Handles a restart of the autopilot or the relay, or a failsafe: the pilot hands over again later.
-    fn has_seen_a_restart(&mut self, now: Instant) {
+    fn schedule_hand_over_after_restart(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * RECOVERS_S));
     }
 
     /// Returns the flight mode that the pilot selects now; `None` to leave it as it is.
     ///
     /// `may_hand_over` is false while the drone moves, or another drone moves near it.
-    fn chooses(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
-        if self.has_sticks(now) {
+    fn selected_mode(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
+        if self.has_control(now) {
             // Schedule a hand-over after the takeover.
             self.hands_over_at = Some(now);
-            return Some(Mode::Sticks);
+            return Some(Mode::Manual);
         }
         if may_hand_over && self.hands_over_at.is_some_and(|at| at <= now) {
             self.hands_over_at = None;
@@ -564,11 +566,11 @@ impl Pilot {
     }
 
     /// Plans another hand-over after the autopilot has rejected the flight mode.
-    fn tries_again(&mut self, now: Instant) {
+    fn schedule_retry(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * LOOKS_S));
     }
 
-    fn has_sticks(&self, now: Instant) -> bool {
+    fn has_control(&self, now: Instant) -> bool {
         let during = |it: &Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
         self.takeovers.iter().any(during)
     }
@@ -579,7 +581,7 @@ const SYSTEM: u8 = 1;
 
 /// MAVLink message that the simulated autopilot sends.
 #[derive(Clone, Copy, Debug)]
-enum SensorReading {
+enum AutopilotMessage {
     Heartbeat {
         autopilot: u8,
         armed: bool,
@@ -603,7 +605,7 @@ enum SensorReading {
     },
 }
 
-impl SensorReading {
+impl AutopilotMessage {
     fn frame(self, sequence: u8) -> Vec<u8> {
         let mut payload = Vec::new();
         let id = match self {
@@ -664,7 +666,7 @@ fn framed(id: u32, payload: &[u8], sequence: u8) -> Vec<u8> {
 
 /// MAVLink message that the simulated autopilot receives from the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
-enum Heard {
+enum RelayMessage {
     /// Request to send the message with this `id` every `interval_us` microseconds.
     Interval { id: u32, interval_us: u64 },
     /// Position to which the autopilot is to fly.
@@ -674,7 +676,7 @@ enum Heard {
 }
 
 /// Decodes a MAVLink frame from the relay; `None` for messages that the simulated autopilot ignores.
-fn heard(frame: &[u8]) -> Option<Heard> {
+fn parse_frame(frame: &[u8]) -> Option<RelayMessage> {
     let end = frame.len().checked_sub(CHECKSUM)?;
     let header = frame.first_chunk::<HEADER>()?;
     let [.., a, b, c] = *header;
@@ -687,19 +689,19 @@ fn heard(frame: &[u8]) -> Option<Heard> {
             clippy::cast_sign_loss,
             reason = "numbers of messages and microseconds"
         )]
-        id::COMMAND_LONG => Some(Heard::Interval {
+        id::COMMAND_LONG => Some(RelayMessage::Interval {
             id: float(0) as u32,
             interval_us: float(4) as u64,
         }),
         #[expect(clippy::cast_possible_truncation, reason = "millimetres")]
-        id::SET_POSITION_TARGET_GLOBAL_INT => Some(Heard::Target(Geodetic {
+        id::SET_POSITION_TARGET_GLOBAL_INT => Some(RelayMessage::Target(Geodetic {
             lat_e7: i32::from_le_bytes(bytes(4)),
             lon_e7: i32::from_le_bytes(bytes(8)),
             amsl_mm: (float(12) * 1e3).round() as i32,
         })),
         id::TIMESYNC => {
             let [low, high] = [8, 12].map(|at| u64::from(u32::from_le_bytes(bytes(at))));
-            Some(Heard::Sync(high << 32 | low))
+            Some(RelayMessage::Sync(high << 32 | low))
         }
         _ => None,
     }

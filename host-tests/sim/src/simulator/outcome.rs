@@ -6,13 +6,13 @@ use std::collections::{BTreeMap, BinaryHeap};
 use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, Stats};
 
-use super::attack::Struck;
+use super::attack::AttackCounts;
 use super::drones::{Nearest, Point};
 use super::faults::Injected;
 use super::medium::AirCounts;
 use super::route::Track;
-use super::true_interference::Stand;
-use super::watch::Seen;
+use super::true_interference::Snapshot;
+use super::watch::ObservedState;
 
 /// Kind of an event in the log of a run, about one relay. "Another node" is [`Moment::other`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -149,7 +149,7 @@ pub struct RelayEnd {
     /// Geographic positions of Tx and Rx in the relay's mission; `None` if no upload changed those loaded.
     pub sites: Option<Sites>,
     /// State of the relay as the statistics of the run use it.
-    pub seen: Seen,
+    pub observed: ObservedState,
 }
 
 /// Availability of the chain over a whole run.
@@ -192,7 +192,7 @@ pub struct Outcome {
     /// Counts of the frame faults that the links caused.
     pub injected: Injected,
     /// Counts of the attacker's frames by how relays classified them.
-    pub struck: Struck,
+    pub attack_counts: AttackCounts,
     /// Neighbours that relays report as lost at the end, with the time of the report.
     ///
     /// The key is the reporting relay's number from 1, and the side of the lost neighbour.
@@ -225,7 +225,7 @@ pub struct Outcome {
     /// Availability of the chain; `None` unless the run has a fixed end or a shared channel.
     pub watched: Option<Watched>,
     /// Snapshots of the relays' positions, one at each measurement of the interference.
-    pub stands: Vec<Stand>,
+    pub snapshots: Vec<Snapshot>,
     /// Record of the run for an animation, if [`Setup::film`](super::setup::Setup::film) was set.
     pub film: Option<Film>,
     /// States of the relays over time, for the data traffic. `None` unless `Setup::track` was set.

@@ -25,7 +25,7 @@ use uav_relay_scenario::scene::{Place, Relay, Scene};
 
 use super::drones::{Point, apart, placement};
 use super::setup::Setup;
-use super::watch::Seen;
+use super::watch::ObservedState;
 use crate::report::hop_sirs;
 
 /// Virtual time or duration, picoseconds.
@@ -60,7 +60,7 @@ pub struct RelayState {
     /// State of the relay, with the true position of its drone as `place`.
     ///
     /// The position is `None` while the relay has no setpoint.
-    pub seen: Seen,
+    pub observed: ObservedState,
     /// Agreed position of the relay: x, y and altitude, m; `None` without an agreement.
     pub agreed: Option<Point>,
 }
@@ -70,15 +70,15 @@ impl RelayState {
     ///
     /// Movements below [`MOVED_M`] and the lease do not affect it.
     fn is_like(&self, other: &Self) -> bool {
-        let near = match (self.seen.place, other.seen.place) {
+        let near = match (self.observed.place, other.observed.place) {
             (Some(one), Some(other)) => apart(one, other) < MOVED_M,
             (one, other) => one.is_none() && other.is_none(),
         };
         let rest = |state: &Self| {
-            let seen = Seen {
+            let seen = ObservedState {
                 place: None,
                 leased: false,
-                ..state.seen
+                ..state.observed
             };
             (seen, state.agreed)
         };
@@ -124,7 +124,10 @@ impl TrueHops {
     /// uploads, they are those of the mission that the chain flies.
     pub fn new(scenario: &Scenario, setup: &Setup, mission: &Mission) -> Self {
         let relays = mission.relays();
-        let moved = setup.sky.as_ref().map_or([0.0; 2], |sky| sky.velocity_mps);
+        let moved = setup
+            .true_interference
+            .as_ref()
+            .map_or([0.0; 2], |true_interference| true_interference.velocity_mps);
         let scene = Scene::new(scenario, relays).map(|scene| (scene, moved));
         let uploads = setup.uploads.iter().filter_map(|spec| {
             let mission = Mission::try_new(*spec.upload.config()).ok()?;
@@ -316,10 +319,10 @@ struct Members {
 impl Members {
     /// Returns the relays of the view that most living relays have accepted; of several the newest.
     fn of(states: &BTreeMap<usize, RelayState>) -> Option<Self> {
-        let on = || states.iter().filter(|(_, state)| state.seen.is_on);
+        let on = || states.iter().filter(|(_, state)| state.observed.is_on);
         let mut counts: BTreeMap<(ViewId, u16), usize> = BTreeMap::new();
         for (_, state) in on() {
-            let view = (state.seen.view, state.seen.relays);
+            let view = (state.observed.view, state.observed.relays);
             *counts.entry(view).or_default() += 1;
         }
         let (view, relays) = counts
@@ -332,7 +335,7 @@ impl Members {
             relays: vec![None; usize::from(relays)],
         };
         for (relay, state) in on() {
-            let seen = state.seen;
+            let seen = state.observed;
             let place = usize::from(seen.index).checked_sub(1);
             if let Some(place) = place
                 && (seen.view, seen.relays) == (view, relays)
@@ -350,7 +353,7 @@ impl Members {
     /// A relay without a position gets a substitute. The hops at such a relay carry no data anyway.
     fn places(&self) -> Vec<(usize, Point)> {
         let place = |(index, member): (usize, &Option<(usize, RelayState)>)| {
-            let known = member.and_then(|(relay, state)| Some((relay, state.seen.place?)));
+            let known = member.and_then(|(relay, state)| Some((relay, state.observed.place?)));
             known.unwrap_or((index, [0.0; 3]))
         };
         self.relays.iter().enumerate().map(place).collect()
@@ -360,7 +363,7 @@ impl Members {
     fn nodes(&self, rx: usize) -> Vec<Option<usize>> {
         let alive = self.relays.iter().map(|member| {
             let (relay, state) = (*member)?;
-            state.seen.place.map(|_| relay + 1)
+            state.observed.place.map(|_| relay + 1)
         });
         [Some(0)]
             .into_iter()
@@ -373,12 +376,12 @@ impl Members {
     ///
     /// Positions from which relays measure an unknown interferer have no target, and do not count.
     fn agreed(&self) -> Option<Vec<(usize, Point)>> {
-        let target = |state: &RelayState| state.seen.target.map(f32::to_bits);
+        let target = |state: &RelayState| state.observed.target.map(f32::to_bits);
         let (_, first) = self.relays.first().copied().flatten()?;
         let first = target(&first)?;
         let held = self.relays.iter().map(|member| {
             let (relay, state) = (*member)?;
-            let is_held = state.seen.phase == Phase::Holding && state.seen.place.is_some();
+            let is_held = state.observed.phase == Phase::Holding && state.observed.place.is_some();
             (is_held && target(&state) == Some(first)).then_some((relay, state.agreed?))
         });
         held.collect()
@@ -515,7 +518,7 @@ pub fn route(
                     from: at,
                     period: 0,
                     on: (0..relays)
-                        .map(|relay| states.get(&relay).is_some_and(|state| state.seen.is_on))
+                        .map(|relay| states.get(&relay).is_some_and(|state| state.observed.is_on))
                         .collect(),
                     hops: Vec::new(),
                 };

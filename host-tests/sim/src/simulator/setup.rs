@@ -112,7 +112,7 @@ pub struct Setup {
     /// One-way link failures: periods in which one relay does not receive another one.
     pub deaf: Vec<OneWayFailure>,
     /// True interferers, which relays measure and have to locate; `None` if relays do not measure them.
-    pub sky: Option<TrueInterference>,
+    pub true_interference: Option<TrueInterference>,
     /// Fixed end of the run; its availability is then measured. `None` to end the run when the chain settles.
     pub soak: Option<Instant>,
     /// Time from which links cause no more faults; `None` if they do to the end.
@@ -155,7 +155,7 @@ impl Setup {
             access: Access::Ideal,
             burst: 1.0,
             deaf: Vec::new(),
-            sky: None,
+            true_interference: None,
             soak: None,
             faults_end: None,
             record: false,

@@ -27,7 +27,7 @@ pub struct TrueInterference {
     /// Relays get them at the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
     /// Measuring receivers that report wrong powers.
-    pub broken: Vec<Broken>,
+    pub broken: Vec<BrokenReceiver>,
     /// Start and end of the period in which Tx and Rx measure the interference, too.
     pub ends_during: [Instant; 2],
     /// True if Tx and Rx measure the interference, too.
@@ -43,18 +43,18 @@ pub struct TrueInterference {
 
 /// Measuring receiver that reports wrong powers from some time on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Broken {
+pub struct BrokenReceiver {
     /// Number of the node with the wrong receiver: a relay from 1, 0 for Tx, N + 1 for Rx.
     pub node: u16,
     /// Power that the receiver reports instead of the true one.
-    pub says: SensorReading,
+    pub reading: BrokenReading,
     /// Time from which the reported powers are wrong.
     pub since: Instant,
 }
 
 /// Power that a broken receiver reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SensorReading {
+pub enum BrokenReading {
     /// The true interference times this factor.
     Times(f64),
     /// A constant power, W, whatever the true interference.
@@ -98,7 +98,7 @@ impl TrueInterference {
     }
 
     /// Draws the power, W, that relay `index` (from 1) measures at the position `at`, with shadowing.
-    pub(super) fn heard_w(
+    pub(super) fn relay_w(
         &self,
         scene: &Scene,
         index: u16,
@@ -107,13 +107,13 @@ impl TrueInterference {
         rng: &mut ChaCha8Rng,
     ) -> f64 {
         let true_w = scene.interference_w(at) * decibel(self.shadow_db * self.shadow(at.into()));
-        self.said_w(scene, index, now, true_w, rng)
+        self.reported_w(scene, index, now, true_w, rng)
     }
 
     /// Draws the power, W, that `node` reports if the true interference is `true_w`, W.
     ///
     /// It includes the noise, the random error of the mean of the samples, and the error of a broken receiver.
-    fn said_w(
+    fn reported_w(
         &self,
         scene: &Scene,
         node: u16,
@@ -123,9 +123,9 @@ impl TrueInterference {
     ) -> f64 {
         let mut broken = self.broken.iter();
         let broken = broken.find(|broken| broken.node == node && now >= broken.since);
-        match broken.map(|broken| broken.says) {
-            Some(SensorReading::Times(times)) => (true_w * times + scene.noise_w) * self.mean(rng),
-            Some(SensorReading::Always(power_w)) => power_w,
+        match broken.map(|broken| broken.reading) {
+            Some(BrokenReading::Times(times)) => (true_w * times + scene.noise_w) * self.mean(rng),
+            Some(BrokenReading::Always(power_w)) => power_w,
             None => (true_w + scene.noise_w) * self.mean(rng),
         }
     }
@@ -138,11 +138,11 @@ impl TrueInterference {
         rng: &mut ChaCha8Rng,
     ) -> f64 {
         let true_w = scene.interference_on_ground_w(scene.distance_m);
-        self.said_w(scene, relays + 1, now, true_w, rng)
+        self.reported_w(scene, relays + 1, now, true_w, rng)
     }
 
     pub(super) fn transmitter_w(&self, scene: &Scene, now: Instant, rng: &mut ChaCha8Rng) -> f64 {
-        self.said_w(scene, 0, now, scene.interference_on_ground_w(0.0), rng)
+        self.reported_w(scene, 0, now, scene.interference_on_ground_w(0.0), rng)
     }
 
     pub(super) fn ends_measure(&self, now: Instant) -> bool {
@@ -174,7 +174,7 @@ fn decibel(db: f64) -> f64 {
 
 /// Snapshot of the relays' positions and estimate at the time of a measurement.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stand {
+pub struct Snapshot {
     /// Time of the snapshot.
     pub at: Instant,
     /// Numbers of the relays that are on, from 1.

@@ -13,10 +13,10 @@ use super::setup::Setup;
 /// Statistics of a run while it goes on: availability, simultaneous groups, smallest distance.
 #[derive(Debug)]
 pub struct Watch {
-    pub(super) seen: Vec<Seen>,
+    pub(super) states: Vec<ObservedState>,
     pub(super) optima: Optima,
     /// Last setpoint of each relay, from relay 1; `None` before its first one. Relays that are off keep theirs.
-    stood: Vec<Option<Point>>,
+    last_setpoints: Vec<Option<Point>>,
     until: Instant,
     first: Option<Instant>,
     is_right: bool,
@@ -31,10 +31,10 @@ impl Watch {
     /// Starts the statistics with the states `seen` of the relays.
     ///
     /// `run` simulates a chain without faults, to compute the positions with which this chain is compared.
-    pub fn new(seen: Vec<Seen>, run: Run) -> Self {
+    pub fn new(seen: Vec<ObservedState>, run: Run) -> Self {
         Self {
-            stood: vec![None; seen.len()],
-            seen,
+            last_setpoints: vec![None; seen.len()],
+            states: seen,
             optima: Optima::new(run),
             until: Instant::ZERO,
             first: None,
@@ -48,7 +48,7 @@ impl Watch {
     }
 
     /// Counts the time since the last call, with unchanged states, as available or as outage.
-    pub fn go_on(&mut self, now: Instant) {
+    pub fn count_time(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
         if self.first.is_none() {
@@ -64,15 +64,15 @@ impl Watch {
     }
 
     /// Replaces the state of relay `at` (from 0) and updates the smallest distance. Returns true on a change.
-    pub fn see(&mut self, at: usize, seen: Seen) -> bool {
-        let Some(known) = self.seen.get_mut(at) else {
+    pub fn record_state(&mut self, at: usize, seen: ObservedState) -> bool {
+        let Some(known) = self.states.get_mut(at) else {
             return false;
         };
         if *known == seen {
             return false;
         }
         *known = seen;
-        let before = self.stood.get(at).copied().flatten();
+        let before = self.last_setpoints.get(at).copied().flatten();
         if seen.place.is_some() && seen.place != before {
             self.move_to(at, seen.place);
         }
@@ -80,11 +80,11 @@ impl Watch {
     }
 
     fn move_to(&mut self, at: usize, place: Option<Point>) {
-        if let Some(stood) = self.stood.get_mut(at) {
-            *stood = place;
+        if let Some(last) = self.last_setpoints.get_mut(at) {
+            *last = place;
         }
-        for (other, stood) in self.stood.iter().enumerate() {
-            if let (Some(one), Some(two)) = (place, stood)
+        for (other, last) in self.last_setpoints.iter().enumerate() {
+            if let (Some(one), Some(two)) = (place, last)
                 && other != at
             {
                 let apart = apart(one, *two);
@@ -94,9 +94,9 @@ impl Watch {
     }
 
     /// Updates the number of groups and the first agreement, after all changes of states at `now`.
-    pub fn take_in(&mut self, now: Instant) {
-        self.most_flying = self.most_flying.max(groups(&self.seen));
-        if self.first.is_none() && has_agreed(&self.seen) {
+    pub fn count_groups(&mut self, now: Instant) {
+        self.most_flying = self.most_flying.max(groups(&self.states));
+        if self.first.is_none() && has_agreed(&self.states) {
             self.first = Some(now);
         }
     }
@@ -104,7 +104,7 @@ impl Watch {
     /// Sets whether the chain counts as available from now on.
     ///
     /// It does while the longest possible chain of the living relays holds the positions that it has without faults.
-    pub fn judge(&mut self, is_right: bool) {
+    pub fn set_available(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);
         }
@@ -116,7 +116,7 @@ impl Watch {
     /// The availability is `None` unless `is_judged`. `flown_m` is the smallest distance of simulated drones, m,
     /// which replaces that of setpoints.
     pub fn end(mut self, now: Instant, is_judged: bool, flown_m: Option<f64>) -> Watched {
-        self.go_on(now);
+        self.count_time(now);
         let share = self.first.map_or(0.0, |first| {
             self.right.as_micros() as f64 / now.since(first).as_micros().max(1) as f64
         });
@@ -132,7 +132,7 @@ impl Watch {
 
 /// State of a relay as the statistics of a run use it.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Seen {
+pub struct ObservedState {
     /// True if the relay is switched on.
     pub is_on: bool,
     /// Phase of the relay's protocol, such as planning or holding a position.
@@ -153,7 +153,7 @@ pub struct Seen {
     pub place: Option<Point>,
 }
 
-impl Seen {
+impl ObservedState {
     /// Reads the state of `relay`; `is_on` is false if the relay is switched off.
     pub fn of(relay: &Relay, is_on: bool) -> Self {
         Self {
@@ -183,7 +183,7 @@ impl Seen {
 ///
 /// A group consists of the relays of one view with valid leases. Relays of one view that claim the same index belong
 /// to different groups. Relays separated by a partition that still hold their common agreement are one group.
-pub fn groups(seen: &[Seen]) -> usize {
+pub fn groups(seen: &[ObservedState]) -> usize {
     let mut views: BTreeMap<(ViewId, u16), BTreeMap<u16, usize>> = BTreeMap::new();
     for one in seen.iter().filter(|one| one.flies()) {
         let claims = views.entry(one.part_of()).or_default();
@@ -194,9 +194,9 @@ pub fn groups(seen: &[Seen]) -> usize {
 }
 
 /// Returns true if in some view all relays hold their positions for the same target SIR.
-pub fn has_agreed(seen: &[Seen]) -> bool {
+pub fn has_agreed(seen: &[ObservedState]) -> bool {
     seen.iter().filter(|one| one.is_on).any(|one| {
-        let same = |other: &&Seen| {
+        let same = |other: &&ObservedState| {
             other.is_on
                 && other.phase == Phase::Holding
                 && other.part_of() == one.part_of()
@@ -207,7 +207,7 @@ pub fn has_agreed(seen: &[Seen]) -> bool {
 }
 
 /// Largest number of chains that [`longest`] returns. Sparse links allow far more, which would take too long.
-const MOST: usize = 1_000;
+const MAX_CHAINS: usize = 1_000;
 
 /// Returns the largest number of relays that can form a chain, and the chains of that many relays.
 ///
@@ -250,7 +250,7 @@ pub fn longest(
                 let next = next.into_iter().flatten().filter(|at| is(at, left));
                 next.map(|at| [way.as_slice(), &[*at]].concat())
             })
-            .take(MOST)
+            .take(MAX_CHAINS)
             .collect();
     }
     let named = |way: Vec<usize>| {
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn where_all_hear_their_neighbours_all_are_in_the_chain() {
+    fn with_all_links_all_relays_are_in_the_chain() {
         let on: Vec<usize> = (0..8).collect();
         assert_eq!(longest(&on, near, |_| true), (8, vec![on.clone()]));
         let left = [0, 1, 4, 5, 7];
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_neighbours_that_are_not_linked_one_is_left_out() {
+    fn one_of_two_unlinked_neighbours_is_left_out() {
         let on: Vec<usize> = (0..8).collect();
         let links = |one, other| near(one, other) && (one, other) != (2, 3);
         let (length, ways) = longest(&on, links, |_| true);
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_do_not_hear_each_other_are_chains_of_their_own() {
+    fn unlinked_parts_are_separate_chains() {
         let on: Vec<usize> = (0..8).collect();
         let halves = |one: usize, other: usize| near(one, other) && (one < 4) == (other < 4);
         let both = longest(&on, halves, |_| true);
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn however_many_ways_there_are_only_some_are_looked_at() {
+    fn the_number_of_examined_chains_is_limited() {
         let on: Vec<usize> = (0..60).collect();
         // Twenty groups of three; each chain takes any one relay of each group.
         let links = |one: usize, other: usize| other / 3 == one / 3 + 1;
@@ -358,7 +358,7 @@ impl Optima {
         let optimum = self
             .known
             .entry((nodes.to_vec(), version))
-            .or_insert_with(|| places_of(&run(alone(setup, nodes, version)?)?));
+            .or_insert_with(|| places_of(&run(without_other_relays(setup, nodes, version)?)?));
         optimum.as_ref().is_some_and(|optimum| {
             let mut pairs = optimum.iter().zip(places.iter().flatten());
             optimum.len() == nodes.len() && pairs.all(|(one, other)| apart(*one, *other) < SAME_M)
@@ -369,7 +369,7 @@ impl Optima {
 /// Returns the setup of a fault-free run of only the relays `nodes`, with the mission of `version`.
 ///
 /// `None` if the mission is invalid or does not allow that number of relays.
-pub fn alone(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
+pub fn without_other_relays(setup: &Setup, nodes: &[u16], version: u16) -> Option<Setup> {
     let uploaded = setup
         .uploads
         .iter()
@@ -405,5 +405,5 @@ pub fn places_of(outcome: &Outcome) -> Places {
 
 /// Returns the positions in which a chain of only the relays `nodes` (from 1) settles without faults.
 pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {
-    places_of(&run(alone(setup, nodes, version)?).ok()?)
+    places_of(&run(without_other_relays(setup, nodes, version)?).ok()?)
 }

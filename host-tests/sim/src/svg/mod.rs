@@ -13,7 +13,7 @@ use nodes::{CLASSES, cross};
 use picture::{
     ABOVE, BOTTOM, LEFT, RIGHT, TOP, WIDTH, bottom, decibels, length, near, placed, worst,
 };
-pub use picture::{OtherInterferers, Picture, Room, room};
+pub use picture::{LateralView, OtherInterferers, Picture, lateral_view};
 use sources::{diamond, has_beside};
 
 /// Draws the chain as an SVG document: from the side and, if useful, from above.
@@ -38,8 +38,8 @@ pub fn draw(picture: &Picture) -> String {
     sources::label_others(&mut canvas, &mut labels, &frame, picture);
     nodes::label_hops(&mut canvas, &mut labels, &hops);
     nodes::label(&mut canvas, &mut labels, &frame, picture);
-    if let Some(room) = &picture.room {
-        draw_above(&mut canvas, &frame, picture, room);
+    if let Some(view) = &picture.lateral_view {
+        draw_above(&mut canvas, &frame, picture, view);
     }
     draw_legend(&mut canvas, picture);
     draw_events(&mut canvas, picture);
@@ -139,24 +139,24 @@ const FARTHEST: f64 = 2.0;
 /// It applies if relays must stay on the line.
 const TOWARD_FAR: f64 = 0.4;
 
-/// Draws the view from above. `side` has the scale along the line; `room` has the relays' lateral offsets.
-fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &Room) {
+/// Draws the view from above. `side` has the scale along the line; `view` has the relays' lateral offsets.
+fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, view: &LateralView) {
     let xs = picture.nodes.iter().map(|(x, _)| *x);
-    let ys = room.y_m.iter().copied().chain(std::iter::repeat(f64::NAN));
+    let ys = view.y_m.iter().copied().chain(std::iter::repeat(f64::NAN));
     let seen = Picture {
         nodes: xs.zip(ys).collect(),
         ..picture.clone()
     };
     let frame = Frame {
         x: side.x,
-        h: upright(&seen, room),
+        h: upright(&seen, view),
     };
     canvas.text((LEFT, TOP - 5.0), "start", "from the side");
     canvas.text((LEFT, PLOT_TOP - 5.0), "start", "from above");
     let mut labels = Labels::inside((LEFT, PLOT_TOP), (RIGHT, PLOT_BOTTOM));
     canvas::draw_axes(canvas, &frame, "y (m)");
-    let edges = [room.least_m, room.most_m].map(|y| frame.h.at(y));
-    for edge in edges.into_iter().filter(|_| !room.is_line()) {
+    let edges = [view.least_m, view.most_m].map(|y| frame.h.at(y));
+    for edge in edges.into_iter().filter(|_| !view.is_line()) {
         canvas.edge((LEFT, edge), (RIGHT, edge));
     }
     let hops = nodes::hops(&seen, &frame);
@@ -166,7 +166,7 @@ fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &Room)
     let placed = sources::from_above(canvas, &mut labels, &frame, &seen);
     sources::label_from_above(canvas, &mut labels, &placed);
     nodes::label_hops(canvas, &mut labels, &hops);
-    if room.is_line() {
+    if view.is_line() {
         nodes::label(canvas, &mut labels, &frame, &seen);
         return;
     }
@@ -181,9 +181,9 @@ fn draw_above(canvas: &mut Canvas, side: &Frame, picture: &Picture, room: &Room)
 /// Returns the vertical scale of the view from above.
 ///
 /// It includes the relays, the lateral limits for them, and the interferers that are not too far away.
-fn upright(seen: &Picture, room: &Room) -> Scale {
-    let (mut low, mut high) = (room.least_m.min(0.0), room.most_m.max(0.0));
-    let reach = if room.is_line() {
+fn upright(seen: &Picture, view: &LateralView) -> Scale {
+    let (mut low, mut high) = (view.least_m.min(0.0), view.most_m.max(0.0));
+    let reach = if view.is_line() {
         length(seen)
     } else {
         FARTHEST * high.max(-low).max(1e-3)
@@ -195,7 +195,7 @@ fn upright(seen: &Picture, room: &Room) -> Scale {
     for y in relays.chain(sources) {
         let shown = match y {
             y if y.abs() <= reach => y,
-            y if room.is_line() => (TOWARD_FAR * reach).copysign(y),
+            y if view.is_line() => (TOWARD_FAR * reach).copysign(y),
             _ => continue,
         };
         (low, high) = (low.min(shown), high.max(shown));

@@ -33,7 +33,7 @@ pub struct Picture {
     /// Relays from Tx to Rx: x along the line and altitude, m. A position that is not finite is not drawn.
     pub nodes: Vec<(f64, f64)>,
     /// Lateral limits and offsets of the relays. If given, the picture has a view from above.
-    pub room: Option<Room>,
+    pub lateral_view: Option<LateralView>,
     /// Linear SIR of every hop from Tx to Rx. A hop is grey if its value is not finite and positive.
     pub hop_sir: Vec<f64>,
     /// Numbers, 1 to N, of silent relays. They are crossed out, and their hops are dashed.
@@ -76,7 +76,7 @@ impl OtherInterferers {
 ///
 /// Offsets are in m, positive to the right of the line from Tx to Rx.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Room {
+pub struct LateralView {
     /// Lateral limit of the relays to the left of the line, m, 0 or less.
     pub least_m: f64,
     /// Lateral limit of the relays to the right of the line, m, 0 or more.
@@ -85,7 +85,7 @@ pub struct Room {
     pub y_m: Vec<f64>,
 }
 
-impl Room {
+impl LateralView {
     /// Returns true if relays must stay on the line. The view from above then shows only the interferers.
     pub(super) const fn is_line(&self) -> bool {
         self.least_m == 0.0 && self.most_m == 0.0
@@ -96,16 +96,16 @@ impl Room {
 ///
 /// They are the lateral limits in `mission` and the relays' lateral offsets `y_m`, m. `None` if relays must stay on
 /// the line and no near interferer is beside it.
-pub fn room(
+pub fn lateral_view(
     mission: &Mission,
     y_m: impl IntoIterator<Item = f64>,
     interferers: &[(f64, f64, f64)],
-) -> Option<Room> {
+) -> Option<LateralView> {
     let lateral = mission.config().lateral;
     let distance_m = f64::from(mission.config().distance_m);
     let is_beside = |(_, x_m, y_m): &(f64, f64, f64)| near(*x_m, distance_m) && *y_m != 0.0;
     let is_seen = !lateral.is_single() || interferers.iter().any(is_beside);
-    is_seen.then(|| Room {
+    is_seen.then(|| LateralView {
         least_m: f64::from(lateral.least_m),
         most_m: f64::from(lateral.most_m),
         y_m: y_m.into_iter().collect(),
@@ -114,7 +114,7 @@ pub fn room(
 
 /// Returns the coordinate of the lower edge of the legend, in picture units.
 pub(super) fn bottom(picture: &Picture) -> f64 {
-    if picture.room.is_some() {
+    if picture.lateral_view.is_some() {
         HEIGHT + ABOVE
     } else {
         HEIGHT

@@ -34,11 +34,11 @@ pub(super) fn headroom(picture: &Picture) -> f64 {
 /// Draws interferers in the side view: symbols on the ground or, beyond the plot, arrows with a text.
 pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (inside, far) = sorted(&picture.interferers, length(picture));
-    beyond(canvas, labels, &far);
+    draw_distant(canvas, labels, &far);
     let ground = frame.h.at(0.0);
     for (power, x, y) in inside {
         let at = frame.x.at(x);
-        let tip = format!("interferer: {}", whole((power, x, y)));
+        let tip = format!("interferer: {}", description((power, x, y)));
         let class = if y == 0.0 { "source" } else { "source beside" };
         canvas.marked(&diamond((at, ground)), class, &tip);
         labels.take(Area::around((at, ground - 3.0), (12.0, 6.0)));
@@ -64,14 +64,14 @@ pub(super) fn has_beside(picture: &Picture) -> bool {
     inside.iter().any(|(_, _, y)| *y != 0.0)
 }
 
-fn whole((power, x, y): Source) -> String {
+fn description((power, x, y): Source) -> String {
     format!("{} W, x = {} m, y = {} m", plain(power), plain(x), plain(y))
 }
 
 /// Returns the earlier or estimated interferers to draw, each with its x in picture units.
 ///
 /// An earlier interferer is left out if the symbol of a present one would cover it.
-fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
+fn past_or_estimated(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     let (before, _) = sorted(&picture.others, length(picture));
     let all = before
@@ -86,8 +86,8 @@ fn gone(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
 
 pub(super) fn others(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let ground = frame.h.at(0.0);
-    for (at, source) in gone(picture, frame) {
-        let tip = format!("{}: {}", picture.others_are.tip(), whole(source));
+    for (at, source) in past_or_estimated(picture, frame) {
+        let tip = format!("{}: {}", picture.others_are.tip(), description(source));
         canvas.marked(&diamond((at, ground)), "before", &tip);
         labels.take(Area::around((at, ground - 3.0), (12.0, 6.0)));
     }
@@ -101,7 +101,7 @@ pub(super) fn label_others(
 ) {
     let ground = frame.h.at(0.0);
     let word = picture.others_are.word();
-    for (at, _) in gone(picture, frame) {
+    for (at, _) in past_or_estimated(picture, frame) {
         let place = (at, ground - 13.0);
         if labels.try_take(Area::around(place, (width(word, SIZE) + 2.0, LINE))) {
             canvas.text((place.0, place.1 + 0.36 * SIZE), "faint halo", word);
@@ -154,7 +154,7 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
                 .any(|other| (0.1..wide).contains(&(side * (other - at))))
         };
         let lean = f64::from(i8::from(crowded(-1.0)) - i8::from(crowded(1.0)));
-        words(
+        draw_label(
             canvas,
             labels,
             (frame.x.at(*x), ground),
@@ -165,7 +165,7 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
 }
 
 /// Symbols of interferers in the view from above: position, label, and style of the label.
-pub(super) type Seen = Vec<(Point, String, &'static str)>;
+pub(super) type PlacedLabels = Vec<(Point, String, &'static str)>;
 
 /// Draws the interferers in the view from above and returns their labels.
 ///
@@ -175,7 +175,7 @@ pub(super) fn from_above(
     labels: &mut Labels,
     frame: &Frame,
     picture: &Picture,
-) -> Seen {
+) -> PlacedLabels {
     let mut seen = Vec::new();
     for (all, class, tip) in [
         (&picture.others, "before", picture.others_are.tip()),
@@ -184,7 +184,7 @@ pub(super) fn from_above(
         let (inside, _) = sorted(all, length(picture));
         for source @ (power, x, y) in inside {
             let at = frame.at((x, y));
-            let tip = format!("{tip}: {}", whole(source));
+            let tip = format!("{tip}: {}", description(source));
             let beyond = if frame.h.holds(y) {
                 canvas.marked(&diamond(at), class, &tip);
                 String::new()
@@ -204,7 +204,7 @@ pub(super) fn from_above(
 }
 
 /// Writes the labels of the interferers in the view from above, where there is free space.
-pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &Seen) {
+pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &PlacedLabels) {
     for ((x, y), words, class) in seen {
         let wide = width(words, SIZE) + 4.0;
         let (aside, clear) = (0.5 * wide + 8.0, 7.0 + 0.5 * LINE);
@@ -225,7 +225,7 @@ pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &
 ///
 /// If the text is far above the symbol, a line connects them. `lean` is the direction, -1 to 1, in which to move the
 /// text if it is crowded.
-fn words(
+fn draw_label(
     canvas: &mut Canvas,
     labels: &mut Labels,
     (x, ground): Point,
@@ -270,7 +270,7 @@ fn words(
 }
 
 /// Writes a line of text for each interferer beyond the plot, with an arrow toward it.
-fn beyond(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
+fn draw_distant(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
     let shown = if far.len() > FAR_LINES {
         FAR_LINES - 1
     } else {

@@ -91,7 +91,7 @@ fn a_capture_of_links_has_every_message_and_every_byte() {
 }
 
 #[test]
-fn a_capture_of_the_shared_channel_has_what_was_sent_and_the_attacker_too() {
+fn a_capture_of_the_channel_has_the_attackers_frames_too() {
     let (report, frames) = captured("--uavs 4 --shared --forge 20 --replay 10");
     assert!(frames.iter().all(|frame| frame.interface == "channel"));
     let with = |word: &str| frames.iter().filter(|frame| frame.comment == word).count();
@@ -105,7 +105,7 @@ fn a_capture_of_the_shared_channel_has_what_was_sent_and_the_attacker_too() {
 }
 
 #[test]
-fn uploads_of_either_end_are_in_the_capture() {
+fn the_capture_has_uploads_from_both_ends() {
     for (end, wire, name) in [
         ("tx", "--wires", "Tx-1"),
         ("rx", "--wires", "3-Rx"),

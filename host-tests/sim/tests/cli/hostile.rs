@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{chain, json, refusal};
 
 #[test]
-fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
+fn a_killed_relay_is_left_out_and_its_recovery_reported() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("lost.svg");
     let file_name = file.to_str().unwrap();
@@ -58,7 +58,7 @@ fn a_killed_relay_is_left_out_and_the_report_tells_how_that_went() {
 }
 
 #[test]
-fn the_story_of_a_loss_is_told_in_a_line_for_each_thing_that_happened() {
+fn the_timeline_of_a_loss_has_a_line_per_event() {
     let output = chain("--kill 4@20");
     assert!(output.status.success() && output.stderr.is_empty());
     let text = String::from_utf8(output.stdout).unwrap();
@@ -79,7 +79,7 @@ fn the_story_of_a_loss_is_told_in_a_line_for_each_thing_that_happened() {
 }
 
 #[test]
-fn a_relay_that_is_switched_on_again_gets_its_place_back() {
+fn a_relay_switched_on_again_gets_its_position_back() {
     for index in ["1", "4", "8"] {
         let (kill, boot) = (format!("{index}@20"), format!("{index}@60"));
         let report = json(&format!("--kill {kill} --boot {boot}"));
@@ -93,7 +93,7 @@ fn a_relay_that_is_switched_on_again_gets_its_place_back() {
 }
 
 #[test]
-fn of_two_parts_the_larger_goes_on_until_they_meet_again() {
+fn the_larger_of_two_parts_goes_on_until_they_merge() {
     let report = json("--partition 3@20");
     assert_eq!(report["left"].as_u64(), Some(5));
     let lost = report["lost"].as_array().unwrap();
@@ -108,7 +108,7 @@ fn of_two_parts_the_larger_goes_on_until_they_meet_again() {
 
 /// Checks that of two relays only the leader, relay 1, may go on alone: the other has no quorum.
 #[test]
-fn too_few_hold_their_places_and_the_status_is_1() {
+fn too_few_relays_with_positions_give_status_1() {
     let output = chain("--json --uavs 2 --kill 1@20");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -123,7 +123,7 @@ fn too_few_hold_their_places_and_the_status_is_1() {
 }
 
 #[test]
-fn with_tags_an_attacker_changes_nothing() {
+fn with_tags_an_attack_has_no_effect() {
     for extra in ["", "--kill 2@20", "--wires"] {
         let arguments = format!("--uavs 5 --forge 600 --replay 600 {extra}");
         let report = json(&arguments);
@@ -146,7 +146,7 @@ fn with_tags_an_attacker_changes_nothing() {
 
 /// Checks that relays that do not sign frames accept an attacker's, and that the report shows the harm.
 #[test]
-fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
+fn without_tags_accepted_forgeries_are_reported() {
     let attacked = "--uavs 4 --forge 1000 --replay 100 --no-auth --json";
     // The chain may not settle; then the report has an error, and the exit status is 1.
     let output = chain(attacked);
@@ -170,7 +170,7 @@ fn without_tags_an_attacker_is_listened_to_and_the_report_says_so() {
 }
 
 #[test]
-fn a_shared_channel_is_csma_unless_said_otherwise() {
+fn a_shared_channel_uses_csma_by_default() {
     for (extra, access) in [
         ("--shared", Some("csma")),
         ("--air csma", Some("csma")),
@@ -215,7 +215,7 @@ fn a_slow_link_takes_longer() {
 }
 
 #[test]
-fn what_the_channel_cannot_carry_is_refused_before_flight() {
+fn an_overloaded_channel_is_refused_before_flight() {
     for (uavs, sharing, least) in [
         ("2", "csma", 4_694),
         ("8", "csma", 32_854),
@@ -240,7 +240,7 @@ fn what_the_channel_cannot_carry_is_refused_before_flight() {
 ///
 /// It names settings that would do, and the slower probing that it names does.
 #[test]
-fn fifty_relays_on_a_slow_channel_are_refused_with_the_probing_that_works() {
+fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
     let (status, line) = refusal(arguments);
     let expected = "--baud 57600: must be within 229974 to 10000000: 50 relays in range of each other overload the channel: it needs 229974 bit/s, or --probe-after-ms 19963 with three times that for --dead-after-ms, or at most 13 relays in range\n";
@@ -254,7 +254,7 @@ fn fifty_relays_on_a_slow_channel_are_refused_with_the_probing_that_works() {
 }
 
 #[test]
-fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
+fn a_soak_runs_to_its_end_and_reports_the_availability() {
     let arguments = "--soak 200 --kill 4@20 --boot 4@60";
     let report = json(arguments);
     assert_eq!(report["virtual_s"], 200.0);
@@ -275,7 +275,7 @@ fn a_soak_goes_on_to_its_end_and_says_how_much_of_it_was_right() {
 }
 
 #[test]
-fn a_soak_of_a_good_chain_is_right_all_the_time_by_any_link() {
+fn the_availability_without_faults_is_1_on_any_link() {
     for extra in ["--air ideal", "--wires"] {
         let report = json(&format!("--soak 60 {extra}"));
         assert_eq!(report["availability"], 1.0, "{extra:?}");
@@ -284,7 +284,7 @@ fn a_soak_of_a_good_chain_is_right_all_the_time_by_any_link() {
 }
 
 #[test]
-fn losses_in_runs_have_the_mean_share_that_was_asked_for() {
+fn burst_losses_have_the_requested_mean() {
     let soaked = "--soak 600 --air ideal --loss 0.3";
     for burst in ["1", "20"] {
         let report = json(&format!("{soaked} --burst {burst}"));
@@ -296,7 +296,7 @@ fn losses_in_runs_have_the_mean_share_that_was_asked_for() {
 }
 
 #[test]
-fn the_story_tells_who_does_not_hear_whom() {
+fn the_timeline_names_relays_that_are_not_received() {
     let output = chain("--deaf 4:3@5-9 --soak 20");
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [
@@ -323,7 +323,7 @@ const TOML: &str =
     "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[listen]\n";
 
 #[test]
-fn what_is_heard_comes_from_an_interferer() {
+fn listening_needs_an_interferer() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("listen.toml");
     std::fs::write(&file, TOML).unwrap();
@@ -339,7 +339,7 @@ fn what_is_heard_comes_from_an_interferer() {
 
 /// Checks that the picture shows no SIR for relays that spread evenly, before they know the interferer.
 #[test]
-fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
+fn relays_spread_for_measuring_have_no_sir_in_the_picture() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("listen.svg");
     let name = file.to_str().unwrap();
@@ -353,7 +353,7 @@ fn relays_that_spread_to_hear_have_no_sir_in_the_picture() {
 
 /// Checks that the true and the optimum SIR of a report are those of the remaining relays.
 #[test]
-fn a_lost_relay_does_not_count() {
+fn a_lost_relay_does_not_count_in_the_status() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";
     let report = json(options);
     let of = |name: &str| report[name].as_f64().unwrap();

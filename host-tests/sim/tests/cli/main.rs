@@ -104,7 +104,7 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
 
 /// Checks that the table has a y column if relays may leave the line. `altitude` is an alias of `joint`.
 #[test]
-fn the_table_has_y_where_there_is_room_beside_the_line() {
+fn the_table_has_y_if_lateral_offsets_are_allowed() {
     let side = example("side.toml");
     let table = |arguments: &str| String::from_utf8(chain(arguments).stdout).unwrap();
     let beside = table(&format!("--scenario {side} --uavs 2 --method altitude"));
@@ -145,7 +145,7 @@ fn example(name: &str) -> String {
 }
 
 #[test]
-fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
+fn an_infeasible_chain_gives_status_1_and_a_reason_in_json() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("on-top.toml");
     let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 1000\ny_m = 0\n";
@@ -171,7 +171,7 @@ fn what_cannot_be_placed_is_status_1_with_the_reason_in_the_json() {
 }
 
 #[test]
-fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
+fn a_killed_relay_on_wires_breaks_the_chain_as_reported() {
     let output = chain("--json --uavs 4 --kill 2@0.01 --wires");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -195,7 +195,7 @@ fn on_wires_a_killed_relay_breaks_the_chain_and_the_report_says_who_noticed() {
 }
 
 #[test]
-fn a_relay_that_is_described_and_not_there_is_refused() {
+fn an_override_of_a_relay_beyond_the_chain_is_refused() {
     let example = example("scenario.toml");
     let output = chain(&format!("--uavs 4 --scenario {example}"));
     assert_eq!(output.status.code(), Some(2));
@@ -304,7 +304,7 @@ const IGNORED: &[&str] = &[
 ];
 
 #[test]
-fn what_is_wrong_is_named_with_what_is_allowed() {
+fn errors_name_the_value_and_what_is_allowed() {
     insta::assert_snapshot!(refusals(WRONG));
 }
 
@@ -315,7 +315,7 @@ fn an_option_that_would_be_ignored_is_refused() {
 
 /// Checks that options are accepted where they have an effect. They are refused where they have none.
 #[test]
-fn an_option_that_is_of_use_is_taken() {
+fn a_useful_option_is_accepted() {
     for arguments in [
         "--uavs 2 --method align-step --epsilon 0.5",
         "--uavs 2 --method adjust --rounds 3 --explore 2 --grid 5x5 --no-predict --tolerance 0.001",
@@ -331,7 +331,7 @@ fn an_option_that_is_of_use_is_taken() {
 
 /// Checks that an error names keys of the scenario file if the user gave such a file.
 #[test]
-fn who_has_a_scenario_is_told_its_keys() {
+fn errors_with_a_scenario_file_name_its_keys() {
     let output = chain(&format!(
         "--scenario {} --uavs 999",
         example("scenario.toml")
@@ -345,7 +345,7 @@ fn who_has_a_scenario_is_told_its_keys() {
 
 /// Checks that a report never says that an upload was not adopted if relays have adopted it.
 #[test]
-fn what_was_adopted_is_not_denied() {
+fn an_adopted_upload_is_never_reported_as_not_adopted() {
     for (arguments, is_denied) in [
         ("--uavs 2 --upload 20 --kill 1@40", false),
         ("--wires --upload 20 --kill 4@20", true),
@@ -363,7 +363,7 @@ fn what_was_adopted_is_not_denied() {
 
 /// Checks that a closed output pipe changes no exit status and causes no panic.
 #[test]
-fn whoever_does_not_listen_changes_no_status() {
+fn a_closed_output_changes_no_exit_status() {
     let several = example("multi_interferer.toml");
     for (arguments, status) in [
         ("--uavs 3", 0),
@@ -442,7 +442,7 @@ fn cpu_of_children() -> [f64; 2] {
 
 #[test]
 #[ignore = "builds the simulator anew, and measures CPU time, so that other work disturbs it"]
-fn the_first_command_takes_at_most_60_s_of_cpu_time() {
+fn the_first_command_builds_in_60_s_of_cpu_time() {
     let empty = tempfile::tempdir().unwrap();
     let before = cpu_of_children();
     let output = Command::new(env!("CARGO"))

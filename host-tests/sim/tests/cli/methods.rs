@@ -7,7 +7,7 @@ use uav_relay_scenario::scene::Scene;
 use super::{chain, example, json, refusal};
 
 #[test]
-fn a_way_back_is_flown_by_align_and_refused_by_the_other_methods() {
+fn a_way_back_is_accepted_by_align_only() {
     let file = std::env::temp_dir().join(format!("way_back_{}.toml", std::process::id()));
     let text = uav_relay_scenario::DEFAULT;
     std::fs::write(&file, format!("{text}\n[link]\nreverse = 1.0\n")).unwrap();
@@ -41,7 +41,7 @@ fn the_fixed_step_reports_the_papers_sweeps() {
 }
 
 #[test]
-fn a_method_says_what_scenario_it_needs() {
+fn a_method_names_the_scenario_it_needs() {
     for method in ["stochastic", "stochastic-step"] {
         let (status, line) = refusal(&format!("--method {method}"));
         assert_eq!(status, 2);
@@ -112,7 +112,7 @@ fn the_joint_figures_hold() {
 }
 
 #[test]
-fn a_field_is_flown_by_what_was_agreed_or_by_what_is_measured() {
+fn a_field_is_flown_by_agreement_or_by_measurements() {
     let file = example("field.toml");
     let agreed = json(&format!("--scenario {file} --method stochastic"));
     assert_eq!(agreed["sweeps"].as_u64(), Some(1));
@@ -133,7 +133,7 @@ fn a_field_is_flown_by_what_was_agreed_or_by_what_is_measured() {
 }
 
 #[test]
-fn a_step_that_is_too_large_says_so() {
+fn a_too_large_step_is_reported() {
     let output = chain(&format!(
         "--json --scenario {} --method stochastic-step --epsilon 0.2",
         example("field.toml")
@@ -172,7 +172,7 @@ fn every_method_can_be_drawn() {
 }
 
 #[test]
-fn relays_of_a_scenario_keep_what_they_hold() {
+fn relays_keep_the_fixed_altitudes_of_the_scenario() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("mixed.toml");
     let text = "[geometry]\ndistance_m = 1000.0\naltitude_m = 20.0\n[power]\ntx_w = 80.0\nuav_w = 1.0\n[[interferer]]\npower_w = 80.0\nx_m = 500.0\ny_m = 400.0\n[[relay]]\nindex = 3\naltitude_m = 30.0\npower_w = 0.5\n";
@@ -203,7 +203,7 @@ fn relays_of_a_scenario_keep_what_they_hold() {
 }
 
 #[test]
-fn several_interferers_are_flown_as_one_and_a_note_says_so() {
+fn several_interferers_are_flown_as_one_with_a_note() {
     let several = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../examples/multi_interferer.toml"

@@ -65,7 +65,7 @@ fn the_promised_rate_is_delivered() {
 /// All nine hops have the same SIR, so fitted slots are equal slots, and separate frequencies carry nine times as
 /// much.
 #[test]
-fn access_of_the_scenario_decides() {
+fn the_scenarios_access_method_is_used() {
     let folder = tempfile::tempdir().unwrap();
     let rate = |access: &str| {
         let file = folder.path().join(format!("{access}.toml"));

@@ -37,7 +37,7 @@ fn whats(report: &Value, what: &str) -> usize {
 ///
 /// Covers wires and radio, uploads from Tx and from Rx, and good and bad links.
 #[test]
-fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it() {
+fn an_upload_ends_as_if_the_mission_had_been_loaded() {
     let folder = tempfile::tempdir().unwrap();
     let expected = from_the_start(&folder, "");
     let loss = "--loss 0.3 --corrupt 0.1 --seed 3";
@@ -78,7 +78,7 @@ fn the_chain_ends_where_one_that_took_off_with_it_does_and_the_report_is_of_it()
 }
 
 #[test]
-fn without_an_upload_nothing_is_said_of_one() {
+fn without_an_upload_the_report_mentions_none() {
     for report in [json(""), json("--kill 4@20")] {
         assert!(report.get("version").is_none());
         assert!(report["relays"][0].get("version").is_none());
@@ -86,7 +86,7 @@ fn without_an_upload_nothing_is_said_of_one() {
 }
 
 #[test]
-fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
+fn an_upload_is_in_the_timeline_and_the_picture() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("upload.svg");
     let file_name = file.to_str().unwrap();
@@ -122,7 +122,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
 
 /// Checks that versions of uploads are numbered by time, not by the order of the options.
 #[test]
-fn of_two_uploads_the_later_one_is_flown() {
+fn the_later_of_two_uploads_is_flown() {
     let folder = tempfile::tempdir().unwrap();
     let report = json("--upload 60:x_m=800,y_m=-300 --upload 20:power_w=30");
     assert_eq!(report["version"].as_u64(), Some(2));
@@ -137,7 +137,7 @@ fn of_two_uploads_the_later_one_is_flown() {
 
 /// Checks that an upload of all parameters has the same result as a scenario file with these values.
 #[test]
-fn every_key_is_that_of_a_scenario_file() {
+fn every_upload_key_is_a_scenario_key() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("other.toml");
     let text = "[geometry]\ndistance_m = 900\naltitude_m = 60\naltitude_min_m = 40\naltitude_max_m = 120\nlateral_min_m = -30\nlateral_max_m = 40\nmin_separation_m = 5\n[power]\ntx_w = 70\nuav_w = 2\n[[interferer]]\npower_w = 60\nx_m = 300\ny_m = 200\n";
@@ -181,7 +181,7 @@ fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
 ///
 /// It is lost before, during or after the upload.
 #[test]
-fn the_relays_that_are_left_fly_it() {
+fn the_remaining_relays_fly_the_upload() {
     let folder = tempfile::tempdir().unwrap();
     let seven = from_the_start(&folder, "--uavs 7");
     for at in ["5", "20.05", "25", "60"] {
@@ -194,7 +194,7 @@ fn the_relays_that_are_left_fly_it() {
 }
 
 #[test]
-fn on_wires_nothing_gets_past_a_silent_relay_and_the_status_is_1() {
+fn a_silent_relay_on_wires_stops_an_upload() {
     let output = chain("--json --upload 20:x_m=800 --kill 4@20 --wires");
     assert_eq!(output.status.code(), Some(1));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -208,7 +208,7 @@ fn on_wires_nothing_gets_past_a_silent_relay_and_the_status_is_1() {
 }
 
 #[test]
-fn an_attacker_changes_nothing_of_it() {
+fn an_attack_has_no_effect_on_an_upload() {
     let run = format!("--upload {MOVED} --forge 2000 --replay 2000");
     let report = json(&run);
     let attack = &report["attack"];
@@ -224,7 +224,7 @@ fn an_attacker_changes_nothing_of_it() {
 }
 
 #[test]
-fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
+fn an_upload_changes_the_hypothetical_interferer() {
     let file = example("multi_interferer.toml");
     let output = chain(&format!("--scenario {file} --upload 20:x_m=500 --json"));
     assert!(output.status.success());

@@ -8,7 +8,7 @@ use uav_relay_scenario::deployment::{Companion, Deployment, agree};
 use uav_relay_scenario::link::{Access, BandwidthError, Radio};
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{Failure, number, whole};
-use uav_relay_sim::svg::{Picture, room};
+use uav_relay_sim::svg::{Picture, lateral_view};
 use uav_relay_sim::{command, svg};
 use uav_relay_tools::plan;
 use uav_relay_tools::plan::flown::{flown, planned, with_plan};
@@ -61,7 +61,7 @@ fn run(options: &Options) -> Result<(), Failure> {
             rates,
         }) => {
             let uavs = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
-            if let Some(line) = mission::left_out(&scenario, uavs) {
+            if let Some(line) = mission::undescribed_relay_error(&scenario, uavs) {
                 return Err(Failure::input(format!("{}: {line}", options.file())));
             }
             if let Some(file) = &options.svg {
@@ -215,7 +215,7 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
             .iter()
             .map(|(place, _)| (f64::from(place.x_m), f64::from(place.altitude_m)))
             .collect(),
-        room: room(
+        lateral_view: lateral_view(
             &plan.mission,
             plan.places.iter().map(|(place, _)| f64::from(place.y_m)),
             &scenario.sources(),

@@ -53,7 +53,7 @@ fn run(options: &Options) -> Result<String, String> {
     {
         return Err(format!("--index {index}: must be within 1 to {uavs}"));
     }
-    if let Some(line) = mission::left_out(scenario, *uavs) {
+    if let Some(line) = mission::undescribed_relay_error(scenario, *uavs) {
         return Err(format!("{name}: {line}"));
     }
     let secret = asked.secret()?;

@@ -38,7 +38,7 @@ impl Chain {
 /// Returns the best chain of relays at one common altitude, with any powers; exact except for rounding.
 ///
 /// Tested to 1e-9 against the reference for one interferer and to 1e-6 against brute force for several
-/// (`of_one_source_it_is_the_optimum_of_the_reference`, `brute_force_finds_the_same` in
+/// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in
 /// `host-tests/tests/multi_interferer`).
 ///
 /// If the least separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a

@@ -245,7 +245,7 @@ impl ProfiledMission {
         Ok(Self {
             mission,
             own,
-            held: mission::held(scenario, relays),
+            held: mission::fixed_altitude_relays(scenario, relays),
         })
     }
 

@@ -128,7 +128,7 @@ impl Flight {
             mission,
             numbers: channel_numbers(&scenario.channel),
             own,
-            held: mission::held(scenario, uavs),
+            held: mission::fixed_altitude_relays(scenario, uavs),
             method: Method::Align,
             measure: None,
             listen: scenario.listen.map(|listen| listen.of(uavs)),

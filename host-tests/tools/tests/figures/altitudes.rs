@@ -2,7 +2,7 @@
 
 use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
-use uav_relay_oracle::reference::{Link, Station, joint};
+use uav_relay_oracle::reference::{Link, Relay, joint};
 use uav_relay_tools::figures::altitude::best_common;
 use uav_relay_tools::figures::aside::{ALTITUDES_M, MOST_ROOM_M, OFFSETS_M, RELAY_W, ROOM_M};
 
@@ -13,7 +13,7 @@ fn link(relays: usize, y_i: f64, altitude_m: f64) -> Link {
         y_i,
         min_separation_m: 4.0,
         relays: vec![
-            Station {
+            Relay {
                 altitude_m,
                 power_w: 1.0
             };
@@ -24,7 +24,7 @@ fn link(relays: usize, y_i: f64, altitude_m: f64) -> Link {
 }
 
 #[test]
-fn chains_at_one_altitude_are_the_judges() {
+fn chains_at_one_altitude_agree_with_the_reference() {
     let table = Table::read("altitude");
     for y in [100.0, 150.0, 200.0, 300.0, 400.0] {
         for altitude in [10.0, 100.0, 205.0, 220.0, 400.0] {
@@ -37,7 +37,7 @@ fn chains_at_one_altitude_are_the_judges() {
 
 /// Checks the figure's SIRs with the paper's step of 0.1 against the reference, at 195 m to 230 m.
 #[test]
-fn the_step_ends_where_the_judge_says() {
+fn the_step_ends_where_the_reference_does() {
     let table = Table::read("altitude");
     for altitude in [195.0, 205.5, 209.5, 220.0, 230.0] {
         let row = table.row(&[("interferer_y_m", 150.0), ("altitude_m", altitude)]);
@@ -55,7 +55,7 @@ fn the_step_ends_where_the_judge_says() {
 }
 
 #[test]
-fn the_best_common_altitude_is_the_reference_programs() {
+fn the_best_common_altitude_agrees_with_the_reference() {
     let (altitude, sir) = best_common(50, 150.0).unwrap();
     println!("{altitude} m, SIR {sir}");
     assert!((altitude - 209.42).abs() < 1.0, "{altitude}");
@@ -65,7 +65,7 @@ fn the_best_common_altitude_is_the_reference_programs() {
 const CORRIDOR: Corridor = Corridor::plane(20.0 - 1e-3, 300.0 + 1e-3);
 
 #[test]
-fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
+fn chain_shapes_have_the_sir_of_their_round() {
     let (shapes, rounds) = (Table::read("shapes"), Table::read("rounds"));
     for round in [0.0, 10.0, 50.0, 500.0] {
         let rows = shapes.rows(&[("round", round)]);
@@ -103,7 +103,7 @@ fn shapes_have_the_sir_of_their_round_and_keep_the_rules() {
 ///
 /// The SIR never falls, and stays below the joint optimum. The search on a coarse grid gains nothing.
 #[test]
-fn rounds_rise_as_exact_local_search_does_and_a_coarse_grid_gains_nothing() {
+fn rounds_rise_as_exact_local_search_does() {
     let table = Table::read("rounds");
     let rows = table.rows(&[]);
     assert_eq!(rows.len(), 501);
@@ -125,7 +125,7 @@ fn rounds_rise_as_exact_local_search_does_and_a_coarse_grid_gains_nothing() {
 }
 
 #[test]
-fn common_and_joint_altitudes_are_the_reference_programs() {
+fn common_and_joint_altitudes_agree_with_the_reference() {
     let table = Table::read("joint");
     for (relays, common, optimum) in [
         (2.0, 0.881_533_2, 0.881_533_886_7),
@@ -166,7 +166,7 @@ fn common_and_joint_altitudes_are_the_reference_programs() {
 fn link_of_one(y_i: f64) -> Link {
     Link {
         y_i,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: ALTITUDES_M.0,
             power_w: RELAY_W,
         }],
@@ -189,7 +189,7 @@ fn judged(y_i: f64, room_m: f64, most_m: f64) -> f64 {
 }
 
 #[test]
-fn the_places_beside_the_line_are_the_judges() {
+fn lateral_positions_agree_with_the_reference() {
     let table = Table::read("aside");
     for offset in OFFSETS_M {
         let rows = table.rows(&[("interferer_y_m", offset)]);
@@ -212,7 +212,7 @@ fn the_places_beside_the_line_are_the_judges() {
 }
 
 #[test]
-fn what_side_and_altitude_gain_is_what_the_judge_says() {
+fn gains_by_side_and_altitude_agree_with_the_reference() {
     let table = Table::read("aside-gain");
     for row in table.rows(&[]) {
         let y = row.number("interferer_y_m");

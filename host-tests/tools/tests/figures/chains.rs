@@ -3,7 +3,7 @@
 use uav_relay_oracle::cases;
 use uav_relay_oracle::cases::OPTIMA;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_tools::figures::stochastic::{Kind, mission};
 use uav_relay_tools::figures::walk;
 
@@ -14,7 +14,7 @@ fn link(relays: usize, x_i: f64, y_i: f64, power_w: f64) -> Link {
         x_i,
         y_i,
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 20.0,
                 power_w
             };
@@ -58,7 +58,7 @@ fn the_fewest_relays_meet_the_target_and_one_fewer_do_not() {
 }
 
 #[test]
-fn the_fewest_relays_are_the_reference_programs() {
+fn the_fewest_relays_agree_with_the_reference() {
     let by_power = Table::read("fewest-by-power");
     let by_place = Table::read("fewest-by-place");
     for case in cases::of("min_uavs").unwrap() {
@@ -86,7 +86,7 @@ fn the_fewest_relays_are_the_reference_programs() {
 ///
 /// The page of the figures says so.
 #[test]
-fn the_fewest_relays_move_as_it_is_said() {
+fn the_fewest_relays_change_as_the_text_says() {
     let by_place = Table::read("fewest-by-place");
     let at = |x: f64, y: f64, target: f64| {
         let of = [
@@ -134,7 +134,7 @@ fn stretched(link: &Link, target: f64) -> Vec<f64> {
 }
 
 #[test]
-fn sweeps_come_to_what_the_judge_makes_of_their_targets() {
+fn sweeps_have_the_references_positions_for_their_targets() {
     let table = Table::read("convergence");
     for relays in [2_u16, 8, 20, 50, 100] {
         let rows = table.rows(&[("relays", f64::from(relays))]);
@@ -153,7 +153,7 @@ fn sweeps_come_to_what_the_judge_makes_of_their_targets() {
 }
 
 #[test]
-fn the_step_settles_where_the_reference_says() {
+fn the_step_settles_where_the_reference_does() {
     let table = Table::read("convergence");
     for (relays, sweeps) in [(2_u16, 10_245.0), (8, 10_237.0), (100, 9857.0)] {
         let rows = table.rows(&[("relays", f64::from(relays))]);
@@ -166,7 +166,7 @@ fn the_step_settles_where_the_reference_says() {
 }
 
 #[test]
-fn gains_are_over_what_the_references_have() {
+fn gains_are_relative_to_the_references_baselines() {
     let table = Table::read("gain");
     for (relays, optimum) in OPTIMA {
         let row = table.row(&[("relays", f64::from(relays))]);
@@ -206,7 +206,7 @@ fn gains_are_over_what_the_references_have() {
 }
 
 #[test]
-fn settling_costs_what_the_schedules_take() {
+fn the_cost_of_settling_is_that_of_the_schedules() {
     let table = Table::read("cost");
     for row in table.rows(&[]) {
         let relays = row.number("relays");
@@ -324,7 +324,7 @@ fn field_link(field: &str, relays: usize) -> StochasticLink {
             })
             .collect(),
         relays: vec![
-            Station {
+            Relay {
                 altitude_m: 20.0,
                 power_w: 1.0
             };
@@ -334,7 +334,7 @@ fn field_link(field: &str, relays: usize) -> StochasticLink {
 }
 
 #[test]
-fn the_fields_are_what_is_said_of_them() {
+fn the_fields_are_as_the_text_says() {
     let lambda = 1.0 / (Link::paper(1).eta * 400.0);
     let even = field_link("even", 1);
     let case = &cases::of("algorithm4").unwrap()[0];
@@ -359,7 +359,7 @@ fn the_fields_are_what_is_said_of_them() {
 }
 
 #[test]
-fn sweeps_of_algorithm_4_are_the_judges() {
+fn sweeps_of_algorithm_4_agree_with_the_reference() {
     let table = Table::read("stochastic");
     for field in ["uneven", "even"] {
         for relays in [10_u16, 20, 30, 40, 50] {
@@ -412,7 +412,7 @@ fn algorithm_4_ends_where_the_reference_program_does() {
 ///
 /// The page of the figures says so.
 #[test]
-fn a_step_of_a_tenth_finds_next_to_nothing_for_eight_relays() {
+fn a_step_of_a_tenth_finds_little_for_eight_relays() {
     let last = |relays: u16| {
         let mission = mission(Kind::Even, relays).unwrap();
         let sweep = walk::descent(&mission, 0.1).unwrap().pop().unwrap();

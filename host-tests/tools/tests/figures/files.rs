@@ -50,7 +50,7 @@ fn every_figure_is_written_and_the_page_names_every_file() {
 }
 
 #[test]
-fn no_file_has_a_number_that_is_none() {
+fn no_file_contains_nan_or_infinity() {
     for file in files().iter().chain([&"index.html".to_owned()]) {
         let text = fs::read_to_string(written().join(file)).unwrap();
         let words = text.split(|c: char| !c.is_alphanumeric());
@@ -64,7 +64,7 @@ fn no_file_has_a_number_that_is_none() {
 }
 
 #[test]
-fn tables_say_what_was_taken_and_their_heads_have_units() {
+fn tables_state_their_scenario_and_units() {
     let bare = [
         "relays",
         "relay",
@@ -124,7 +124,7 @@ fn extent(text: &Node<'_, '_>) -> (f64, f64) {
 }
 
 #[test]
-fn pictures_are_documents_whose_words_are_inside() {
+fn pictures_are_valid_and_their_text_is_inside() {
     for figure in ALL {
         let text = fs::read_to_string(written().join(format!("{}.svg", figure.name))).unwrap();
         let document = Document::parse(&text).unwrap();
@@ -195,7 +195,7 @@ fn a_second_run_writes_the_same_bytes() {
 }
 
 #[test]
-fn a_wrong_name_is_answered_with_the_right_ones() {
+fn a_wrong_figure_name_lists_the_right_ones() {
     let output = figures("--only locus --only nothing");
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty());
@@ -211,7 +211,7 @@ fn a_wrong_name_is_answered_with_the_right_ones() {
 }
 
 #[test]
-fn a_place_that_cannot_be_written_is_named() {
+fn an_unwritable_folder_is_named() {
     let dir = TempDir::new().unwrap();
     let file = dir.path().join("file");
     fs::write(&file, "").unwrap();
@@ -249,7 +249,7 @@ fn the_page_begins_with_its_contents() {
 }
 
 #[test]
-fn every_finished_figure_is_told() {
+fn every_finished_figure_is_reported() {
     let folder = TempDir::new().unwrap();
     let names = [ALL[0].name, ALL[1].name];
     let out = folder.path().to_str().unwrap();

@@ -1,7 +1,7 @@
 //! Single relay: the equal-SIR locus, the best position by altitude, and the readings of the gain.
 
 use uav_relay_oracle::cases;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 use uav_relay_tools::figures::locus::CHOICES;
 use uav_relay_tools::figures::single::{ALTITUDES_M, REALISATIONS};
 
@@ -15,7 +15,7 @@ fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
         interferer_w: 20.0,
         x_i: 30.0,
         y_i: 30.0,
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m: f64::from(altitude_m),
             power_w: relay_w,
         }],
@@ -30,7 +30,7 @@ fn locus_link(row: &super::Row<'_>, altitude_m: f64) -> Link {
         tx_w: row.number("tx_w"),
         x_i: row.number("interferer_x_m"),
         y_i: row.number("interferer_y_m"),
-        relays: vec![Station {
+        relays: vec![Relay {
             altitude_m,
             power_w: 1.0,
         }],
@@ -71,7 +71,7 @@ fn both_hops_are_equal_on_the_locus_and_nowhere_between() {
 }
 
 #[test]
-fn the_locus_is_the_reference_programs() {
+fn the_locus_agrees_with_the_reference() {
     let table = Table::read("locus");
     for (tx, (x, y)) in CHOICES {
         let of = [("tx_w", tx), ("interferer_x_m", x), ("interferer_y_m", y)];
@@ -96,7 +96,7 @@ fn the_locus_is_the_reference_programs() {
 
 /// Checks that more Tx power shifts the locus of equal SIR to Rx, a nearer interferer shifts it down.
 #[test]
-fn the_locus_moves_as_it_is_said_to() {
+fn the_locus_moves_as_the_text_says() {
     let table = Table::read("locus");
     let upper = |tx: f64, y: f64, x: f64| {
         let of = [("tx_w", tx), ("interferer_y_m", y), ("x_m", x)];
@@ -115,7 +115,7 @@ fn the_locus_moves_as_it_is_said_to() {
 }
 
 #[test]
-fn the_best_place_and_the_baselines_are_the_references() {
+fn the_optimum_and_baselines_agree_with_the_reference() {
     let table = Table::read("single");
     let (low, high) = ALTITUDES_M;
     for (tx, relay) in REALISATIONS {
@@ -181,7 +181,7 @@ fn blind(link: &Link) -> f64 {
 }
 
 #[test]
-fn every_reading_of_the_gain_is_what_it_says() {
+fn every_definition_of_the_gain_has_its_value() {
     let table = Table::read("single-gains");
     let (low, high) = ALTITUDES_M;
     let (tx, relay) = REALISATIONS[0];
@@ -235,7 +235,7 @@ fn every_reading_of_the_gain_is_what_it_says() {
 
 /// Checks that no pair of powers has the printed gain of 30.14 % over random positions in linear SIR.
 #[test]
-fn no_linear_reading_comes_near_what_is_printed() {
+fn no_linear_definition_gives_the_papers_gain() {
     let table = Table::read("single-gains");
     let rows = table.rows(&[]);
     assert_eq!(rows.len(), 17 * 17 * 4);

@@ -46,7 +46,7 @@ fn example() -> Vec<Piece> {
 }
 
 #[test]
-fn an_image_is_stored_where_its_elf_says_and_blank_in_between() {
+fn an_image_has_its_elfs_addresses_and_blank_gaps() {
     let whole = flat(&example()).unwrap();
     assert_eq!(whole.address, 0x1000_0000);
     assert_eq!(whole.bytes.len(), 0x3_0005);
@@ -111,7 +111,7 @@ fn a_uf2_file_has_whole_blocks_with_whole_pages() {
 }
 
 #[test]
-fn what_is_no_image_is_refused_in_one_line() {
+fn an_invalid_image_is_refused_in_one_line() {
     assert!(pieces(b"no ELF").unwrap_err().starts_with("not an ELF"));
     let nothing = pieces(&elf(&[])).unwrap_err();
     assert_eq!(nothing, "an ELF with nothing to load");
@@ -128,7 +128,7 @@ fn image(arguments: &str) -> Output {
 }
 
 #[test]
-fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
+fn a_block_becomes_files_and_an_invalid_one_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     std::fs::write(path("relay3.bin"), [5; LEN]).unwrap();
@@ -159,7 +159,7 @@ fn a_block_becomes_files_for_its_place_and_what_is_none_is_refused() {
 
 /// Checks that each board's block is outside its image, so that flashing an image keeps the block.
 #[test]
-fn a_board_has_its_block_where_its_memory_says_that_no_image_reaches() {
+fn a_boards_block_is_at_an_address_beyond_any_image() {
     let embassy = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/embassy");
     for (board, folder) in [
         ("stm32f405-embassy", "stm32f405"),

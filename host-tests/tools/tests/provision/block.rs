@@ -47,7 +47,7 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
 const PAPER: ([f32; 3], &[u8]) = ([80.0, 500.0, 400.0], &[]);
 
 #[test]
-fn a_block_is_what_the_table_says() {
+fn a_block_follows_the_table() {
     assert_eq!(by_hand((0, false, 0.0, 0), [20.0; 2], PAPER), paper());
 
     let mut scenario = Scenario {
@@ -88,7 +88,7 @@ fn a_block_is_what_the_table_says() {
 }
 
 #[test]
-fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
+fn the_silence_limit_is_in_the_block_and_the_settings() {
     let flight = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
     let usual = flight.block(3).unwrap();
     let block = flight.asking_after(0x0102).block(3).unwrap();
@@ -110,7 +110,7 @@ fn the_silence_is_in_the_block_and_in_the_settings_of_the_drone() {
 }
 
 #[test]
-fn a_drone_reads_what_it_is_to_do() {
+fn a_drone_reads_its_task_from_the_block() {
     let scenario = Scenario {
         altitude_max_m: 120.0,
         ..Scenario::load(&example()).unwrap()
@@ -140,7 +140,7 @@ fn a_drone_reads_what_it_is_to_do() {
 }
 
 #[test]
-fn a_block_that_cannot_say_it_is_not_written() {
+fn a_block_that_cannot_hold_the_values_is_not_written() {
     let too_many = Flight::new(&in_a_field(17), 5, 1e-4, 7);
     assert_eq!(too_many.err(), Some(BlockError::Points(17)));
     let grid = Adjust {
@@ -178,7 +178,7 @@ fn a_block_that_cannot_say_it_is_not_written() {
 }
 
 #[test]
-fn a_drone_reads_the_very_mission_of_the_scenario() {
+fn a_drone_reads_the_scenarios_exact_mission() {
     let scenario = Scenario::load(&example()).unwrap();
     let flight = Flight::new(&scenario, 6, 1e-3, 9).unwrap();
     for index in 1..=6 {
@@ -201,7 +201,7 @@ fn a_drone_reads_the_very_mission_of_the_scenario() {
 }
 
 #[test]
-fn no_bit_can_flip_unnoticed() {
+fn every_flipped_bit_of_a_block_is_noticed() {
     for (at, of) in (0..LEN).zip([paper(), field(4)].iter().cycle()) {
         for bit in 0..8 {
             let mut block = *of;

@@ -28,7 +28,7 @@ fn the_command_writes_the_block() {
 }
 
 #[test]
-fn the_command_writes_what_the_relay_is_to_do() {
+fn the_command_writes_the_relays_task() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("relay.bin");
     let file = folder.path().join("field.toml");
@@ -77,7 +77,7 @@ fn toml(points: usize) -> String {
 }
 
 #[test]
-fn what_is_wrong_is_said_in_one_line() {
+fn errors_are_reported_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().to_str().unwrap();
     for points in [3, 17] {
@@ -155,7 +155,7 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
 }
 
 #[test]
-fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
+fn the_block_has_the_networks_method_and_baud() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("relay.bin");
     let file = folder.path().join("chain.toml");
@@ -337,7 +337,7 @@ fn is_provisioned(scenario: &Scenario, dir: &Path, index: u16, summary: &str) {
 }
 
 #[test]
-fn a_plan_goes_to_every_drone() {
+fn a_plan_is_written_to_every_block() {
     let folder = tempfile::tempdir().unwrap();
     let [file, key, dir] = ["plan.toml", "key.txt", "blocks"].map(|name| folder.path().join(name));
     let decibels = text(&example().with_file_name("decibels.toml"));
@@ -401,7 +401,7 @@ fn a_plan_goes_to_every_drone() {
 }
 
 #[test]
-fn a_joint_plan_is_flown_jointly_and_planned_anew_in_place() {
+fn a_joint_plan_sets_the_joint_method() {
     let folder = tempfile::tempdir().unwrap();
     let [file, dir] = ["plan.toml", "blocks"].map(|name| text(&folder.path().join(name)));
     let altitudes = text(&example().with_file_name("altitudes.toml"));
@@ -461,7 +461,7 @@ fn all_or_none_is_written() {
 }
 
 #[test]
-fn what_does_not_go_together_is_said_in_one_line() {
+fn conflicting_options_are_reported_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let [file, old, dir] =
         ["plan.toml", "old.toml", "blocks"].map(|name| text(&folder.path().join(name)));
@@ -510,7 +510,7 @@ fn what_does_not_go_together_is_said_in_one_line() {
 ///
 /// The error states the loss against the planner's best positions.
 #[test]
-fn a_stand_in_that_loses_too_much_is_refused_and_measured() {
+fn a_poor_hypothetical_interferer_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let [out, dir] = ["block.bin", "blocks"].map(|name| text(&folder.path().join(name)));
     let several = text(&example().with_file_name("multi_interferer.toml"));
@@ -565,7 +565,7 @@ fn for_the_firmware(text: &str) -> String {
 }
 
 #[test]
-fn the_next_command_takes_the_file() {
+fn the_printed_next_command_accepts_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let [scenario, file, dir, key] =
         ["mine.toml", "plan.toml", "blocks", "network7.key"].map(|name| folder.path().join(name));

@@ -23,7 +23,7 @@ fn plain_flight() -> Flight {
 }
 
 #[test]
-fn key_and_epoch_stand_where_the_table_says() {
+fn key_and_epoch_are_at_the_tables_offsets() {
     let block = plain_flight().signed(Some(SECRET)).block(3).unwrap();
     let mut bytes = [4, 3, 2, 1].to_vec();
     bytes.extend(SECRET.key);
@@ -87,7 +87,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
 }
 
 #[test]
-fn a_bad_key_is_named_and_not_shown() {
+fn a_bad_key_is_reported_without_its_value() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file) = (path("block.bin"), path("key"));
@@ -180,7 +180,7 @@ const ENDS: [[i32; 3]; 2] = [
 ];
 
 #[test]
-fn sites_stand_where_the_table_says() {
+fn sites_are_at_the_tables_offsets() {
     let block = flight().no_faster_than(7.5).block(3).unwrap();
     let mut bytes = Vec::new();
     for number in ENDS.as_flattened() {
@@ -214,7 +214,7 @@ fn the_line_is_that_of_the_scenario() {
 }
 
 #[test]
-fn what_is_wrong_with_sites_is_named() {
+fn errors_of_sites_are_named() {
     let block = flight().block(3).unwrap();
     for speed in [f32::NAN, -1.0, 0.099, 20.1, -0.0] {
         let block = changed(block, 312, &speed.to_le_bytes());
@@ -273,7 +273,7 @@ fn what_is_wrong_with_sites_is_named() {
 }
 
 #[test]
-fn the_command_has_them_from_the_scenario() {
+fn the_command_takes_the_sites_from_the_scenario() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file, off) = (path("block.bin"), path("site.toml"), path("off.toml"));
@@ -303,7 +303,7 @@ fn the_command_has_them_from_the_scenario() {
 const KEY: [u8; 32] = [0x4B; 32];
 
 #[test]
-fn the_key_of_an_autopilot_stands_behind_the_sites_and_is_none_without_them() {
+fn an_autopilots_key_follows_the_sites() {
     let block = flight().signed_to_autopilots(Some(KEY)).block(3).unwrap();
     assert_eq!(block[316..348], KEY);
     assert_eq!(autopilot_key(&block), Some(KEY));
@@ -315,7 +315,7 @@ fn the_key_of_an_autopilot_stands_behind_the_sites_and_is_none_without_them() {
 }
 
 #[test]
-fn provision_has_the_key_of_the_autopilot_from_a_file() {
+fn provision_reads_the_autopilots_key_from_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (out, file, sites) = (path("block.bin"), path("key"), path("sites.toml"));
@@ -346,7 +346,7 @@ fn listening_flight(toml: &str) -> Flight {
 }
 
 #[test]
-fn what_the_relays_do_not_know_stands_as_nothing() {
+fn an_unknown_interferer_is_stored_as_none() {
     let block = listening_flight("[listen]\n").block(3).unwrap();
     assert_eq!(block[44..56], [0; 12]);
     let config = reads(&block).unwrap();
@@ -358,7 +358,7 @@ fn what_the_relays_do_not_know_stands_as_nothing() {
 }
 
 #[test]
-fn listening_stands_where_the_table_says() {
+fn listening_is_at_the_tables_offsets() {
     let toml = "[listen]\nevery_s = 0.25\nhalf_life_s = 1e12\nrelative_error = 0.5\n";
     let block = listening_flight(&format!("{SOURCE}{toml}"))
         .block(3)
@@ -416,7 +416,7 @@ fn the_ranges_are_those_of_a_relay() {
 
 /// Checks that relays in an interference field cannot be set to locate an interferer.
 #[test]
-fn a_field_has_nothing_to_find() {
+fn a_field_is_refused_with_listening() {
     let mut scenario = super::in_a_field(3);
     scenario.listen = Some(uav_relay_scenario::ListenSpec::default());
     let flight = Flight::new(&scenario, 5, 1e-4, 7).unwrap();
@@ -427,7 +427,7 @@ fn a_field_has_nothing_to_find() {
 }
 
 #[test]
-fn the_command_takes_it_from_the_scenario() {
+fn the_command_takes_listening_from_the_scenario() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (toml, out) = (path("listen.toml"), path("relay.bin"));

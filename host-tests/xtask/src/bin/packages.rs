@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_of_the_registry_is_named() {
+    fn packages_outside_the_registry_are_named() {
         let lock = "source = \"registry+one\"\nsource = \"git+two\"\n";
         assert_eq!(elsewhere(lock).len(), 1);
     }

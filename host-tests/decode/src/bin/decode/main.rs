@@ -12,9 +12,9 @@ use uav_relay_command::{Failure, ended, usage};
 use uav_relay_decode::dissector;
 use uav_relay_decode::format::Format;
 use uav_relay_decode::frame;
-use uav_relay_decode::members::Members;
 use uav_relay_decode::shown::{Shown, json, text};
-use uav_relay_decode::source::{self, Item, Packet, Trouble};
+use uav_relay_decode::source::{self, Item, Packet, SourceError};
+use uav_relay_decode::tags::TagVerifier;
 use uav_relay_scenario::key;
 
 use options::Options;
@@ -35,7 +35,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let key = key.map(|file| key::load("--key", file)).transpose();
     let mut printer = Printer {
         format: &format,
-        members: Members::new(key.map_err(Failure::input)?),
+        tags: TagVerifier::new(key.map_err(Failure::input)?),
         json: options.json,
         number: 0,
         out: BufWriter::new(io::stdout().lock()),
@@ -44,15 +44,15 @@ fn run(options: &Options) -> Result<(), Failure> {
     match source::read(input, |item| printer.take(item)) {
         Ok(()) => Ok(()),
         // A reader that closes the pipe, such as `head`, is not an error.
-        Err(Trouble::Taken(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        Err(Trouble::Taken(error)) => {
+        Err(SourceError::Taken(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(SourceError::Taken(error)) => {
             let line = format!("standard output: cannot be written: {error}");
             Err(Failure::input(line))
         }
-        Err(Trouble::Read(error)) => {
+        Err(SourceError::Read(error)) => {
             Err(Failure::input(format!("{name}: cannot be read: {error}")))
         }
-        Err(Trouble::Capture(error)) => {
+        Err(SourceError::Capture(error)) => {
             Err(Failure::input(format!("{name}: no valid capture: {error}")))
         }
     }
@@ -82,7 +82,7 @@ fn open(file: Option<&Path>) -> Result<(String, Box<dyn Read>), Failure> {
 
 struct Printer<'f, W: Write> {
     format: &'f Format,
-    members: Members,
+    tags: TagVerifier,
     json: bool,
     number: u64,
     out: W,
@@ -94,9 +94,9 @@ impl<W: Write> Printer<'_, W> {
             Item::Comment(comment) => {
                 // A simulation's capture comment contains the key.
                 if let Some(key) = of_comment(comment)
-                    && !self.members.has_key()
+                    && !self.tags.has_key()
                 {
-                    self.members = Members::new(Some(key));
+                    self.tags = TagVerifier::new(Some(key));
                 }
                 if !self.json {
                     writeln!(self.out, "{comment}")?;
@@ -110,7 +110,7 @@ impl<W: Write> Printer<'_, W> {
     fn packet(&mut self, packet: &Packet<'_>) -> io::Result<()> {
         self.number += 1;
         let frame = frame::read(self.format, packet.wire, packet.len);
-        let tag = self.members.check(&frame);
+        let tag = self.tags.check(&frame);
         let shown = Shown {
             number: self.number,
             packet,

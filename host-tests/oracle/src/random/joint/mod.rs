@@ -41,8 +41,8 @@ use rand::{Rng, RngExt};
 
 use super::log_uniform;
 use crate::mission::as_relays_know_it;
-use crate::reference::joint::{Corridor, Hold};
-use crate::reference::{Link, Station};
+use crate::reference::joint::{Corridor, FixedCrossSection};
+use crate::reference::{Link, Relay};
 use uav_relay_scenario::number::narrow;
 
 /// Random link, and the corridor in which its relays choose positions. In the link they are at its lowest altitude.
@@ -53,7 +53,7 @@ pub struct Scenario {
     /// Altitudes and lateral positions that the relays may choose.
     pub corridor: Corridor,
     /// Relays with a fixed lateral position and altitude.
-    pub held: Vec<Hold>,
+    pub held: Vec<FixedCrossSection>,
 }
 
 impl Scenario {
@@ -61,7 +61,7 @@ impl Scenario {
     #[must_use]
     pub fn as_relays_know_it(&self) -> Self {
         let round = |value: f64| f64::from(narrow(value));
-        let held = self.held.iter().map(|hold| Hold {
+        let held = self.held.iter().map(|hold| FixedCrossSection {
             y_m: round(hold.y_m),
             altitude_m: round(hold.altitude_m),
             ..*hold
@@ -101,7 +101,7 @@ pub fn scenario(rng: &mut impl Rng, relays: &RangeInclusive<u32>, apart: (f64, f
         };
     let interferer_w = relay_w * log_uniform(rng, 1.0, 300.0);
     let least_m = d * log_uniform(rng, 0.005, 0.05);
-    let relay = Station {
+    let relay = Relay {
         altitude_m: least_m,
         power_w: relay_w,
     };
@@ -167,7 +167,7 @@ pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
             station.power_w *= log_uniform(rng, 0.3, 3.0);
         }
         if holds && rng.random_bool(0.1) {
-            of.held.push(Hold {
+            of.held.push(FixedCrossSection {
                 relay,
                 y_m: rng.random_range(room.left_m..=room.right_m),
                 altitude_m: rng.random_range(room.least_m..=room.most_m),

@@ -1,7 +1,7 @@
 //! Chains built from Rx toward Tx with hops as long as a target allows. The paper's Algorithm 4 and its optimum.
 
 use super::link::StochasticLink;
-use crate::reference::link::Station;
+use crate::reference::link::Relay;
 
 /// Chain built backward, from Rx toward Tx, and its target SIR.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,7 +109,7 @@ impl StochasticLink {
     ///
     /// `iterations` is their number.
     pub fn fewest(&self, gamma: f64, most: usize) -> Option<Backward> {
-        let like: Station = *self.relays.first()?;
+        let like: Relay = *self.relays.first()?;
         (1..=most).find_map(|n| {
             let link = Self {
                 relays: vec![like; n],

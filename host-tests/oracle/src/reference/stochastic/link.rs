@@ -1,6 +1,6 @@
 //! A chain of relays under interference with a known Upsilon.
 
-use super::super::link::{Station, received_w};
+use super::super::link::{Relay, received_w};
 
 /// Chain of relays between Tx at (0, 0) and Rx at (D, 0) in an interference field. Upsilon(x) = E[1 / interference
 /// power] is known.
@@ -17,7 +17,7 @@ pub struct StochasticLink {
     /// Strictly rising positions, m, with Upsilon, 1/W: linear in between, constant beyond the ends.
     pub upsilon: Vec<(f64, f64)>,
     /// Relays 1 to N from Tx to Rx.
-    pub relays: Vec<Station>,
+    pub relays: Vec<Relay>,
 }
 
 impl StochasticLink {

@@ -7,9 +7,9 @@
 mod backward;
 mod equals;
 mod link;
-mod own;
 mod single;
 mod upsilon;
+mod with_separation;
 
 pub use backward::Backward;
 pub use link::StochasticLink;

@@ -91,11 +91,11 @@ impl Chain {
             for arrival in arrivals {
                 let late = late_by.times(u32::try_from(arrival.late).unwrap_or(u32::MAX));
                 let bytes = arrival.bytes;
-                let (at, happening) = match receiver {
+                let (at, event) = match receiver {
                     Receiver::Relay(at) => (at, QueuedEvent::Bytes { port: into, bytes }),
-                    Receiver::Ground(at) => (at, QueuedEvent::Heard { bytes }),
+                    Receiver::Ground(at) => (at, QueuedEvent::StationBytes { bytes }),
                 };
-                self.queue.put(arrives + late, at, happening);
+                self.queue.put(arrives + late, at, event);
             }
         }
         note

@@ -13,7 +13,7 @@ use crate::simulator::outcome::TimelineEvent;
 const STEP: Duration = Duration::from_millis(50);
 
 /// Distance of a drone from its agreed position below which it has arrived, m.
-const THERE_M: f64 = 1.0;
+const ARRIVED_M: f64 = 1.0;
 
 /// Period in which the simulated operator looks for landed drones of lost relays.
 const LOOKS: Duration = Duration::from_millis(5_000);
@@ -39,18 +39,18 @@ impl Chain {
     }
 
     pub(super) fn fly_fleet(&mut self) {
-        self.look_for_traffic();
+        self.update_traffic();
         for index in 0..self.fleet.len() {
             self.drive(index);
         }
         let flying = self.fleet.iter().filter(|vehicle| vehicle.flies());
         let places: Vec<Point> = flying.map(Vehicle::at).collect();
         self.keep(Nearest::of(&places, self.now));
-        let lent = self
+        let controlled = self
             .fleet
             .iter()
-            .filter(|vehicle| vehicle.is_in_its_hands(self.now));
-        let places: Vec<Point> = lent.map(Vehicle::at).collect();
+            .filter(|vehicle| vehicle.is_automatic(self.now));
+        let places: Vec<Point> = controlled.map(Vehicle::at).collect();
         let nearest = Nearest::of(&places, self.now);
         let least = |known: Option<Nearest>| known.map_or(f64::INFINITY, |it| it.apart_m);
         if least(nearest) < least(self.outcome.nearest_lent) {
@@ -59,7 +59,7 @@ impl Chain {
         self.measure_pairs();
         self.outcome.stray_targets = self.fleet.iter().map(|vehicle| vehicle.strays).sum();
         if self.now.as_micros().is_multiple_of(LOOKS.as_micros()) {
-            self.look_around();
+            self.clear_lost_neighbours();
         }
         self.queue.put(self.now + STEP, 0, QueuedEvent::Fly);
     }
@@ -76,7 +76,7 @@ impl Chain {
                 let Some(begun) = self.handed_over_m.get_mut(index * count + other) else {
                     continue;
                 };
-                if !one.is_in_its_hands(self.now) || !beside.is_in_its_hands(self.now) {
+                if !one.is_automatic(self.now) || !beside.is_automatic(self.now) {
                     *begun = None;
                     continue;
                 }
@@ -95,7 +95,7 @@ impl Chain {
     }
 
     /// Sets for each drone whether its pilot sees traffic: another moving drone that is near.
-    fn look_for_traffic(&mut self) {
+    fn update_traffic(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let seen: Vec<(Point, bool)> = self
             .fleet
@@ -126,7 +126,7 @@ impl Chain {
         };
         vehicle.go_on(now, step_s);
         if let Some(at) = member.killed {
-            if now.since(at) >= LANDS_AFTER || !vehicle.is_lent(now) {
+            if now.since(at) >= LANDS_AFTER || !vehicle.is_not_taken_over(now) {
                 vehicle.land();
             }
             return;
@@ -135,7 +135,7 @@ impl Chain {
         let (is_news, _) = vehicle.link.exchange(&mut member.relay, now);
         let is_flown = vehicle.link.is_flown();
         while let Some(frame) = vehicle.link.poll_transmit(now) {
-            vehicle.hear(now, &frame);
+            vehicle.handle_frame(now, &frame);
         }
         let due = member.relay.poll_timeout();
         let is_sooner = due.is_some_and(|at| member.wake.is_none_or(|wake| at < wake));
@@ -145,15 +145,15 @@ impl Chain {
                 AutopilotEvent::Restarted => turnings.push(TimelineEvent::Restarted),
                 AutopilotEvent::State(State::Engaged) => turnings.push(TimelineEvent::Engaged),
                 AutopilotEvent::State(State::Blind) => turnings.push(TimelineEvent::Blind),
-                AutopilotEvent::State(State::Standby) if member.lent => {
+                AutopilotEvent::State(State::Standby) if member.under_relay_control => {
                     turnings.push(TimelineEvent::Released);
                 }
                 _ => {}
             }
         }
-        member.lent = is_flown;
+        member.under_relay_control = is_flown;
         for turning in turnings {
-            self.tell(index, turning, None);
+            self.log(index, turning, None);
         }
         if is_news || is_sooner {
             self.drain(index);
@@ -164,9 +164,9 @@ impl Chain {
     ///
     /// Relays then no longer keep away from these drones. The operator waits while the next flying drone is in its
     /// pilot's hands, or was until recently.
-    fn look_around(&mut self) {
+    fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
-            if !self.is_lent_long(index) {
+            if !self.is_long_under_relay_control(index) {
                 continue;
             }
             for side in [Side::Upstream, Side::Downstream] {
@@ -180,7 +180,8 @@ impl Chain {
                     (Side::Upstream, at) => at.map_or(index > 0, |at| at + 1 < index),
                     (Side::Downstream, at) => at.unwrap_or(self.members.len()) > index + 1,
                 };
-                let is_free = is_lost && beside.is_none_or(|at| self.is_lent_long(at));
+                let is_free =
+                    is_lost && beside.is_none_or(|at| self.is_long_under_relay_control(at));
                 let now = self.now;
                 if is_free
                     && let Some(member) = self.members.get_mut(index)
@@ -198,11 +199,11 @@ impl Chain {
     }
 
     /// Returns true if relay `index` (from 0) has controlled its drone for at least [`LANDS_AFTER`].
-    fn is_lent_long(&self, index: usize) -> bool {
+    fn is_long_under_relay_control(&self, index: usize) -> bool {
         let Some(member) = self
             .members
             .get(index)
-            .filter(|it| it.lent && it.killed.is_none())
+            .filter(|it| it.under_relay_control && it.killed.is_none())
         else {
             return false;
         };
@@ -215,7 +216,7 @@ impl Chain {
     }
 
     pub(super) fn restart_autopilot(&mut self, index: usize) {
-        self.ahead -= 1;
+        self.pending_planned -= 1;
         if let Some(vehicle) = self.fleet.get_mut(index) {
             vehicle.restart(self.now);
         }
@@ -225,12 +226,15 @@ impl Chain {
     ///
     /// Drones in their pilots' hands do not count.
     pub(super) fn all_hover(&self) -> bool {
-        let lent = self.members.iter().zip(&self.fleet);
-        lent.filter(|(member, vehicle)| member.killed.is_none() && vehicle.is_lent(self.now))
+        let controlled = self.members.iter().zip(&self.fleet);
+        controlled
+            .filter(|(member, vehicle)| {
+                member.killed.is_none() && vehicle.is_not_taken_over(self.now)
+            })
             .all(|(member, vehicle)| {
                 let agreed = member.relay.agreed_place();
-                let there = agreed.and_then(|place| vehicle.there(place));
-                let there = there.is_some_and(|place| apart(place, vehicle.at()) < THERE_M);
+                let there = agreed.and_then(|place| vehicle.in_run_coordinates(place));
+                let there = there.is_some_and(|place| apart(place, vehicle.at()) < ARRIVED_M);
                 vehicle.link.is_flown() && there
             })
     }
@@ -302,7 +306,7 @@ impl Chain {
             .filter(|(member, _)| member.killed.is_none())
             .all(|(member, drone)| {
                 let agreed = member.relay.agreed_place();
-                agreed.is_some_and(|place| apart(point(place), drone.taken()) < 1e-3)
+                agreed.is_some_and(|place| apart(point(place), drone.estimated_position()) < 1e-3)
             })
     }
 }

@@ -9,13 +9,15 @@ use uav_relay_scenario::scene::Scene;
 
 use super::air::{Receiver, link};
 use super::{Chain, Member, QueuedEvent};
-use crate::simulator::attack::{AttackKind, Attacker, NETWORK, Way, destination, fate, forge};
+use crate::simulator::attack::{
+    AttackKind, Attacker, ForgedRoute, NETWORK, destination, forge, incremented_counter,
+};
 use crate::simulator::drones::{Drone, Point, placement};
 use crate::simulator::faults::Line;
 use crate::simulator::fleet::Vehicle;
 use crate::simulator::outcome::{Link, Moment, TimelineEvent};
 use crate::simulator::setup::Setup;
-use crate::simulator::true_interference::{Stand, TrueInterference};
+use crate::simulator::true_interference::{Snapshot, TrueInterference};
 
 impl Chain {
     pub(super) fn begin_upload(&mut self, which: usize) {
@@ -32,13 +34,13 @@ impl Chain {
         if let Some(station) = self.stations.get_mut(at)
             && station.ground.upload(self.now, spec.upload).is_ok()
         {
-            self.tell_of_ground(spec.end, TimelineEvent::Offered(spec.upload.version()));
+            self.log_ground(spec.end, TimelineEvent::Offered(spec.upload.version()));
         }
         self.drain_station(at);
     }
 
     /// Passes received bytes to the ground station `at` (from 0) and sends its replies.
-    pub(super) fn hear(&mut self, at: usize, bytes: &[u8]) {
+    pub(super) fn station_receive(&mut self, at: usize, bytes: &[u8]) {
         if let Some(station) = self.stations.get_mut(at) {
             station.ground.handle_bytes(bytes);
         }
@@ -46,7 +48,7 @@ impl Chain {
     }
 
     /// Handles an expired timer of the ground station `at` (from 0) and sends its frames.
-    pub(super) fn ask(&mut self, at: usize) {
+    pub(super) fn station_timeout(&mut self, at: usize) {
         let now = self.now;
         if let Some(station) = self.stations.get_mut(at)
             && station.wake == Some(now)
@@ -58,14 +60,16 @@ impl Chain {
     }
 
     /// Measures the interference at the ground stations at Tx and Rx. They send the results to the relays.
-    pub(super) fn measure_at_ends(&mut self, sky: &TrueInterference, scene: &Scene) {
+    pub(super) fn measure_at_ends(&mut self, true_interference: &TrueInterference, scene: &Scene) {
         for at in 0..self.stations.len() {
             if let Some(station) = self.stations.get_mut(at) {
                 let power_w = match station.end {
-                    Side::Upstream => sky.transmitter_w(scene, self.now, &mut self.rng),
+                    Side::Upstream => {
+                        true_interference.transmitter_w(scene, self.now, &mut self.rng)
+                    }
                     Side::Downstream => {
                         let relays = self.setup.mission.relays();
-                        sky.receiver_w(scene, self.now, relays, &mut self.rng)
+                        true_interference.receiver_w(scene, self.now, relays, &mut self.rng)
                     }
                 };
                 station.ground.measured(narrow(power_w));
@@ -117,7 +121,7 @@ impl Chain {
         {
             assert!(again > now, "the ground would spin");
             station.wake = Some(again);
-            self.queue.put(again, at, QueuedEvent::Ask);
+            self.queue.put(again, at, QueuedEvent::StationTimeout);
         }
     }
 
@@ -138,7 +142,7 @@ impl Chain {
         }
     }
 
-    fn tell_of_ground(&mut self, end: Side, what: TimelineEvent) {
+    fn log_ground(&mut self, end: Side, what: TimelineEvent) {
         self.outcome.moments.push(Moment {
             at: self.now,
             relay: match end {
@@ -178,7 +182,10 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
         return Vec::new();
     };
     let uploads = setup.uploads.iter().map(|spec| spec.end);
-    let measures = setup.sky.as_ref().filter(|sky| sky.handed.is_empty());
+    let measures = setup
+        .true_interference
+        .as_ref()
+        .filter(|true_interference| true_interference.handed.is_empty());
     let both = measures.map(|_| [Side::Upstream, Side::Downstream]);
     let mut ends: Vec<Side> = uploads.chain(both.into_iter().flatten()).collect();
     ends.sort();
@@ -199,20 +206,20 @@ impl Chain {
         let flight = self.flight.as_ref();
         flight
             .and_then(|flight| flight.drones.get(index))
-            .map(Drone::taken)
+            .map(Drone::estimated_position)
             .or_else(|| self.fleet.get(index).map(Vehicle::at))
     }
 
     /// Lets every living relay measure the interference at its position, and records all positions.
     pub(super) fn measure_all(&mut self) {
-        let Some(sky) = self.setup.sky.clone() else {
+        let Some(true_interference) = self.setup.true_interference.clone() else {
             return;
         };
         let now = self.now;
-        let scene = sky.scene_at(now);
+        let scene = true_interference.scene_at(now);
         let (mut nodes, mut places) = (Vec::new(), Vec::new());
-        if now == Instant::ZERO + sky.period {
-            for (node, sample) in &sky.handed {
+        if now == Instant::ZERO + true_interference.period {
+            for (node, sample) in &true_interference.handed {
                 let mut members = self.members.iter_mut();
                 if let Some(member) = members.find(|member| member.node == *node) {
                     member.relay.handle_sample(now, *sample);
@@ -232,11 +239,13 @@ impl Chain {
                 continue;
             };
             places.push(at);
-            if !sky.handed.is_empty() || sky.once && member.measured == Some(at) {
+            if !true_interference.handed.is_empty()
+                || true_interference.once && member.measured == Some(at)
+            {
                 continue;
             }
             member.measured = Some(at);
-            let power_w = sky.heard_w(&scene, member.node, now, at, &mut self.rng);
+            let power_w = true_interference.relay_w(&scene, member.node, now, at, &mut self.rng);
             member.relay.handle_sample(
                 now,
                 Sample::Heard {
@@ -244,28 +253,30 @@ impl Chain {
                     power_w: narrow(power_w),
                 },
             );
-            if sky.ends_measure(now)
+            if true_interference.ends_measure(now)
                 && !self.setup.auth
                 && member.node == self.setup.mission.relays()
             {
-                let power_w = narrow(sky.receiver_w(&scene, now, member.node, &mut self.rng));
+                let power_w =
+                    narrow(true_interference.receiver_w(&scene, now, member.node, &mut self.rng));
                 member
                     .relay
                     .handle_sample(now, Sample::Receiver { power_w });
             }
         }
-        if sky.ends_measure(now) && sky.handed.is_empty() {
-            self.measure_at_ends(&sky, &scene);
+        if true_interference.ends_measure(now) && true_interference.handed.is_empty() {
+            self.measure_at_ends(&true_interference, &scene);
         }
-        self.stand(nodes, places);
-        if now < sky.until {
-            self.queue.put(now + sky.period, 0, QueuedEvent::Listen);
+        self.record_snapshot(nodes, places);
+        if now < true_interference.until {
+            self.queue
+                .put(now + true_interference.period, 0, QueuedEvent::Measure);
         } else {
-            self.listened = true;
+            self.measurements_done = true;
         }
     }
 
-    fn stand(&mut self, nodes: Vec<u16>, places: Vec<Placement>) {
+    fn record_snapshot(&mut self, nodes: Vec<u16>, places: Vec<Placement>) {
         let agreed = self
             .members
             .iter()
@@ -277,7 +288,7 @@ impl Chain {
             self.agreements += 1;
         }
         let leader = self.members.first();
-        self.outcome.stands.push(Stand {
+        self.outcome.snapshots.push(Snapshot {
             believed: leader.map_or_else(NumberedEstimate::default, |leader| {
                 leader.relay.interference_estimate()
             }),
@@ -295,27 +306,27 @@ const WAIT: Duration = Duration::from_millis(10);
 
 impl Chain {
     /// Creates the attacker of the setup, if any, and queues the times of its frames.
-    pub(super) fn expect_an_attack(&mut self) {
+    pub(super) fn schedule_attack(&mut self) {
         let Some(attack) = self.setup.attack else {
             return;
         };
         let mut attacker = Attacker::new(attack, self.setup.seed);
         for (at, kind) in attacker.plan(&self.setup.link) {
-            self.queue.put(at, 0, QueuedEvent::AttackKind(kind));
-            self.ahead += 1;
+            self.queue.put(at, 0, QueuedEvent::Attack(kind));
+            self.pending_planned += 1;
         }
         self.attacker = Some(attacker);
     }
 
     /// Sends one frame of the attacker to a living relay. Without a frame to replay, it tries again later.
-    pub(super) fn strike(&mut self, kind: AttackKind) {
+    pub(super) fn send_attack(&mut self, kind: AttackKind) {
         let now = self.now;
         let Some(mut attacker) = self.attacker.take() else {
             return;
         };
         let frame = match kind {
             AttackKind::Forge => {
-                let way = self.way(&mut attacker);
+                let way = self.forged_route(&mut attacker);
                 let heard = attacker.recall(now);
                 let heard = heard.as_ref().map(|heard| heard.bytes.as_slice());
                 let bytes = forge(&self.setup.mission, way, heard, &mut attacker.rng);
@@ -330,12 +341,12 @@ impl Chain {
                 let astray = kind == AttackKind::Replay && attacker.rng.random_range(0..4) == 0;
                 let to = destination(&bytes).filter(|_| !astray);
                 if let Some(to) = self.reached(to, &mut attacker) {
-                    self.hit(to, kind, port, &bytes);
+                    self.deliver_attack(to, kind, port, &bytes);
                 }
             }
             None if now < attacker.attack.until => {
-                self.queue.put(now + WAIT, 0, QueuedEvent::AttackKind(kind));
-                self.ahead += 1;
+                self.queue.put(now + WAIT, 0, QueuedEvent::Attack(kind));
+                self.pending_planned += 1;
             }
             None => {}
         }
@@ -345,7 +356,7 @@ impl Chain {
     /// Draws the destination and the claimed sender of a forged frame.
     ///
     /// The destination is a relay, the sender a relay or ground station that may be its neighbour.
-    fn way(&self, attacker: &mut Attacker) -> Way {
+    fn forged_route(&self, attacker: &mut Attacker) -> ForgedRoute {
         let relays = self.setup.mission.relays();
         let reach = match self.setup.settings.wiring {
             Wiring::Pair => 1,
@@ -354,7 +365,7 @@ impl Chain {
         let to = attacker.rng.random_range(1..=relays);
         let off = attacker.rng.random_range(1..=reach);
         let before = attacker.rng.random::<bool>() && off <= to || to + off > relays + 1;
-        Way {
+        ForgedRoute {
             from: if before {
                 to.saturating_sub(off)
             } else {
@@ -364,7 +375,7 @@ impl Chain {
         }
     }
 
-    fn port(&self, way: Way) -> Port {
+    fn port(&self, way: ForgedRoute) -> Port {
         match self.setup.settings.wiring {
             Wiring::Shared => Port::Shared,
             Wiring::Pair if way.from < way.to => Port::Upstream,
@@ -389,14 +400,19 @@ impl Chain {
     }
 
     /// Passes a frame of the attacker to relay `index` (from 0) and counts how the relay classified it.
-    fn hit(&mut self, index: usize, kind: AttackKind, port: Port, bytes: &[u8]) {
+    fn deliver_attack(&mut self, index: usize, kind: AttackKind, port: Port, bytes: &[u8]) {
         let Some(member) = self.members.get_mut(index) else {
             return;
         };
         let before = *member.relay.stats();
         member.relay.handle_bytes(self.now, port, bytes);
-        let name = fate(&before, member.relay.stats());
-        *self.outcome.struck.counted.entry((kind, name)).or_default() += 1;
+        let name = incremented_counter(&before, member.relay.stats());
+        *self
+            .outcome
+            .attack_counts
+            .counted
+            .entry((kind, name))
+            .or_default() += 1;
         let note = match kind {
             AttackKind::Forge => "forged by the attacker",
             AttackKind::Replay => "replayed by the attacker",

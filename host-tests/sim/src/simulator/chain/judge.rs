@@ -9,23 +9,25 @@ use super::{Chain, Member, QueuedEvent};
 use crate::simulator::drones::point;
 use crate::simulator::outcome::{Ending, Moment, TimelineEvent};
 use crate::simulator::route::RelayState;
-use crate::simulator::watch::{Run, Seen, Watch, longest};
+use crate::simulator::watch::{ObservedState, Run, Watch, longest};
 
 /// Relays whose state an event may have changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Touched {
-    Nobody,
+pub(super) enum ChangedRelays {
+    None,
     /// A single relay with this index, from 0.
     One(usize),
     /// Any relay, or the links between relays.
     All,
 }
 
-impl Touched {
-    pub(super) fn by(happening: &QueuedEvent, index: usize) -> Self {
-        match happening {
+impl ChangedRelays {
+    pub(super) fn of(event: &QueuedEvent, index: usize) -> Self {
+        match event {
             QueuedEvent::Bytes { .. } | QueuedEvent::Wake => Self::One(index),
-            QueuedEvent::Air(_) | QueuedEvent::Ask | QueuedEvent::Heard { .. } => Self::Nobody,
+            QueuedEvent::Air(_)
+            | QueuedEvent::StationTimeout
+            | QueuedEvent::StationBytes { .. } => Self::None,
             _ => Self::All,
         }
     }
@@ -34,37 +36,37 @@ impl Touched {
 impl Chain {
     /// Starts the statistics of the run. `run` simulates a chain without faults, to judge this chain.
     pub(super) fn begin_watch(&mut self, run: Run) {
-        let seen = self.members.iter().map(seen).collect();
+        let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
     }
 
-    /// Updates the run's records and statistics after an event that may have changed the relays `touched`.
-    pub(super) fn look(&mut self, touched: Touched) {
-        if touched == Touched::Nobody {
+    /// Updates the run's records and statistics after an event that may have changed the relays `changed`.
+    pub(super) fn update_statistics(&mut self, changed: ChangedRelays) {
+        if changed == ChangedRelays::None {
             return;
         }
-        self.track(touched);
+        self.track(changed);
         let Some(mut watch) = self.watch.take() else {
             return;
         };
-        self.take_in(&mut watch, touched);
+        self.update_watch(&mut watch, changed);
         self.watch = Some(watch);
     }
 
-    /// Records changed states of the relays `touched`, for the data traffic.
-    fn track(&mut self, touched: Touched) {
+    /// Records changed states of the relays `changed`, for the data traffic.
+    fn track(&mut self, changed: ChangedRelays) {
         let Some(mut track) = self.outcome.track.take() else {
             return;
         };
-        let range = self.range(touched);
+        let range = self.changed_indices(changed);
         let changed = self.members.get(range.clone()).unwrap_or_default();
         for (index, member) in range.zip(changed) {
             let setpoint = member.relay.setpoint().map(point);
             let drone = self.drone(index);
             let state = RelayState {
-                seen: Seen {
+                observed: ObservedState {
                     place: setpoint.map(|setpoint| drone.unwrap_or(setpoint)),
-                    ..seen(member)
+                    ..observed_state(member)
                 },
                 agreed: member.relay.agreed_place().map(point),
             };
@@ -74,28 +76,28 @@ impl Chain {
     }
 
     /// Returns the indices, from 0, of the relays that an event may have changed.
-    fn range(&self, touched: Touched) -> Range<usize> {
-        match touched {
-            Touched::One(index) => index..index + 1,
+    fn changed_indices(&self, changed: ChangedRelays) -> Range<usize> {
+        match changed {
+            ChangedRelays::One(index) => index..index + 1,
             _ => 0..self.members.len(),
         }
     }
 
-    fn take_in(&self, watch: &mut Watch, touched: Touched) {
-        let range = self.range(touched);
-        let mut is_new = touched == Touched::All;
+    fn update_watch(&self, watch: &mut Watch, changed: ChangedRelays) {
+        let range = self.changed_indices(changed);
+        let mut is_new = changed == ChangedRelays::All;
         let fresh = self.members.get(range.clone()).unwrap_or_default();
         for (at, member) in range.zip(fresh) {
-            is_new |= watch.see(at, seen(member));
+            is_new |= watch.record_state(at, observed_state(member));
         }
         if !is_new {
             return;
         }
-        watch.go_on(self.now);
-        watch.take_in(self.now);
+        watch.count_time(self.now);
+        watch.count_groups(self.now);
         if self.setup.soak.is_some() {
             let is_right = self.is_right(watch);
-            watch.judge(is_right);
+            watch.set_available(is_right);
         }
     }
 
@@ -107,14 +109,14 @@ impl Chain {
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
         let links = |one, other| self.are_linked(one, other);
         let holds = |at: usize| {
-            let seen = watch.seen.get(at);
+            let seen = watch.states.get(at);
             seen.is_some_and(|one| one.place.is_some())
         };
         let (_, chains) = longest(&on, links, holds);
         for chain in chains {
-            let seen: Vec<Seen> = chain
+            let seen: Vec<ObservedState> = chain
                 .iter()
-                .filter_map(|at| watch.seen.get(*at).copied())
+                .filter_map(|at| watch.states.get(*at).copied())
                 .collect();
             let nodes: Vec<u16> = chain
                 .iter()
@@ -130,16 +132,16 @@ impl Chain {
     }
 }
 
-fn seen(member: &Member) -> Seen {
-    Seen::of(&member.relay, member.killed.is_none())
+fn observed_state(member: &Member) -> ObservedState {
+    ObservedState::of(&member.relay, member.killed.is_none())
 }
 
 impl Chain {
     pub(super) fn ending(&self) -> Option<Ending> {
-        if self.setup.sky.is_some() {
-            return self.listened.then_some(Ending::Soaked);
+        if self.setup.true_interference.is_some() {
+            return self.measurements_done.then_some(Ending::Soaked);
         }
-        if self.ahead > 0 || self.setup.soak.is_some() {
+        if self.pending_planned > 0 || self.setup.soak.is_some() {
             return None;
         }
         let killed = self.members.iter().any(|member| member.killed.is_some());
@@ -174,7 +176,7 @@ impl Chain {
         if is_in(largest, Phase::Infeasible) {
             return Some(Ending::Infeasible);
         }
-        let settled = self.holding >= largest.len()
+        let settled = self.accepted_positions >= largest.len()
             && holds(largest)
             && self.has_arrived()
             && self.all_hover();
@@ -312,7 +314,7 @@ impl Chain {
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
             // With a guard, a drone may come from anywhere and be halted anywhere on its path: its setpoint may not leave the box
             // by more than it has since the drone was engaged.
-            let [low, high] = member.been.unwrap_or([place; 2]);
+            let [low, high] = member.setpoint_bounds.unwrap_or([place; 2]);
             let guard = self.setup.settings.guard;
             let inside = guard.map_or(chosen, |guard| {
                 let fence = guard.fence;
@@ -345,8 +347,8 @@ impl Chain {
             // After an upload, the drone keeps its position until the next agreement.
             member.safe = inside.then_some(place);
         }
-        member.been = member.relay.setpoint().map(|place| {
-            let [low, high] = member.been.unwrap_or([place; 2]);
+        member.setpoint_bounds = member.relay.setpoint().map(|place| {
+            let [low, high] = member.setpoint_bounds.unwrap_or([place; 2]);
             let of = |low: Placement, pick: fn(f32, f32) -> f32| Placement {
                 x_m: pick(low.x_m, place.x_m),
                 y_m: pick(low.y_m, place.y_m),
@@ -371,7 +373,7 @@ impl Chain {
 
 impl Chain {
     /// Takes all pending events from relay `index` (from 0) and logs them.
-    pub(super) fn listen(&mut self, index: usize) {
+    pub(super) fn drain_events(&mut self, index: usize) {
         while let Some(member) = self.members.get_mut(index)
             && let Some(event) = member.relay.poll_event()
         {
@@ -395,7 +397,7 @@ impl Chain {
                 Event::SensorOff { node } => (TimelineEvent::SensorOff, Some(node)),
                 Event::LeaseLapsed => (TimelineEvent::LeaseLapsed, None),
                 Event::Converged => {
-                    self.holding += 1;
+                    self.accepted_positions += 1;
                     (TimelineEvent::Converged, None)
                 }
                 Event::ViewAccepted => {
@@ -422,12 +424,12 @@ impl Chain {
                 Event::Infeasible => (TimelineEvent::Infeasible, None),
                 _ => continue,
             };
-            self.tell(index, what, other);
+            self.log(index, what, other);
         }
     }
 
     /// Adds an entry about relay `index` (from 0) to the log of the run. `other` is the other node that it concerns.
-    pub(super) fn tell(&mut self, index: usize, what: TimelineEvent, other: Option<u16>) {
+    pub(super) fn log(&mut self, index: usize, what: TimelineEvent, other: Option<u16>) {
         let Some(member) = self.members.get(index) else {
             return;
         };
@@ -442,13 +444,13 @@ impl Chain {
     }
 
     /// Logs the partitions and one-way link failures that begin or end at the present time.
-    pub(super) fn tell_of_partitions(&mut self) {
+    pub(super) fn log_partitions(&mut self) {
         for deaf in self.setup.deaf.clone() {
             let by = usize::from(deaf.by).saturating_sub(1);
             if deaf.from == self.now {
-                self.tell(by, TimelineEvent::Deaf, Some(deaf.of));
+                self.log(by, TimelineEvent::Deaf, Some(deaf.of));
             } else if deaf.until == Some(self.now) {
-                self.tell(by, TimelineEvent::Hears, Some(deaf.of));
+                self.log(by, TimelineEvent::Hears, Some(deaf.of));
             }
         }
         let relays = self.setup.mission.relays();
@@ -459,9 +461,9 @@ impl Chain {
             }
             let last = usize::from(partition.after).saturating_sub(1);
             if partition.from == self.now {
-                self.tell(last, TimelineEvent::Partitioned, None);
+                self.log(last, TimelineEvent::Partitioned, None);
             } else if partition.until == Some(self.now) {
-                self.tell(last, TimelineEvent::PartitionEnded, None);
+                self.log(last, TimelineEvent::PartitionEnded, None);
             }
         }
     }

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_without_tests_is_told_by_its_last_lines() {
+    fn a_step_without_tests_is_reported_by_its_last_lines() {
         let mut evidence = Evidence::default();
         (0..50).for_each(|number| evidence.add(&format!("line {number}")));
         let kept = evidence.to_string();

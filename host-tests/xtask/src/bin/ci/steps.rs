@@ -395,7 +395,7 @@ mod tests {
     use super::{Step, WAITING_TEST, all, integration_tests, quick, step};
 
     #[test]
-    fn a_failed_step_in_the_background_is_reported_with_its_messages() {
+    fn a_failed_background_step_is_reported_with_its_output() {
         let step = Step {
             is_background: true,
             ..step("list", "ls --no-such-option")

@@ -332,7 +332,7 @@ mod tests {
     const PAGE: &str = "# One\n\n```sh\na \\\n  b\n```\n\nprints\n\n```text\n1 s\n```\n\n## Two\n\n```text\nx\n```\n\n```console root\n$ c\nd\n```\n";
 
     #[test]
-    fn commands_and_what_they_print_are_told_apart() {
+    fn commands_and_their_output_are_distinguished() {
         let all = blocks(PAGE).unwrap_or_default();
         let [one, said, other, console] = &all[..] else {
             unreachable!("{all:?}")
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_has_to_end_with_the_status_that_its_comment_begins_with() {
+    fn a_command_must_end_with_its_comments_status() {
         let all = blocks("```sh\na   # exit status 2: no\nb   # 2\n```\n").unwrap_or_default();
         let commands = all.first().map(super::Block::commands);
         let expected = "s=0; { a; } || s=$?; [ $s = 2 ]\nb   # 2";
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_that_is_not_known_and_a_block_without_an_end_are_named() {
+    fn unknown_words_and_unclosed_blocks_are_named() {
         for (page, line) in [("```sh later\n```\n", "1: "), ("\n```sh\n", "2: ")] {
             let error = blocks(page).err().unwrap_or_default();
             assert!(error.starts_with(line), "{error}");
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alias_whose_program_is_there_is_a_case_of_the_function() {
+    fn an_alias_with_its_program_is_a_case_of_the_function() {
         let config = "[alias]\nsh = \"run --package p --bin sh --\"\nother = \"run --package p --bin not-there --\"\n";
         let all = functions(config, "/bin".as_ref(), "/root".as_ref());
         assert!(all.contains("sh) shift; '/bin/sh' \"$@\";;"), "{all}");
@@ -376,7 +376,7 @@ mod tests {
     const OUTPUT: &str = "  0.10 s  one\nother \n 12.5 s  two\n";
 
     #[test]
-    fn lines_come_in_their_order_and_numbers_count_unless_they_are_noisy() {
+    fn lines_keep_their_order_and_only_noisy_numbers_vary() {
         let good: [&[&str]; 3] = [&["other"], &["  0.10 s  one", "...", " 12.5 s  two"], &[]];
         for page in good {
             assert_eq!(compare(page, OUTPUT, false), Ok(()));

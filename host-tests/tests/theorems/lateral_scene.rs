@@ -10,12 +10,12 @@ use uav_relay_oracle::reference::joint::{Place, sir};
 
 use super::scene::Scene;
 
-pub(crate) struct Roomy {
+pub(crate) struct LateralScene {
     pub(crate) scene: Scene,
     pub(crate) lateral: (f64, f64),
 }
 
-impl Roomy {
+impl LateralScene {
     pub(crate) fn new(scene: Scene, lateral: (f64, f64)) -> Self {
         let lateral = (lateral.0 as f32, lateral.1 as f32);
         let config = MissionConfig {

@@ -2,14 +2,14 @@
 
 use uav_relay_oracle::reference::joint::Place;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
-use uav_relay_oracle::reference::{Link, Station};
+use uav_relay_oracle::reference::{Link, Relay};
 
 /// Relative excess over the optimum that f32 rounding permits a target SIR.
 const ABOVE: f64 = 1e-4;
 
 /// Reference model of a mission's chain, in f64.
 #[derive(Debug)]
-pub(crate) enum Judge {
+pub(crate) enum Reference {
     /// Reference model of a chain with an interferer at a known position.
     Source {
         link: Link,
@@ -20,7 +20,7 @@ pub(crate) enum Judge {
     Field(StochasticLink),
 }
 
-impl Judge {
+impl Reference {
     /// Returns the SIRs of the N + 1 hops. Those at a relay without a position are meaningless.
     pub(crate) fn hops(&self, places: &[Option<Place>]) -> Vec<f64> {
         let x: Vec<f64> = places
@@ -30,7 +30,7 @@ impl Judge {
         match self {
             Self::Source { link, .. } => {
                 let stations = link.relays.iter().zip(places);
-                let relays = stations.map(|(relay, place)| Station {
+                let relays = stations.map(|(relay, place)| Relay {
                     altitude_m: place.map_or(relay.altitude_m, |at| at.altitude_m),
                     ..*relay
                 });
@@ -46,7 +46,7 @@ impl Judge {
 
     /// Returns the ratio of the SIR at `x_m` with the measured Upsilon = E[1/I] to that with the true one.
     /// `measured_per_w` is the measured value in 1/W. Returns 1 for a known interferer.
-    pub(crate) fn louder(&self, x_m: f64, measured_per_w: f64) -> f64 {
+    pub(crate) fn sir_ratio(&self, x_m: f64, measured_per_w: f64) -> f64 {
         match self {
             Self::Source { .. } => 1.0,
             Self::Field(link) => measured_per_w / link.upsilon_at(x_m),
@@ -55,7 +55,7 @@ impl Judge {
 
     /// Returns true if a chain can meet `target`, given the largest Upsilon = E[1/I] that a relay measured.
     /// `measured_per_w` is that Upsilon in 1/W, or `None` without a measurement.
-    pub(crate) fn may_meet(&self, target: f64, measured_per_w: Option<f64>) -> bool {
+    pub(crate) fn can_meet(&self, target: f64, measured_per_w: Option<f64>) -> bool {
         match self {
             Self::Source { optimum, .. } => target <= optimum * (1.0 + ABOVE),
             Self::Field(link) => match measured_per_w {

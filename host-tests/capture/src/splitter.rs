@@ -15,12 +15,12 @@ pub struct Piece<'a> {
 
 /// Splitter of a byte stream into frames. The result does not depend on how the stream is divided into reads.
 #[derive(Clone, Debug, Default)]
-pub struct Cut {
+pub struct FrameSplitter {
     bytes: Vec<u8>,
     len: usize,
 }
 
-impl Cut {
+impl FrameSplitter {
     /// Appends `bytes` to the stream and passes each completed piece to `take`; empty pieces are skipped.
     ///
     /// Work is linear in the number of bytes, memory at most [`MOST`].

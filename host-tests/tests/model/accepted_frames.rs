@@ -11,26 +11,26 @@ use super::Checked;
 
 /// Epochs of both ends at the time a frame was sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Seal {
+pub(crate) struct EpochPair {
     pub(crate) from: u32,
     pub(crate) to: u32,
 }
 
 /// Signed frames that a relay has accepted since it was switched on. The sides are upstream and downstream.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Taken {
+pub(crate) struct AcceptedFrames {
     frames: [BTreeSet<(u32, Vec<u8>)>; 2],
     /// Largest epoch in an accepted frame of each neighbour.
     newest: [u32; 2],
 }
 
 /// Returns the number of frames that a relay has accepted.
-pub(crate) fn taken(stats: &Stats) -> u32 {
+pub(crate) fn accepted_count(stats: &Stats) -> u32 {
     stats.received + stats.handshakes
 }
 
 /// Returns the number of frames that a relay has refused as forged or replayed.
-pub(crate) fn refused(stats: &Stats) -> u32 {
+pub(crate) fn refused_count(stats: &Stats) -> u32 {
     stats.forged + stats.replayed
 }
 
@@ -46,14 +46,14 @@ fn handshake(wire: &[u8]) -> Option<Vec<u8>> {
     None
 }
 
-impl Taken {
+impl AcceptedFrames {
     /// Checks that a relay was right to accept a frame from `side`. Returns true if the frame proves that the sender
     /// is alive.
-    pub(crate) fn take(
+    pub(crate) fn accept(
         &mut self,
         side: usize,
         wire: &[u8],
-        seal: Seal,
+        seal: EpochPair,
         epoch: u32,
     ) -> Checked<bool> {
         let handshake = handshake(wire);

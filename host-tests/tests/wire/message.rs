@@ -17,9 +17,9 @@ pub(crate) static FORMAT: LazyLock<Format> = LazyLock::new(|| Format::load().unw
 
 /// Body of a valid message, whose fields have the names in `FORMAT.md`.
 #[derive(Clone, PartialEq, Eq)]
-pub(crate) struct Said(Vec<u8>);
+pub(crate) struct WireMessage(Vec<u8>);
 
-impl fmt::Debug for Said {
+impl fmt::Debug for WireMessage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.name(), json!(self.fields()))
     }
@@ -34,13 +34,13 @@ fn walked(body: &[u8]) -> Result<Fields<'static>, MessageError> {
     }
 }
 
-impl Said {
+impl WireMessage {
     /// Creates the message `name`. Its `fields` are as `cargo decode --json` prints them.
     pub(crate) fn new(name: &str, fields: &Json) -> Self {
         let body = write::write(&FORMAT, name, fields);
-        let said = Self(body.unwrap_or_else(|error| panic!("{error}: {name} {fields}")));
-        assert_eq!(Self::verdict(&said.0), Ok(()), "{said:?}");
-        said
+        let message = Self(body.unwrap_or_else(|error| panic!("{error}: {name} {fields}")));
+        assert_eq!(Self::verdict(&message.0), Ok(()), "{message:?}");
+        message
     }
 
     pub(crate) fn read(body: &[u8]) -> Result<Self, MessageError> {
@@ -107,7 +107,7 @@ pub(crate) fn number(fields: &Fields<'_>, name: &str) -> f64 {
         Some(Value::Digest(number)) => (*number).into(),
         Some(Value::View(number)) => (*number).into(),
         Some(Value::Word(number, _) | Value::Flags(number, _)) => (*number).into(),
-        Some(Value::Bool(said)) => f64::from(u8::from(*said)),
+        Some(Value::Bool(value)) => f64::from(u8::from(*value)),
         other => panic!("{name}: {other:?}"),
     }
 }

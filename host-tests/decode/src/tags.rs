@@ -50,12 +50,12 @@ type Pair = (u16, u16, u16);
 
 /// Verifier of authentication tags, with the nonces of all captured handshakes.
 #[derive(Debug, Default)]
-pub struct Members {
+pub struct TagVerifier {
     key: Option<Key>,
     nonces: HashMap<Pair, VecDeque<u64>>,
 }
 
-impl Members {
+impl TagVerifier {
     /// Creates a verifier without nonces, for a network with this key, if it is known.
     pub fn new(key: Option<[u8; 32]>) -> Self {
         Self {

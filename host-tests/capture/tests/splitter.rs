@@ -8,12 +8,12 @@ use pcap_file::pcapng::blocks::enhanced_packet::EnhancedPacketOption;
 use pcap_file::pcapng::{Block, PcapNgReader};
 use proptest::collection::vec;
 use proptest::prelude::*;
-use uav_relay_capture::{Capture, Cut, Direction, Frame, MOST};
+use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, MOST};
 
 /// Returns the pieces of a stream, which arrives in `reads`, with their lengths. The last number is the length of the
 /// incomplete end.
 fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
-    let (mut cut, mut all) = (Cut::default(), Vec::new());
+    let (mut cut, mut all) = (FrameSplitter::default(), Vec::new());
     for read in reads {
         let taken: Result<(), Infallible> = cut.push(read, |piece| {
             all.push((piece.bytes.to_vec(), piece.len));
@@ -27,7 +27,7 @@ fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
 
 proptest! {
     #[test]
-    fn any_way_of_reading_gives_the_same_pieces(
+    fn pieces_do_not_depend_on_the_read_sizes(
         bytes in vec(prop_oneof![1 => Just(0_u8), 3 => any::<u8>()], 0..400),
         at in vec(0..400_usize, 0..6),
     ) {
@@ -46,7 +46,7 @@ proptest! {
 }
 
 #[test]
-fn of_a_long_piece_the_begin_is_kept_and_the_length_is_told() {
+fn a_long_piece_is_cut_and_its_full_length_reported() {
     let mut noise = vec![7; 10 * MOST];
     noise.extend([0, 2, 9, 0]);
     let (pieces, rest) = pieces(&[&noise]);
@@ -56,7 +56,7 @@ fn of_a_long_piece_the_begin_is_kept_and_the_length_is_told() {
 }
 
 #[test]
-fn a_capture_holds_what_went_in() {
+fn a_capture_contains_every_written_frame() {
     let mut capture = Capture::new(Vec::new(), "a test", "of everything").unwrap();
     let ports = ["one", "two"].map(|name| capture.interface(name, "a port").unwrap());
     let ways = [Direction::In, Direction::Out, Direction::Unknown];
