@@ -47,7 +47,7 @@ impl Frame {
 pub type Route = Box<dyn Fn(usize, Port, usize) -> Option<Port>>;
 
 /// Fate of an arriving frame, which may be changed: true if it is delivered.
-pub type Fate = Box<dyn FnMut(&mut Frame) -> bool>;
+pub type Delivery = Box<dyn FnMut(&mut Frame) -> bool>;
 
 /// Relays, ground stations, and the frames between them.
 #[expect(
@@ -66,7 +66,7 @@ pub struct Bench {
     pub events: Vec<(usize, Event)>,
     pub latency: Duration,
     pub route: Route,
-    pub fate: Fate,
+    pub fate: Delivery,
     steps: u32,
 }
 

@@ -99,7 +99,7 @@ pub fn print(text: &str) {
 }
 
 /// Prints `line` on standard error; a closed pipe is ignored.
-pub fn say(line: &str) {
+pub fn print_line(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 

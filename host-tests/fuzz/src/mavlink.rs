@@ -8,7 +8,7 @@ mod wire;
 
 use uav_relay::flight::mavlink::incoming::{Counters, Parser, Received};
 
-use super::heap::without;
+use super::heap::without_allocation;
 use super::input::Input;
 use reference::Reference;
 use wire::{Placed, stream};
@@ -18,7 +18,7 @@ use wire::{Placed, stream};
 /// # Panics
 /// - The parser deviates from the definition of frames, misses an intact one, or exceeds its bound on work.
 /// - The link sends numbers that are not finite, targets far from the line or not of its state, depends on how its bytes are
-/// split, allocates, or requests needless calls.
+///   split, allocates, or requests needless calls.
 /// - A link with a key accepts unsigned or repeated frames, rejects others, or does not sign its frames with increasing stamps.
 pub fn mavlink(data: &[u8]) {
     let mut input = Input::new(data);
@@ -37,7 +37,7 @@ fn parsed(bytes: &[u8]) -> (Vec<Received>, Counters) {
     let mut all = Vec::new();
     for &byte in bytes {
         parser.push(byte);
-        while let Some(received) = without(|| parser.next_message()) {
+        while let Some(received) = without_allocation(|| parser.next_message()) {
             all.push(received);
         }
     }

@@ -20,7 +20,7 @@ pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
 /// Share of the optimum after a number of agreements.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-struct Found {
+struct AgreementShare {
     scene: &'static str,
     relays: u16,
     /// Number of agreements based on measurements.
@@ -55,12 +55,12 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
 ];
 
 /// Returns the share by agreement, in `scenes` scenes each.
-fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
+fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
         let each: Shares = shares(scenes, relays, sources, run)?;
         for (agreements, mut shares) in each.into_iter().enumerate() {
-            rows.push(Found {
+            rows.push(AgreementShare {
                 scene: what,
                 relays,
                 agreements,

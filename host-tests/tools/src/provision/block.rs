@@ -152,7 +152,7 @@ impl Flight {
     }
 
     /// Sets the silence before a neighbour is probed, ms; 0 for the firmware's default.
-    pub fn asking_after(self, probe_after_ms: u32) -> Self {
+    pub fn with_probe_after(self, probe_after_ms: u32) -> Self {
         Self {
             probe_after_ms,
             ..self
