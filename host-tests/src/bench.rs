@@ -50,7 +50,7 @@ impl Frame {
 pub type Route = Box<dyn Fn(usize, Port, usize) -> Option<Port>>;
 
 /// Function that may change an arriving frame, and returns true if the frame is to be delivered.
-pub type Fate = Box<dyn FnMut(&mut Frame) -> bool>;
+pub type Delivery = Box<dyn FnMut(&mut Frame) -> bool>;
 
 /// Test bench in virtual time: relays, ground stations, and the frames between them.
 #[expect(
@@ -69,7 +69,7 @@ pub struct Bench {
     pub events: Vec<(usize, Event)>,
     pub latency: Duration,
     pub route: Route,
-    pub fate: Fate,
+    pub fate: Delivery,
     steps: u32,
 }
 

@@ -101,7 +101,7 @@ pub fn print(text: &str) {
 }
 
 /// Prints the message `line` on standard error; a closed pipe is ignored.
-pub fn say(line: &str) {
+pub fn print_line(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 

@@ -20,11 +20,11 @@ pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     }
     let mut make = Command::new("python3");
     succeed(make.args(["-m", "venv"]).arg(venv)).map_err(|why| match why {
-        Trouble::Missing => {
+        PythonError::Missing => {
             "python3 is not on PATH: the other solvers need Python 3.11 or later with venv and pip"
                 .to_owned()
         }
-        Trouble::Failed(said) => format!(
+        PythonError::Failed(said) => format!(
             "python3 cannot make {}; are venv and pip there? {said}",
             venv.display()
         ),
@@ -42,8 +42,8 @@ pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     ];
     let mut pip = Command::new(&python);
     succeed(pip.args(install).arg(REQUIREMENTS_FILE)).map_err(|why| match why {
-        Trouble::Missing => format!("{} is missing", python.display()),
-        Trouble::Failed(said) => {
+        PythonError::Missing => format!("{} is missing", python.display()),
+        PythonError::Failed(said) => {
             let names: Vec<&str> = REQUIREMENTS.lines().collect();
             format!(
                 "pip cannot install {}; is there a network, and is this Python 3.11 or later? {said}",
@@ -56,15 +56,15 @@ pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     Ok(python)
 }
 
-enum Trouble {
+enum PythonError {
     Missing,
     Failed(String),
 }
 
-fn succeed(command: &mut Command) -> Result<(), Trouble> {
+fn succeed(command: &mut Command) -> Result<(), PythonError> {
     let output = command.output().map_err(|error| match error.kind() {
-        ErrorKind::NotFound => Trouble::Missing,
-        _ => Trouble::Failed(error.to_string()),
+        ErrorKind::NotFound => PythonError::Missing,
+        _ => PythonError::Failed(error.to_string()),
     })?;
     if output.status.success() {
         return Ok(());
@@ -77,5 +77,5 @@ fn succeed(command: &mut Command) -> Result<(), Trouble> {
     // For pip the first error, for other programs the last line.
     let first = lines.clone().find(|line| line.starts_with("ERROR"));
     let line = first.or_else(|| lines.next_back()).unwrap_or_default();
-    Err(Trouble::Failed(line.trim().to_owned()))
+    Err(PythonError::Failed(line.trim().to_owned()))
 }

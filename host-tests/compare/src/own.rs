@@ -15,7 +15,7 @@ use uav_relay_tools::plan::solved;
 
 use crate::machine::Clock;
 use crate::problem::{Choice, Problem};
-use crate::results::{Answer, Found, Mark, Run};
+use crate::results::{Answer, Mark, Run, Solution};
 
 /// Relative tolerance of the SIR that this crate aims for: that of `cargo chain`.
 const TOLERANCE: f64 = 1e-4;
@@ -125,7 +125,7 @@ fn run(solver: &str, time_s: f64, mission: &Mission, places: &[Placement]) -> Ru
         .collect();
     Run {
         solver: solver.to_owned(),
-        answer: Answer::Found(Found {
+        answer: Answer::Found(Solution {
             time_s,
             evaluations: None,
             sir: hop_sirs(mission, &flown)

@@ -37,12 +37,12 @@ pub(crate) struct Run {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Answer {
-    Found(Found),
+    Found(Solution),
     Error(String),
 }
 
 #[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct Found {
+pub(crate) struct Solution {
     /// Total processor time of the solver, s.
     pub(crate) time_s: f64,
     /// Number of chains that the solver evaluated; `None` for solvers that do not evaluate chains.

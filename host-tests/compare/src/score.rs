@@ -5,7 +5,7 @@ use std::fmt;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
-use crate::results::{Found, Mark};
+use crate::results::{Mark, Solution};
 
 /// Relative difference from the optimum SIR up to which a chain is good enough. It is the tolerance of the relays'
 /// mission.
@@ -114,7 +114,7 @@ pub(crate) fn score(
     room: Corridor,
     optimum: f64,
     level: f64,
-    found: &Found,
+    found: &Solution,
 ) -> Result<Score, Refusal> {
     let sir = judge(link, room, &found.chain)?;
     if !((found.sir / sir - 1.0).abs() <= SIR_SLACK) {

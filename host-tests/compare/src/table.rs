@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::problem::{Choice, Problem};
-use crate::results::{Answer, Found, Results, Run, Solved};
+use crate::results::{Answer, Results, Run, Solution, Solved};
 use crate::score::{Score, judge, score};
 use uav_relay_xtask::toolchain::spaced;
 
@@ -184,7 +184,7 @@ fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     Ok(lines.collect())
 }
 
-fn line(found: &Found, score: &Score, optimum: f64, own_s: f64) -> Line {
+fn line(found: &Solution, score: &Score, optimum: f64, own_s: f64) -> Line {
     let after = |after_s: Option<f64>| {
         after_s.map_or_else(|| "never".to_owned(), |after_s| time(after_s, own_s))
     };

@@ -117,7 +117,7 @@ impl Chain {
     }
 
     /// Returns the CRC-32C of all bytes that the relays have sent, in order.
-    pub fn said(&self) -> u32 {
+    pub fn crc_of_sent(&self) -> u32 {
         CRC_32C.checksum(&self.said)
     }
 

@@ -72,7 +72,7 @@ fn five_relays_reach_the_optimum_with_the_same_bytes() {
     println!(
         "{places:?} {:#010x?} {hops:?}, said {:#010x}",
         bits(&places),
-        chain.said()
+        chain.crc_of_sent()
     );
     // In the best chain all hops have the same SIR.
     let (least, most) = hops.iter().fold((f64::MAX, 0.0_f64), |(least, most), hop| {
@@ -80,7 +80,7 @@ fn five_relays_reach_the_optimum_with_the_same_bytes() {
     });
     assert!(most / least < 1.0 + 2e-4, "{hops:?}");
     assert_eq!(bits(&places), OF_FIVE);
-    assert_eq!(chain.said(), SAID_BY_WIRES);
+    assert_eq!(chain.crc_of_sent(), SAID_BY_WIRES);
 }
 
 #[test]
@@ -96,10 +96,10 @@ fn four_relays_go_on_without_the_third_with_the_same_bytes() {
     println!(
         "{places:?} {:#010x?}, said {:#010x}",
         bits(&places),
-        chain.said()
+        chain.crc_of_sent()
     );
     assert_eq!(bits(&places), OF_FOUR);
-    assert_eq!(chain.said(), SAID_ON_A_CHANNEL);
+    assert_eq!(chain.crc_of_sent(), SAID_ON_A_CHANNEL);
 }
 
 static POINTS: [FieldPoint; 1] = [FieldPoint {

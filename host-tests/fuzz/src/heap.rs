@@ -46,7 +46,7 @@ unsafe impl GlobalAlloc for Counting {
 }
 
 /// Returns the number of allocations by this thread so far.
-pub fn asked() -> u64 {
+pub fn allocations() -> u64 {
     ASKED.get()
 }
 
@@ -54,9 +54,9 @@ pub fn asked() -> u64 {
 ///
 /// # Panics
 /// It allocates.
-pub fn without<T>(work: impl FnOnce() -> T) -> T {
-    let before = asked();
+pub fn without_allocation<T>(work: impl FnOnce() -> T) -> T {
+    let before = allocations();
     let done = work();
-    assert!(asked() == before, "the crate has asked for memory");
+    assert!(allocations() == before, "the crate has asked for memory");
     done
 }

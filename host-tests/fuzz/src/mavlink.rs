@@ -8,7 +8,7 @@ mod wire;
 
 use uav_relay::flight::mavlink::incoming::{Counters, Parser, Received};
 
-use super::heap::without;
+use super::heap::without_allocation;
 use super::input::Input;
 use reference::Reference;
 use wire::{Placed, stream};
@@ -37,7 +37,7 @@ fn parsed(bytes: &[u8]) -> (Vec<Received>, Counters) {
     let mut all = Vec::new();
     for &byte in bytes {
         parser.push(byte);
-        while let Some(received) = without(|| parser.next_message()) {
+        while let Some(received) = without_allocation(|| parser.next_message()) {
             all.push(received);
         }
     }

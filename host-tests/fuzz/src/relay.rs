@@ -271,7 +271,7 @@ impl Bench {
             view: self.watched.relay().view(),
             number: self.watched.number(),
             association: self.watched.association(),
-            offer_number: self.watched.asked(),
+            offer_number: self.watched.offer_number(),
             distance_m: self.mission.config().distance_m,
         };
         let body = body(input, &state);

@@ -77,7 +77,8 @@ impl Watched {
             network: NETWORK,
             index,
         };
-        let relay = heap::without(|| Relay::new(mission, identity, settings, seed, now)).ok()?;
+        let relay =
+            heap::without_allocation(|| Relay::new(mission, identity, settings, seed, now)).ok()?;
         Some(Self {
             relay,
             node: index,
@@ -117,7 +118,7 @@ impl Watched {
     }
 
     /// Returns the offer number in the relay's last hello, 0 for none.
-    pub const fn asked(&self) -> u16 {
+    pub const fn offer_number(&self) -> u16 {
         self.frames.asked
     }
 
@@ -139,7 +140,7 @@ impl Watched {
     /// its bounds on work.
     pub fn bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let before = *self.relay.stats();
-        heap::without(|| self.relay.handle_bytes(now, port, bytes));
+        heap::without_allocation(|| self.relay.handle_bytes(now, port, bytes));
         let after = self.relay.stats();
         let Some(begun) = self.begun.get_mut(port as usize) else {
             return;
@@ -158,7 +159,7 @@ impl Watched {
 
     /// Delivers a measurement to the relay, `count` times.
     pub fn sample(&mut self, now: Instant, sample: Sample, count: u8) {
-        heap::without(|| {
+        heap::without_allocation(|| {
             for _ in 0..count {
                 self.relay.handle_sample(now, sample);
             }
@@ -167,23 +168,23 @@ impl Watched {
 
     /// Reports to the relay that its drone was at `place` at the time `at`.
     pub fn position(&mut self, now: Instant, at: Instant, place: Placement) {
-        heap::without(|| self.relay.handle_position(now, place, at));
+        heap::without_allocation(|| self.relay.handle_position(now, place, at));
     }
 
     /// Reports to the relay that the lost relays at `side` have landed.
     pub fn forget(&mut self, now: Instant, side: Side) {
-        heap::without(|| self.relay.clear_lost(now, side));
+        heap::without_allocation(|| self.relay.clear_lost(now, side));
     }
 
     /// Uploads a mission to the relay, which may refuse it.
     pub fn upload(&mut self, now: Instant, upload: &Upload) {
         // An older mission, or one for a relay without a key, is refused.
-        _ = heap::without(|| self.relay.handle_upload(now, upload));
+        _ = heap::without_allocation(|| self.relay.handle_upload(now, upload));
     }
 
     /// Makes the relay start a new agreement, if it leads the chain.
     pub fn restart(&mut self, now: Instant) {
-        heap::without(|| self.relay.restart(now));
+        heap::without_allocation(|| self.relay.restart(now));
     }
 
     /// Handles the relay's timeouts, returns its frames and events, and checks its promises.
@@ -191,11 +192,13 @@ impl Watched {
     /// # Panics
     /// A promise is broken.
     pub fn settle(&mut self, now: Instant) -> (Vec<Sent>, Vec<Event>) {
-        heap::without(|| self.relay.handle_timeout(now));
+        heap::without_allocation(|| self.relay.handle_timeout(now));
         let mut sent = Vec::with_capacity(MOST_FRAMES);
         let mut buffer = [0; MAX_FRAME];
         self.relay.persist(|_| true);
-        while let Some(transmit) = heap::without(|| self.relay.poll_transmit(now, &mut buffer)) {
+        while let Some(transmit) =
+            heap::without_allocation(|| self.relay.poll_transmit(now, &mut buffer))
+        {
             let bytes = buffer.get(..transmit.len).unwrap_or_default().to_vec();
             let port = transmit.port;
             self.frames.look(&self.relay, &self.settings, port, &bytes);
@@ -208,7 +211,7 @@ impl Watched {
         let more = self.relay.poll_transmit(now, &mut buffer);
         assert_eq!(more, None, "a frame after the last one");
         let mut events = Vec::with_capacity(MOST_EVENTS);
-        while let Some(event) = heap::without(|| self.relay.poll_event()) {
+        while let Some(event) = heap::without_allocation(|| self.relay.poll_event()) {
             events.push(event);
             assert!(events.len() <= MOST_EVENTS, "events without end");
         }

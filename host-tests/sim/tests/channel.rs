@@ -66,7 +66,7 @@ fn agree_and_hold(relays: u16, loss: f64, seeds: u64) {
 }
 
 #[test]
-fn twenty_relays_agree_with_30_percent_loss() {
+fn twenty_agree_at_the_least_baud_with_30_percent_loss() {
     for relays in [2, 8, 20] {
         for loss in [0.0, 0.3] {
             agree_and_hold(relays, loss, 4);
@@ -75,19 +75,19 @@ fn twenty_relays_agree_with_30_percent_loss() {
 }
 
 #[test]
-fn a_hundred_relays_agree_and_hold() {
+fn a_hundred_agree_at_the_least_baud() {
     agree_and_hold(100, 0.0, 1);
 }
 
 #[test]
-fn fifty_relays_agree_with_30_percent_loss() {
+fn fifty_agree_at_the_least_baud_with_30_percent_loss() {
     agree_and_hold(50, 0.3, 4);
 }
 
 /// Fails at present: after the agreement, the relays' own requests fill the channel.
 #[test]
 #[ignore = "fails"]
-fn a_hundred_relays_agree_with_30_percent_loss() {
+fn a_hundred_agree_at_the_least_baud_with_30_percent_loss() {
     agree_and_hold(100, 0.3, 2);
 }
 

@@ -233,7 +233,7 @@ impl Air {
     }
 
     /// Returns the index (from 0) of the reporting relay for each report of `event`.
-    pub(crate) fn told(&self, event: Event) -> Vec<usize> {
+    pub(crate) fn reporters(&self, event: Event) -> Vec<usize> {
         let told = self.told.iter().filter(|(_, told)| *told == event);
         told.map(|(by, _)| *by).collect()
     }
@@ -270,7 +270,7 @@ fn joined(loss: f64, seed: u64) -> (Air, usize) {
     // The second relay appears at a varying time between two passes.
     air.run(90 + seed % 7);
     assert!(air.relays.iter().all(|relay| relay.setpoint().is_some()));
-    assert!(air.told(TAKEN).is_empty());
+    assert!(air.reporters(TAKEN).is_empty());
     let other = air.join(relay(&mission, 3, None, air.now));
     (air, other)
 }
@@ -294,7 +294,7 @@ fn the_later_of_two_duplicates_gets_no_setpoint() {
                 assert_eq!(given, None, "loss {loss}, seed {seed}, {:?}", air.now);
             }
             assert!(air.relays[other].is_passive() && !air.relays[2].is_passive());
-            let mut told = air.told(TAKEN);
+            let mut told = air.reporters(TAKEN);
             told.sort_unstable();
             told.dedup();
             assert_eq!(told, [2, other], "loss {loss}");
@@ -342,7 +342,7 @@ fn one_of_two_simultaneous_duplicates_flies() {
         assert_eq!(down[0], !down[1], "seed {seed}");
         let flies = if down[0] { other } else { 2 };
         assert!(air.relays[flies].setpoint().is_some());
-        assert!(air.told(TAKEN).contains(&2) && air.told(TAKEN).contains(&other));
+        assert!(air.reporters(TAKEN).contains(&2) && air.reporters(TAKEN).contains(&other));
     }
 }
 
@@ -358,7 +358,7 @@ fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
         let other = air.join(relay(&mission, 3, auth(KEY, epoch), air.now));
         air.run(240);
         let silent = if first_stays { other } else { 2 };
-        assert!(air.told(TAKEN).contains(&silent), "{epoch}");
+        assert!(air.reporters(TAKEN).contains(&silent), "{epoch}");
         assert_eq!(air.relays[2].setpoint().is_some(), first_stays, "{epoch}");
         assert_eq!(air.relays[2].is_passive(), !first_stays, "{epoch}");
         assert_eq!(
@@ -385,7 +385,7 @@ fn forged_frames_make_no_relay_passive() {
         air.run(1);
         liar.handle_timeout(air.now);
     }
-    assert_eq!(air.told(Event::DuplicateIndex { node: 2 }), [1]);
+    assert_eq!(air.reporters(Event::DuplicateIndex { node: 2 }), [1]);
     assert!(
         air.relays
             .iter()
@@ -400,11 +400,11 @@ fn a_key_mismatch_is_reported_with_the_node() {
         let key = |index| if index == 2 { [1; 32] } else { KEY };
         let mut air = Air::of(&mission(3), |index| auth(key(index), 1), loss);
         air.run(60);
-        let mut told = air.told(Event::KeyMismatch { node: 2 });
+        let mut told = air.reporters(Event::KeyMismatch { node: 2 });
         told.sort_unstable();
         assert_eq!(told, [0, 2]);
         for node in [1, 3] {
-            assert_eq!(air.told(Event::KeyMismatch { node }), [1]);
+            assert_eq!(air.reporters(Event::KeyMismatch { node }), [1]);
         }
     }
 }
@@ -423,7 +423,7 @@ fn two_forged_handshakes_are_noise() {
         air.run(30);
     }
     assert!(air.relays[0].stats().forged > 0);
-    assert!(air.told(Event::KeyMismatch { node: 2 }).is_empty());
+    assert!(air.reporters(Event::KeyMismatch { node: 2 }).is_empty());
 }
 
 /// Checks that a relay that restarts with an older epoch is rejected. It and its neighbours report it.
@@ -439,7 +439,7 @@ fn an_epoch_that_went_back_is_reported_with_the_node() {
         assert!(air.relays.iter().all(|relay| relay.setpoint().is_some()));
         air.relays[1] = relay(&mission, 2, auth(KEY, again), air.now);
         air.run(90);
-        let mut told = air.told(Event::EpochWentBack { node: 2 });
+        let mut told = air.reporters(Event::EpochWentBack { node: 2 });
         told.sort_unstable();
         let expected: &[usize] = if back { &[0, 1, 2] } else { &[] };
         assert_eq!(told, expected, "epoch {again}, loss {loss}");
@@ -465,7 +465,10 @@ fn with_a_reused_epoch_a_relay_joins_or_reports_and_waits() {
         let settings = settings(auth(KEY, 5));
         air.relays[1] = Relay::new(mission, identity, settings, 1_000 * seed, air.now).unwrap();
         let restarted = air.now;
-        let reports = |air: &Air| air.told(Event::DuplicateIndex { node: 2 }).contains(&1);
+        let reports = |air: &Air| {
+            air.reporters(Event::DuplicateIndex { node: 2 })
+                .contains(&1)
+        };
         while air.relays[1].setpoint().is_none() {
             air.run(1);
             let seconds = air.now.since(restarted).as_micros() / 1_000_000;

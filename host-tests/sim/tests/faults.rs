@@ -272,7 +272,7 @@ fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
 }
 
 #[test]
-fn all_but_one_linked_relays_share_an_agreement() {
+fn one_way_links_exclude_at_most_one_relay() {
     let first = number("SEED", 1);
     let cases: Vec<_> = (first..first + number("COUNT", 1))
         .flat_map(one_way_links)
@@ -439,7 +439,7 @@ fn judge(setups: &[Setup]) {
 }
 
 #[test]
-fn at_most_one_group_flies() {
+fn random_faults_let_at_most_one_group_fly() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
@@ -456,7 +456,7 @@ fn an_unheard_decision_ends_no_lease() {
 
 #[test]
 #[ignore = "takes some minutes"]
-fn at_most_one_group_flies_in_10000_sequences() {
+fn random_faults_let_at_most_one_group_fly_in_10000_runs() {
     fly(number("SEED", 1_000), number("COUNT", 10_000));
 }
 

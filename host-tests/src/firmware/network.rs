@@ -25,13 +25,13 @@ const WAITING: usize = 16_384;
 #[derive(Debug)]
 pub struct Network {
     carrier: Option<JoinHandle<()>>,
-    stop: Sender<Heard>,
+    stop: Sender<PortBytes>,
     injected: Arc<Mutex<Injected>>,
 }
 
 /// Bytes sent by the port with number `sender`. No bytes mean that the network is to end.
 #[derive(Debug)]
-struct Heard {
+struct PortBytes {
     sender: usize,
     bytes: Vec<u8>,
 }
@@ -100,7 +100,7 @@ impl Network {
 
 impl Drop for Network {
     fn drop(&mut self) {
-        _ = self.stop.send(Heard {
+        _ = self.stop.send(PortBytes {
             sender: 0,
             bytes: Vec::new(),
         });
@@ -125,11 +125,11 @@ fn begun(mut port: &UnixStream) -> std::io::Result<Vec<u8>> {
 }
 
 /// Forwards the bytes that a drone sends on a port to `out`, until the drone closes the port.
-fn listen(mut port: UnixStream, sender: usize, out: &Sender<Heard>) {
+fn listen(mut port: UnixStream, sender: usize, out: &Sender<PortBytes>) {
     let mut buffer = [0; 1024];
     while let Ok(count @ 1..) = port.read(&mut buffer) {
         let bytes = buffer.get(..count).unwrap_or_default().to_vec();
-        if out.send(Heard { sender, bytes }).is_err() {
+        if out.send(PortBytes { sender, bytes }).is_err() {
             return;
         }
     }
@@ -142,7 +142,7 @@ fn has_room(port: &UnixStream) -> bool {
 }
 
 fn carry(
-    heard: &Receiver<Heard>,
+    heard: &Receiver<PortBytes>,
     mut ports: Vec<UnixStream>,
     hearers: &Hearers,
     mut medium: Medium,
@@ -161,8 +161,8 @@ fn carry(
             next.saturating_duration_since(Instant::now())
         });
         match heard.recv_timeout(pause) {
-            Ok(Heard { bytes, .. }) if bytes.is_empty() => return,
-            Ok(Heard { sender, bytes }) => {
+            Ok(PortBytes { bytes, .. }) if bytes.is_empty() => return,
+            Ok(PortBytes { sender, bytes }) => {
                 let receivers = hearers.get(sender).map_or(&[][..], Vec::as_slice);
                 medium.send(Instant::now(), sender, &bytes, receivers);
             }

@@ -33,9 +33,9 @@ pub(crate) enum Kind {
     RecordedHandshake,
     Noise,
     /// Attack: a valid message of any kind without an authentication tag.
-    Bare,
+    Untagged,
     /// Attack: a valid message of any kind with a random authentication tag.
-    Dressed,
+    AnyWithRandomTag,
     /// Attack: replay of a mission offer, recorded after the last start of both ends, to any relay.
     OfferReplayed,
     /// Attack: replay of a mission offer that was recorded before the last start of one end.
@@ -60,8 +60,8 @@ pub(crate) const KINDS: [Kind; 18] = [
     Kind::ForgedHandshake,
     Kind::RecordedHandshake,
     Kind::Noise,
-    Kind::Bare,
-    Kind::Dressed,
+    Kind::Untagged,
+    Kind::AnyWithRandomTag,
     Kind::OfferReplayed,
     Kind::OfferFromBefore,
     Kind::OfferAltered,
@@ -280,12 +280,12 @@ impl Attacker {
                 handshake((NETWORK, from, to), self.counter(&recorded), nonces, asks)
                     .signed(&self.rng.random(), nonces)
             }
-            Kind::Bare | Kind::Dressed => {
-                let flags = if kind == Kind::Bare { 0 } else { SIGNED };
+            Kind::Untagged | Kind::AnyWithRandomTag => {
+                let flags = if kind == Kind::Untagged { 0 } else { SIGNED };
                 let body = self.messages.choose(&mut self.rng)?.0.clone();
                 let mut frame = Plain::new(NETWORK, from, to, flags, self.counter(&recorded));
                 frame.0.extend(body);
-                if kind == Kind::Dressed {
+                if kind == Kind::AnyWithRandomTag {
                     frame.0.extend(self.rng.random::<[u8; TAG]>());
                 }
                 frame

@@ -35,7 +35,7 @@ fn of(relays: u16, index: u16, settings: Settings) -> Relay {
 }
 
 /// Returns a copy of the autopilot link that has received the relay's current outputs once more.
-fn told_again(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
+fn with_repeated_outputs(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     let mut link = link.clone();
     link.handle_ready(now, relay.is_ready());
     let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
@@ -67,7 +67,7 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
         }
         assert!(format!("{relay:?}") == format!("{expected:?}"));
         // The link has what the relay has computed from the newest position.
-        let told = told_again(&vehicle.link, relay, now);
+        let told = with_repeated_outputs(&vehicle.link, relay, now);
         assert_eq!(format!("{:?}", vehicle.link), format!("{told:?}"));
         let before = format!("{:?} {relay:?}", vehicle.link);
         let again = vehicle.link.exchange(relay, now);
@@ -183,7 +183,13 @@ fn exchange_passes_the_radios_noise_to_the_relay() {
 }
 
 /// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.
-fn talk(first: &mut Relay, second: &mut Relay, now: Instant, start_m: f32, is_silent: bool) {
+fn exchange_fences(
+    first: &mut Relay,
+    second: &mut Relay,
+    now: Instant,
+    start_m: f32,
+    is_silent: bool,
+) {
     for (port, bytes) in bench::sent(first, now) {
         if port == Port::Downstream && !is_silent {
             second.handle_bytes(now, Port::Upstream, &bytes);
@@ -219,7 +225,7 @@ fn exchange_passes_an_operators_clearance_to_the_relay() {
             // The pilot of the second drone takes the sticks, and its relay is switched off later.
             second.handle_control(vehicle.now, false);
         }
-        talk(&mut first, &mut second, vehicle.now, 900.0, tenths > 300);
+        exchange_fences(&mut first, &mut second, vehicle.now, 900.0, tenths > 300);
         while let Some(event) = first.poll_event() {
             vehicle.link.handle_event(event);
             if matches!(event, Event::NeighbourLost { .. }) {
@@ -284,7 +290,7 @@ fn a_drone_out_of_sequence_cannot_be_engaged() {
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
     for _ in 0..200 {
         run(&mut vehicle, &mut first, 100);
-        talk(&mut first, &mut second, vehicle.now, 50.0, false);
+        exchange_fences(&mut first, &mut second, vehicle.now, 50.0, false);
     }
     assert!(!first.is_ready());
     let waits = AutopilotEvent::Waits(WaitReason::NotReady);

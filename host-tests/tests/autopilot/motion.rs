@@ -98,7 +98,7 @@ impl Rig {
         }
     }
 
-    pub(crate) fn says(&self, text: &str) -> usize {
+    pub(crate) fn text_count(&self, text: &str) -> usize {
         self.texts.iter().filter(|(_, said)| said == text).count()
     }
 
@@ -226,10 +226,10 @@ fn a_restarted_companion_engages_no_drone() {
         } else {
             "relay: waits, change the mode first"
         };
-        assert_eq!(rig.says(reason), 1, "{kind:?}: {:?}", rig.texts);
+        assert_eq!(rig.text_count(reason), 1, "{kind:?}: {:?}", rig.texts);
         assert!(rig.choose(Mode::Hold));
         rig.run(8_000);
-        assert_eq!(rig.says("relay: ready, choose the mode"), 2);
+        assert_eq!(rig.text_count("relay: ready, choose the mode"), 2);
         assert!(rig.choose(Mode::Companion));
         rig.run(2_000);
         assert_eq!(rig.link.state(), State::Engaged);
@@ -358,7 +358,7 @@ fn a_fence_breach_by_a_moving_target_is_named() {
     });
     assert!(rig.events.contains(&returns), "{:?}", rig.events);
     assert!(rig.events.contains(&AutopilotEvent::FenceBreached));
-    assert_eq!(rig.says("relay: released, returns (RTL): fence"), 1);
+    assert_eq!(rig.text_count("relay: released, returns (RTL): fence"), 1);
 }
 
 /// Checks a drone whose pilot hands over at full speed: it overshoots, stops, and flies on from there.

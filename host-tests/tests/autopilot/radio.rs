@@ -7,7 +7,7 @@ use uav_relay::flight::mavlink::incoming::noise_w;
 
 use super::*;
 
-fn hears(vehicle: &mut Vehicle, noise: u8) -> Option<Sample> {
+fn sample_of_noise(vehicle: &mut Vehicle, noise: u8) -> Option<Sample> {
     let header = MavHeader {
         system_id: u32::from(b'3'),
         component_id: b'D',
@@ -29,9 +29,9 @@ fn hears(vehicle: &mut Vehicle, noise: u8) -> Option<Sample> {
 fn an_airborne_radios_noise_reaches_the_relay() {
     let mut vehicle = Vehicle::new(Kind::ArduCopter);
     vehicle.run(2_000);
-    assert_eq!(hears(&mut vehicle, 100), None, "on the ground");
+    assert_eq!(sample_of_noise(&mut vehicle, 100), None, "on the ground");
     vehicle.fly_off();
-    let Some(Sample::Heard { at, power_w }) = hears(&mut vehicle, 100) else {
+    let Some(Sample::Heard { at, power_w }) = sample_of_noise(&mut vehicle, 100) else {
         panic!("nothing was heard");
     };
     let (_, known) = vehicle.positions.last().unwrap();
@@ -40,15 +40,27 @@ fn an_airborne_radios_noise_reaches_the_relay() {
     assert!((power_w / 3.657_e-11 - 1.0).abs() < 1e-3, "{power_w:e}");
     assert_eq!(noise_w(100), Some(power_w));
     for unknown in [0, 255] {
-        assert_eq!(hears(&mut vehicle, unknown), None, "{unknown} says nothing");
+        assert_eq!(
+            sample_of_noise(&mut vehicle, unknown),
+            None,
+            "{unknown} says nothing"
+        );
     }
     vehicle.position_every_ms = u64::MAX;
     vehicle.run(2_000);
-    assert_eq!(hears(&mut vehicle, 100), None, "it may be anywhere");
+    assert_eq!(
+        sample_of_noise(&mut vehicle, 100),
+        None,
+        "it may be anywhere"
+    );
     vehicle.position_every_ms = 200;
     vehicle.run(1_000);
-    assert!(hears(&mut vehicle, 100).is_some());
+    assert!(sample_of_noise(&mut vehicle, 100).is_some());
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_ON_GROUND;
     vehicle.run(1_000);
-    assert_eq!(hears(&mut vehicle, 100), None, "on the ground again");
+    assert_eq!(
+        sample_of_noise(&mut vehicle, 100),
+        None,
+        "on the ground again"
+    );
 }

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use crate::files::{Files, asked, until};
+use crate::files::{Files, status_of, until};
 use crate::flying::Flight;
-use crate::peer::{Heard, Peer, RX, Site, TX, apart_m, between_m, on_earth, text};
+use crate::peer::{Peer, RX, ReceivedMessage, Site, TX, apart_m, between_m, on_earth, text};
 use crate::process::Relay;
 
 /// Question in the log line about a drone far from its line.
@@ -34,7 +34,7 @@ impl Apart {
     }
 
     fn position(&self) -> serde_json::Value {
-        asked(self.files.path("status"))["autopilot"]["position"].clone()
+        status_of(self.files.path("status"))["autopilot"]["position"].clone()
     }
 }
 
@@ -64,11 +64,11 @@ fn is_off_a_swapped_line(kind: &str) {
     let off = digits(&line) / digits(&said) - 1.0;
     assert!(off.abs() < 2e-3, "{line}, and not {said}");
     assert!(line.ends_with(said.split(" km").nth(1).unwrap()), "{line}");
-    let operator = |heard: &Heard| {
+    let operator = |heard: &ReceivedMessage| {
         let text = heard.0["text"].as_str().unwrap_or_default();
         text.starts_with("relay: the drone is ") && text.ends_with(" km from its line")
     };
-    apart.drone.hears(operator);
+    apart.drone.receive(operator);
     let position = apart.position();
     assert_eq!(position["outside"], "line", "{position}");
     assert_eq!(position["sites_look_swapped"], true, "{position}");
@@ -91,12 +91,12 @@ fn is_off_a_swapped_line(kind: &str) {
     // The drone cannot be engaged: the relay has no position, and no targets are streamed.
     // The log gives the reason, and never reports the drone as ready.
     let reason = "autopilot: cannot be engaged: there is no position near the line";
-    apart.relay.says(reason);
+    apart.relay.wait_for(reason);
     apart.drone.order("mode companion");
-    let heard = apart.drone.hears_for(Duration::from_secs(3));
-    assert!(!heard.iter().any(Heard::is_target), "{heard:?}");
+    let heard = apart.drone.receive_for(Duration::from_secs(3));
+    assert!(!heard.iter().any(ReceivedMessage::is_target), "{heard:?}");
     for never in ["setpoint control engaged", "autopilot: ready"] {
-        assert!(!apart.relay.has_said(never), "{never}");
+        assert!(!apart.relay.has_printed(never), "{never}");
     }
 }
 
@@ -155,7 +155,7 @@ fn a_drone_outside_the_geofence_is_reported_in_the_air() {
         .as_f64()
         .unwrap();
     assert!((from_m - 120.0).abs() < 1.0, "{from_m}");
-    assert!(!apart.relay.has_said("geofence"), "it is on the ground");
+    assert!(!apart.relay.has_printed("geofence"), "it is on the ground");
     apart.drone.takes_off();
     let line = apart.relay.line("geofence");
     assert!(
@@ -173,5 +173,5 @@ fn a_drone_at_its_line_is_not_reported() {
     flight.takes_off();
     flight.is_engaged();
     std::thread::sleep(Duration::from_secs(3));
-    assert!(!flight.relay.has_said("from the line between"));
+    assert!(!flight.relay.has_printed("from the line between"));
 }

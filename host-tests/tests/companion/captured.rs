@@ -14,10 +14,10 @@ use crate::process::Relay;
 use crate::stays::fill_disk;
 
 /// Frame in a capture: its sender, destination and counter.
-type Seen = (u64, u64, u64);
+type FrameId = (u64, u64, u64);
 
 /// Returns the frames in a capture file with their directions. The first frame may be partial.
-fn frames(file: &Path) -> Vec<(String, Seen)> {
+fn frames(file: &Path) -> Vec<(String, FrameId)> {
     let output = Command::new("cargo")
         .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .args(["decode", "--json"])
@@ -57,7 +57,7 @@ fn every_frame_is_in_the_captures_of_both_ends() {
         .drain(..)
         .for_each(|relay| drop(relay.stopped()));
     let all = [1, 2, 3].map(|index| frames(Path::new(&file(&chain, index))));
-    let went = |at: usize, way: &str, from: u64, to: u64| -> BTreeSet<Seen> {
+    let went = |at: usize, way: &str, from: u64, to: u64| -> BTreeSet<FrameId> {
         let frames = all[at - 1].iter().filter(|(its, _)| its == way);
         let seen = frames.map(|(_, seen)| *seen);
         seen.filter(|seen| (seen.0, seen.1) == (from, to)).collect()
@@ -102,7 +102,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_flight() {
     let again = chain.relays[1].lines_with("capture ended");
     assert!(again.is_empty(), "once: {again:?}");
     for relay in &mut chain.relays {
-        assert!(!relay.has_said("lost: ") && !relay.has_said("lease expired: "));
+        assert!(!relay.has_printed("lost: ") && !relay.has_printed("lease expired: "));
     }
     // A capture does not resume when space is available again.
     fill_disk(chain.relays[1].pid(), false);
@@ -134,7 +134,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
         std::fs::write(&level, power).unwrap();
     }
     station.line("capture ended: --capture cannot be written: File too large");
-    station.says("back: relay 1");
+    station.wait_for("back: relay 1");
     assert!(station.lines_with("capture ended").is_empty(), "once");
     station.stopped();
 }

@@ -51,7 +51,7 @@ impl Bench {
 }
 
 /// Returns the text after `event: ` in each log line about that event.
-fn said(lines: &[String], event: &str) -> Vec<String> {
+fn lines_of_event(lines: &[String], event: &str) -> Vec<String> {
     let event = format!("  transmitter  {event}: ");
     let lines = lines.iter();
     lines
@@ -66,10 +66,10 @@ fn a_later_upload_is_based_on_the_flown_mission() {
     let moved = "--new-site-rx 47.412,8.552,433 --yes";
     let ended = bench.uploads("1", moved).succeeds();
     assert_eq!(
-        said(&ended, "current"),
+        lines_of_event(&ended, "current"),
         ["relay 1 flies the mission with which it was loaded"]
     );
-    let changes = said(&ended, "change");
+    let changes = lines_of_event(&ended, "change");
     assert_eq!(
         changes[0],
         "receiver: 47.4100000,8.5500000,431.000 -> 47.4120000,8.5520000,433.000"
@@ -79,7 +79,7 @@ fn a_later_upload_is_based_on_the_flown_mission() {
         "{changes:?}"
     );
     assert_eq!(changes.len(), 2, "{changes:?}");
-    assert_eq!(said(&ended, "move").len(), 2);
+    assert_eq!(lines_of_event(&ended, "move").len(), 2);
     bench.0.lines("adopted: the chain flies version 1");
     let after = bench.agreed();
     assert!((after[0] - before[0]).abs() > 1.0, "{before:?}, {after:?}");
@@ -87,18 +87,25 @@ fn a_later_upload_is_based_on_the_flown_mission() {
     // Dry run with another interferer: the receiver stays at its new site.
     let new = "--new-interferer 80,700,-300";
     let ended = bench.uploads("2", &format!("{new} --dry-run")).succeeds();
-    assert_eq!(said(&ended, "current"), ["relay 1 flies version 1"]);
+    assert_eq!(
+        lines_of_event(&ended, "current"),
+        ["relay 1 flies version 1"]
+    );
     let change = "interferer: 80 W at x 500 m, y 400 m -> 80 W at x 700 m, y -300 m";
-    assert_eq!(said(&ended, "change"), [change]);
-    let moves = said(&ended, "move");
-    assert_eq!(said(&ended, "dry run"), ["version 2 was not uploaded"]);
+    assert_eq!(lines_of_event(&ended, "change"), [change]);
+    let moves = lines_of_event(&ended, "move");
+    assert_eq!(
+        lines_of_event(&ended, "dry run"),
+        ["version 2 was not uploaded"]
+    );
     assert!(
-        !bench.0.relays[0].has_said("uploaded: version 2 of the mission was received and stored")
+        !bench.0.relays[0]
+            .has_printed("uploaded: version 2 of the mission was received and stored")
     );
 
     // A script's upload: the relays move as far as announced.
     let ended = bench.uploads("2", &format!("{new} --yes")).succeeds();
-    assert_eq!(said(&ended, "move"), moves);
+    assert_eq!(lines_of_event(&ended, "move"), moves);
     let between = "between 47.4000000,8.5400000,420.000 and 47.4120000,8.5520000,433.000";
     for line in bench.0.lines("adopted: the chain flies version 2") {
         assert!(line.ends_with(between), "{line}");
@@ -126,13 +133,16 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     let (ended, error) = bench.uploads("1", more).fails(1);
     let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m";
     assert_eq!(error, line);
-    assert_eq!(said(&ended, "change")[0], "altitude: 20 m -> 50 m");
-    let moves = said(&ended, "move");
+    assert_eq!(
+        lines_of_event(&ended, "change")[0],
+        "altitude: 20 m -> 50 m"
+    );
+    let moves = lines_of_event(&ended, "move");
     assert!(
         moves.len() == 2 && moves[0].ends_with("altitude 50.0 m"),
         "{moves:?}"
     );
-    assert!(!bench.0.relays[0].has_said("uploaded: "));
+    assert!(!bench.0.relays[0].has_printed("uploaded: "));
 }
 
 /// Checks that a dry run fails with status 1 if the upload would leave the geofence, else succeeds.
@@ -145,16 +155,22 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
         let station = bench.uploads("1", &format!("{more} --new-band {altitude},{altitude}"));
         if !is_outside {
             let lines = station.succeeds();
-            assert_eq!(said(&lines, "dry run"), ["version 1 was not uploaded"]);
+            assert_eq!(
+                lines_of_event(&lines, "dry run"),
+                ["version 1 was not uploaded"]
+            );
             continue;
         }
         let (lines, error) = station.fails(1);
         let why = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays";
         assert!(error.starts_with(why), "{error}");
-        assert_eq!(said(&lines, "change")[0], "altitude: 20 m -> 50 m");
-        assert!(said(&lines, "dry run").is_empty(), "{lines:?}");
+        assert_eq!(
+            lines_of_event(&lines, "change")[0],
+            "altitude: 20 m -> 50 m"
+        );
+        assert!(lines_of_event(&lines, "dry run").is_empty(), "{lines:?}");
     }
-    assert!(!bench.0.relays[0].has_said("uploaded: "));
+    assert!(!bench.0.relays[0].has_printed("uploaded: "));
 }
 
 /// Checks `--from-loaded`, which uploads the relays' loaded mission with the given changes. The ground station shows
@@ -179,13 +195,16 @@ fn an_upload_based_on_loaded_values_shows_reverted_keys() {
     ] {
         let more = format!("--new-altitude 30 --dry-run {from}");
         let lines = bench.uploads("2", &more).succeeds();
-        assert_eq!(said(&lines, "current"), ["relay 1 flies version 1"]);
-        assert_eq!(said(&lines, "change"), expected);
+        assert_eq!(
+            lines_of_event(&lines, "current"),
+            ["relay 1 flies version 1"]
+        );
+        assert_eq!(lines_of_event(&lines, "change"), expected);
     }
     // Without any other value the relays fly again as loaded.
     let lines = bench.uploads("2", "--from-loaded --yes").succeeds();
     assert_eq!(
-        said(&lines, "change"),
+        lines_of_event(&lines, "change"),
         ["interferer: 80 W at x 700 m, y -300 m -> 80 W at x 500 m, y 400 m"]
     );
     bench.0.lines("adopted: the chain flies version 2");
@@ -241,7 +260,7 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
         let refused = "--version 1: not confirmed, nothing was uploaded\n";
         assert_eq!((status, shown), (Some(1), format!("{question}{refused}")));
     }
-    assert!(!bench.0.relays[0].has_said("uploaded: "));
+    assert!(!bench.0.relays[0].has_printed("uploaded: "));
     let (status, shown) = at_a_terminal(&bench.options("1", new), "y\n");
     assert_eq!((status, &shown[..]), (Some(0), question));
     bench.0.lines("adopted: the chain flies version 1");

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::chain::{Chain, QUICK};
-use crate::files::{Files, answer, asked, write};
+use crate::files::{Files, answer, status_of, write};
 use crate::medium::{Medium, QUIET};
 use crate::peer::Peer;
 use crate::process::{LIMIT, Relay, bits};
@@ -24,7 +24,7 @@ struct Drones {
     fifos: [String; 3],
     at: [[f32; 3]; 3],
     /// Log lines of each relay so far.
-    said: [Vec<String>; 3],
+    lines: [Vec<String>; 3],
 }
 
 impl Drones {
@@ -41,19 +41,19 @@ impl Drones {
             chain,
             fifos,
             at: [10.0, 30.0, 50.0].map(|x_m| [x_m, 0.0, 20.0]),
-            said: Default::default(),
+            lines: Default::default(),
         }
     }
 
-    fn has_said(&self, index: usize, part: &str) -> bool {
-        self.said[index - 1].iter().any(|line| line.contains(part))
+    fn has_logged(&self, index: usize, part: &str) -> bool {
+        self.lines[index - 1].iter().any(|line| line.contains(part))
     }
 
     /// Moves drones 1 and 2 to their setpoints until the condition holds.
     fn fly_until(&mut self, is_so: impl Fn(&Self) -> bool) {
         let end = Instant::now() + LIMIT;
         while !is_so(self) {
-            assert!(Instant::now() < end, "{:?}: {:#?}", self.at, self.said);
+            assert!(Instant::now() < end, "{:?}: {:#?}", self.at, self.lines);
             for (k, relay) in self.chain.relays.iter_mut().enumerate() {
                 let [x, y, h] = self.at[k];
                 write(&self.fifos[k], &format!("{x} {y} {h}\n"));
@@ -63,7 +63,7 @@ impl Drones {
                     let to = bits(line).into_iter().map(f32::from_bits);
                     self.at[k] = to.collect::<Vec<_>>().try_into().unwrap();
                 }
-                self.said[k].extend(lines);
+                self.lines[k].extend(lines);
             }
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -73,11 +73,11 @@ impl Drones {
 #[test]
 fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     let mut drones = Drones::start();
-    drones.fly_until(|all| (1..=3).all(|index| all.has_said(index, "converged: ")));
+    drones.fly_until(|all| (1..=3).all(|index| all.has_logged(index, "converged: ")));
     drop(drones.chain.relays.pop());
-    drones.fly_until(|all| all.has_said(2, "a lost relay may still hover between"));
+    drones.fly_until(|all| all.has_logged(2, "a lost relay may still hover between"));
     let socket = drones.chain.files.path("status2");
-    assert_eq!(asked(&socket)["relay"]["lost"], json!([3]));
+    assert_eq!(status_of(&socket)["relay"]["lost"], json!([3]));
     for (command, why) in [
         (
             "land",
@@ -105,9 +105,9 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     let process = std::process::id();
     let line =
         format!("relay 2  cleared: {said} (`clear-lost 3` by user {uid}, process {process})");
-    drones.fly_until(|all| all.has_said(2, &line));
+    drones.fly_until(|all| all.has_logged(2, &line));
     drones.fly_until(|all| all.at[1][0] > 60.0);
-    assert_eq!(asked(&socket)["relay"]["lost"], json!([]));
+    assert_eq!(status_of(&socket)["relay"]["lost"], json!([]));
 }
 
 /// Checks that a client that sends nothing, or half a command, is answered at once.
@@ -120,7 +120,7 @@ fn an_incomplete_command_is_answered() {
     let (is_done, text) = commanded(&socket, "clear-lo");
     assert!(!is_done, "{text}");
     relay.line("command refused: unknown command `clear-lo`: the only command is clear-lost N");
-    assert_eq!(asked(&socket)["relay"]["index"], 1);
+    assert_eq!(status_of(&socket)["relay"]["index"], 1);
     let text = answer(&socket, "", false);
     assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
@@ -136,13 +136,13 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     let second = chain.relay(2, &format!("--distance {distance} {QUICK}"));
     let own = crate::peer::options(&link);
     let mut relay = chain.relay(1, &format!("{own} --status-socket {socket} {QUICK}"));
-    relay.says("converged: ");
-    relay.says("autopilot: on the ground");
+    relay.wait_for("converged: ");
+    relay.wait_for("autopilot: on the ground");
     drop(second);
     relay.line("lost: ");
-    assert_eq!(asked(&socket)["relay"]["lost"], json!([2]));
+    assert_eq!(status_of(&socket)["relay"]["lost"], json!([2]));
     let answer = |drone: &Peer, result: u64| {
-        let ack = drone.hears(|heard| heard.is("COMMAND_ACK") && heard.0["result"] == result);
+        let ack = drone.receive(|heard| heard.is("COMMAND_ACK") && heard.0["result"] == result);
         assert_eq!(ack.0["command"], 31_010);
         let to = [&ack.0["target_system"], &ack.0["target_component"]];
         assert_eq!(to, [255, 190]);
@@ -158,5 +158,5 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     relay.line(
         "cleared: relay 2 is cleared: no lost relay downstream limits this relay any more (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
     );
-    assert_eq!(asked(&socket)["relay"]["lost"], json!([]));
+    assert_eq!(status_of(&socket)["relay"]["lost"], json!([]));
 }

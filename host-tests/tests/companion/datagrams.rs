@@ -3,7 +3,7 @@
 use std::net::UdpSocket;
 
 use crate::files::Files;
-use crate::peer::{Heard, Peer, relay};
+use crate::peer::{Peer, ReceivedMessage, relay};
 use crate::process::Relay;
 
 /// Free UDP ports of this computer for an autopilot (`port`) and its companion (`local`).
@@ -56,46 +56,46 @@ impl Ports {
 }
 
 /// Checks that the companion and its autopilot receive each other's messages.
-fn they_hear_each_other(relay: &mut Relay, drone: &mut Peer) {
+fn check_both_receive(relay: &mut Relay, drone: &mut Peer) {
     relay.line("autopilot: found a PX4");
     relay.line("autopilot: on the ground, or not armed");
     drone.forget();
-    drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == serde_json::json!([7, 191]));
+    drone.receive(|heard| heard.is("HEARTBEAT") && heard.0["from"] == serde_json::json!([7, 191]));
 }
 
 /// Checks that an autopilot answers a companion that restarts, first after a kill, then after an exit.
-fn is_heard_again(address: &str, ports: Ports) {
+fn check_received_after_restarts(address: &str, ports: Ports) {
     let mut drone = ports.drone(ports.local);
     let mut first = relay(address, "");
-    they_hear_each_other(&mut first, &mut drone);
+    check_both_receive(&mut first, &mut drone);
     // Dropping kills it with SIGKILL.
     drop(first);
     let mut second = relay(address, "");
-    they_hear_each_other(&mut second, &mut drone);
+    check_both_receive(&mut second, &mut drone);
     second.stopped();
     let mut third = relay(address, "");
-    they_hear_each_other(&mut third, &mut drone);
-    let heard = drone.hears(Heard::is_any);
+    check_both_receive(&mut third, &mut drone);
+    let heard = drone.receive(ReceivedMessage::is_any);
     assert_eq!(heard.partner(), Some(ports.local), "{address}");
 }
 
 #[test]
 fn a_restarted_companion_is_received_at_the_ports_of_px4() {
     let ports = Ports::of_px4();
-    is_heard_again(&format!("udp:127.0.0.1:{}", ports.port), ports);
+    check_received_after_restarts(&format!("udp:127.0.0.1:{}", ports.port), ports);
 }
 
 #[test]
 fn a_restarted_companion_is_received_at_any_other_port() {
     let ports = Ports::apart(1_000);
-    is_heard_again(&format!("udp:127.0.0.1:{}", ports.port), ports);
+    check_received_after_restarts(&format!("udp:127.0.0.1:{}", ports.port), ports);
 }
 
 #[test]
 fn a_restarted_companion_is_received_at_its_local_port() {
     let ports = Ports::apart(7);
     let address = format!("udp:localhost:{}@{}", ports.port, ports.local);
-    is_heard_again(&address, ports);
+    check_received_after_restarts(&address, ports);
 }
 
 /// Checks that a companion that restarts in the air finds the autopilot and its flight state.
@@ -105,7 +105,7 @@ fn a_companion_restarted_in_the_air_is_received() {
     let address = format!("udp:127.0.0.1:{}", ports.port);
     let mut drone = ports.drone(ports.local);
     let mut first = relay(&address, "");
-    they_hear_each_other(&mut first, &mut drone);
+    check_both_receive(&mut first, &mut drone);
     drone.takes_off();
     first.line("autopilot: in the air");
     drop(first);
@@ -121,7 +121,7 @@ fn an_autopilot_that_restarts_is_found_again() {
     // The drone does not send before it receives a datagram.
     let mut drone = ports.drone(9);
     let mut relay = relay(&format!("udp:127.0.0.1:{}", ports.port), "");
-    they_hear_each_other(&mut relay, &mut drone);
+    check_both_receive(&mut relay, &mut drone);
     for _ in 0..2 {
         drone.order("unplug");
         relay.line("autopilot: no heartbeat");
@@ -129,7 +129,7 @@ fn an_autopilot_that_restarts_is_found_again() {
         drone.forget();
         drone.order("plug");
         relay.line("autopilot: on the ground, or not armed");
-        let heard = drone.hears(Heard::is_any);
+        let heard = drone.receive(ReceivedMessage::is_any);
         assert_eq!(heard.partner(), Some(ports.local));
     }
     relay.stopped();
@@ -181,6 +181,6 @@ fn the_file_states_a_local_port() {
     let file = files.write("drone.toml", lines.join("\n"));
     let mut relay = Relay::start(&format!("--config {file} --index 1 --of 1"));
     relay.line("autopilot: found a PX4");
-    let heard = drone.hears(Heard::is_any);
+    let heard = drone.receive(ReceivedMessage::is_any);
     assert_eq!(heard.partner(), Some(ports.local));
 }

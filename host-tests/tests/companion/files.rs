@@ -88,7 +88,7 @@ pub(crate) fn answer(socket: impl AsRef<Path>, request: &str, is_whole: bool) ->
 }
 
 /// Returns the status answer of a process's socket.
-pub(crate) fn asked(socket: impl AsRef<Path>) -> Value {
+pub(crate) fn status_of(socket: impl AsRef<Path>) -> Value {
     let text = answer(socket, "", true);
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
 }
@@ -97,7 +97,7 @@ pub(crate) fn asked(socket: impl AsRef<Path>) -> Value {
 pub(crate) fn until(socket: impl AsRef<Path>, is_so: impl Fn(&Value) -> bool) -> Value {
     let mut said = Value::Null;
     wait_until(|| {
-        said = asked(&socket);
+        said = status_of(&socket);
         is_so(&said)
     });
     said

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::files::Files;
-use crate::peer::{Heard, Peer, Site, agreed, apart_m, relay};
+use crate::peer::{Peer, ReceivedMessage, Site, agreed, apart_m, relay};
 use crate::process::Relay;
 
 /// Messages requested by the companion (position, landed state, target), and their intervals, µs.
@@ -74,18 +74,19 @@ impl Flight {
         // Before that, the companion has seen no other mode.
         self.relay.line("autopilot: ready");
         if self.is_px4 {
-            self.drone.hears(Heard::is_target);
+            self.drone.receive(ReceivedMessage::is_target);
         }
         self.drone.order("mode companion");
         self.relay.line("autopilot: setpoint control engaged");
         self.drone
-            .hears(|heard| heard.says("relay: engaged, flies to position"));
+            .receive(|heard| heard.is_text("relay: engaged, flies to position"));
     }
 
     /// Waits until the drone is within a metre of `place`, under setpoint control.
     pub(crate) fn arrives(&self, place: Site) {
-        let is_there = |heard: &Heard| heard.is_any() && apart_m(heard.own(), place) < 1.0;
-        let there = self.drone.hears(is_there);
+        let is_there =
+            |heard: &ReceivedMessage| heard.is_any() && apart_m(heard.own(), place) < 1.0;
+        let there = self.drone.receive(is_there);
         assert_eq!(there.mode(), "companion");
     }
 
@@ -98,12 +99,12 @@ impl Flight {
             "pilot" => "relay: released, manual mode",
             _ => "relay: released, returns (RTL)",
         };
-        self.drone.hears(|heard| heard.says(text));
+        self.drone.receive(|heard| heard.is_text(text));
     }
 
-    pub(crate) fn targets_for(&self, span: Duration) -> Vec<Heard> {
-        let mut heard = self.drone.hears_for(span);
-        heard.retain(Heard::is_target);
+    pub(crate) fn targets_for(&self, span: Duration) -> Vec<ReceivedMessage> {
+        let mut heard = self.drone.receive_for(span);
+        heard.retain(ReceivedMessage::is_target);
         heard
     }
 }
@@ -111,13 +112,13 @@ impl Flight {
 /// Checks that the companion's heartbeats are those of an onboard computer, not of an autopilot.
 fn is_an_onboard_computer(drone: &Peer) {
     let from = serde_json::json!([7, 191]);
-    let heard = drone.hears(|heard| heard.is("HEARTBEAT") && heard.0["from"] == from);
+    let heard = drone.receive(|heard| heard.is("HEARTBEAT") && heard.0["from"] == from);
     let (kind, autopilot) = (&heard.0["type"], &heard.0["autopilot"]);
     assert_eq!((kind, autopilot), (&18.into(), &8.into()));
 }
 
 /// Checks that successive targets lead from the drone to `place` without a jump.
-fn lead_to(targets: &[Heard], place: Site) {
+fn lead_to(targets: &[ReceivedMessage], place: Site) {
     let mut before = targets[0].own();
     for target in targets {
         assert_eq!(target.mode(), "companion", "{target:?}");
@@ -136,24 +137,24 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     let mut flight = Flight::found_by(kind, key, "");
     // A PX4 is not asked for its target because it does not report it.
     let asked = if kind == "px4" { &ASKED[..2] } else { &ASKED };
-    flight.drone.is_asked_for(asked);
+    flight.drone.wait_for_requests(asked);
     is_an_onboard_computer(&flight.drone);
     assert!(flight.targets_for(MOMENT).is_empty(), "it is on the ground");
     flight.takes_off();
     flight.drone.forget();
     if kind == "px4" {
-        flight.drone.hears(Heard::is_target);
+        flight.drone.receive(ReceivedMessage::is_target);
     }
     flight.relay.line("autopilot: ready");
     flight.drone.order("mode companion");
     flight.relay.line("autopilot: setpoint control engaged");
-    let is_there = |heard: &Heard| heard.is_any() && apart_m(heard.own(), place) < 0.5;
-    let mut all = flight.drone.hears_until(is_there);
+    let is_there = |heard: &ReceivedMessage| heard.is_any() && apart_m(heard.own(), place) < 0.5;
+    let mut all = flight.drone.receive_until(is_there);
     assert!(
         all.iter()
-            .any(|heard| heard.says("relay: engaged, flies to position"))
+            .any(|heard| heard.is_text("relay: engaged, flies to position"))
     );
-    all.extend(flight.drone.hears_for(2 * MOMENT));
+    all.extend(flight.drone.receive_for(2 * MOMENT));
     all.retain(|heard| heard.is_target() && heard.mode() == "companion");
     assert!(all.len() > 50, "{} targets", all.len());
     lead_to(&all, place);
@@ -209,7 +210,7 @@ fn an_arducopter(key: Option<&str>) {
     // The pilot gives control back: the drone flies from its position to the agreed one.
     flight.drone.forget();
     flight.is_engaged();
-    let back = flight.drone.hears(Heard::is_target);
+    let back = flight.drone.receive(ReceivedMessage::is_target);
     assert!(apart_m(back.to(), back.own()) < 1.0, "{back:?}");
     assert!(apart_m(back.own(), place) > 5.0, "{back:?}");
     flight.arrives(place);
@@ -272,7 +273,7 @@ fn a_px4(key: Option<&str>) {
     flight.drone.order("sticks 4 0");
     let own = flight.targets_for(2 * MOMENT);
     assert!(own.len() > 10, "{own:?}");
-    assert!(own.iter().all(Heard::is_to_own_place), "{own:?}");
+    assert!(own.iter().all(ReceivedMessage::is_to_own_place), "{own:?}");
     let flown = apart_m(own[own.len() - 1].own(), place);
     assert!(flown > 8.0, "{flown} m from its place");
     flight.is_engaged();
@@ -280,7 +281,7 @@ fn a_px4(key: Option<&str>) {
 
     flight.is_released_by("rtl");
     let own = flight.targets_for(MOMENT);
-    assert!(own.iter().all(Heard::is_to_own_place), "{own:?}");
+    assert!(own.iter().all(ReceivedMessage::is_to_own_place), "{own:?}");
     flight.is_engaged();
     flight.arrives(place);
 
@@ -289,16 +290,16 @@ fn a_px4(key: Option<&str>) {
     flight
         .relay
         .line("autopilot: cannot be engaged: the autopilot is in a failsafe");
-    let heard = flight.drone.hears_for(2 * MOMENT);
+    let heard = flight.drone.receive_for(2 * MOMENT);
     assert!(heard.iter().all(|heard| heard.mode() == "hold"));
     assert!(
-        !heard.iter().any(Heard::is_target),
+        !heard.iter().any(ReceivedMessage::is_target),
         "nobody has asked for it"
     );
     // The pilot takes control with the sticks, and gives it back.
     flight.drone.order("sticks 0 0");
     flight.drone.order("mode pilot");
-    flight.drone.hears(Heard::is_target);
+    flight.drone.receive(ReceivedMessage::is_target);
     flight.is_engaged();
     flight.arrives(place);
 

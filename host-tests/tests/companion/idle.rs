@@ -13,7 +13,7 @@ fn a_settled_relay_sleeps() {
     assert_idle(&chain.relays, 100);
     for relay in &mut chain.relays {
         assert!(
-            !relay.has_said("lost"),
+            !relay.has_printed("lost"),
             "it has heard the others all the time"
         );
     }

@@ -217,5 +217,5 @@ fn neighbours_with_different_missions_report_it() {
     let mut first = chain.relay(1, "");
     let mut second = chain.relay(2, "--altitude 21");
     second.line("mismatch: relay 1 has another mission than this relay, which has 0x");
-    assert!(!second.has_said("setpoint") && !first.has_said("setpoint"));
+    assert!(!second.has_printed("setpoint") && !first.has_printed("setpoint"));
 }

@@ -5,7 +5,9 @@ use std::time::Duration;
 use crate::files::Files;
 use crate::flying::Flight;
 use crate::medium::{Medium, QUIET};
-use crate::peer::{Heard, RX, Site, TX, agreed, agreed_toward, apart_m, distance_to_m, text};
+use crate::peer::{
+    RX, ReceivedMessage, Site, TX, agreed, agreed_toward, apart_m, distance_to_m, text,
+};
 use crate::process::Relay;
 
 /// New site of the receiver, about 200 m beyond the old one and to the right, on higher ground.
@@ -54,7 +56,7 @@ fn a_drone_waits_and_then_flies_along_the_new_line() {
         flight.drone.forget();
         let last = flight
             .drone
-            .hears(|heard| Heard::is_target(heard) || kind == "arducopter");
+            .receive(|heard| ReceivedMessage::is_target(heard) || kind == "arducopter");
         if kind == "px4" {
             let off = apart_m(last.to(), after);
             assert!(off < 1.0, "{off} m off: {last:?}");

@@ -93,9 +93,9 @@ pub(crate) struct Peer {
 
 /// MAVLink message that the simulated autopilot has received, as JSON fields.
 #[derive(Clone, Debug)]
-pub(crate) struct Heard(pub(crate) Value);
+pub(crate) struct ReceivedMessage(pub(crate) Value);
 
-impl Heard {
+impl ReceivedMessage {
     pub(crate) fn is(&self, name: &str) -> bool {
         self.0["mavpackettype"] == name
     }
@@ -115,12 +115,12 @@ impl Heard {
     }
 
     /// Returns true if this message is a STATUSTEXT with `text`.
-    pub(crate) fn says(&self, text: &str) -> bool {
+    pub(crate) fn is_text(&self, text: &str) -> bool {
         self.is("STATUSTEXT") && self.0["text"] == text
     }
 
     /// Returns the id and interval in µs of the message that this one requests; `None` if it is no request.
-    pub(crate) fn asks_for(&self) -> Option<(u64, u64)> {
+    pub(crate) fn requested_interval(&self) -> Option<(u64, u64)> {
         let asks = self.is("COMMAND_LONG") && self.0["command"] == 511;
         let number = |name: &str| self.0[name].as_f64().unwrap() as u64;
         asks.then(|| (number("param1"), number("param2")))
@@ -174,7 +174,7 @@ impl Peer {
             lines: lines_of(child.stdout.take().unwrap()),
             child,
         };
-        peer.hears(|heard| heard.is("READY"));
+        peer.receive(|heard| heard.is("READY"));
         peer
     }
 
@@ -197,12 +197,15 @@ impl Peer {
     }
 
     /// Waits for the next message for which `wanted` is true, and returns it.
-    pub(crate) fn hears(&self, wanted: impl Fn(&Heard) -> bool) -> Heard {
-        self.hears_until(wanted).pop().unwrap()
+    pub(crate) fn receive(&self, wanted: impl Fn(&ReceivedMessage) -> bool) -> ReceivedMessage {
+        self.receive_until(wanted).pop().unwrap()
     }
 
     /// Waits for the next message for which `wanted` is true. Returns all messages up to and with that one.
-    pub(crate) fn hears_until(&self, wanted: impl Fn(&Heard) -> bool) -> Vec<Heard> {
+    pub(crate) fn receive_until(
+        &self,
+        wanted: impl Fn(&ReceivedMessage) -> bool,
+    ) -> Vec<ReceivedMessage> {
         let end = Instant::now() + LIMIT;
         let mut all = Vec::new();
         loop {
@@ -211,7 +214,7 @@ impl Peer {
                 let from = all.len().saturating_sub(10);
                 panic!("it was not heard; the last: {:#?}", &all[from..]);
             };
-            let heard = Heard(serde_json::from_str(&line).unwrap());
+            let heard = ReceivedMessage(serde_json::from_str(&line).unwrap());
             let is_wanted = wanted(&heard);
             all.push(heard);
             if is_wanted {
@@ -221,17 +224,17 @@ impl Peer {
     }
 
     /// Returns the messages that arrive during the next `span`.
-    pub(crate) fn hears_for(&self, span: Duration) -> Vec<Heard> {
+    pub(crate) fn receive_for(&self, span: Duration) -> Vec<ReceivedMessage> {
         self.forget();
         std::thread::sleep(span);
         self.so_far()
     }
 
     /// Returns the messages that have arrived and were not returned before.
-    pub(crate) fn so_far(&self) -> Vec<Heard> {
+    pub(crate) fn so_far(&self) -> Vec<ReceivedMessage> {
         let lines = self.lines.try_iter();
         lines
-            .map(|line| Heard(serde_json::from_str(&line).unwrap()))
+            .map(|line| ReceivedMessage(serde_json::from_str(&line).unwrap()))
             .collect()
     }
 
@@ -240,11 +243,11 @@ impl Peer {
     }
 
     /// Waits until the companion has requested all of the messages `wanted`: their ids and intervals in µs.
-    pub(crate) fn is_asked_for(&self, wanted: &[(u64, u64)]) {
+    pub(crate) fn wait_for_requests(&self, wanted: &[(u64, u64)]) {
         let mut left = wanted.to_vec();
         while !left.is_empty() {
-            let heard = self.hears(|heard| heard.asks_for().is_some());
-            left.retain(|asked| heard.asks_for() != Some(*asked));
+            let heard = self.receive(|heard| heard.requested_interval().is_some());
+            left.retain(|asked| heard.requested_interval() != Some(*asked));
         }
     }
 }

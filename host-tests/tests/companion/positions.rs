@@ -28,7 +28,7 @@ fn two_relays_with_positions_keep_apart_by_their_guards() {
         let line =
             relay.line("guarded: setpoints keep drones apart while they move, by --positions");
         assert!(!line.contains("unguarded"), "{line}");
-        assert!(!relay.has_said("setpoint: "), "nobody knows where it is");
+        assert!(!relay.has_printed("setpoint: "), "nobody knows where it is");
     }
     let began = Instant::now();
     let mut setpoints = [0; 2];

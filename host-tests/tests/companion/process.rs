@@ -95,14 +95,14 @@ impl Relay {
     }
 
     /// Returns true if a line that the process has printed contains `part`.
-    pub(crate) fn has_said(&mut self, part: &str) -> bool {
+    pub(crate) fn has_printed(&mut self, part: &str) -> bool {
         self.seen.extend(self.lines.try_iter());
         self.seen.iter().any(|line| line.contains(part))
     }
 
     /// Waits for a line that contains `part`; returns at once if the process has printed such a line.
-    pub(crate) fn says(&mut self, part: &str) {
-        if !self.has_said(part) {
+    pub(crate) fn wait_for(&mut self, part: &str) {
+        if !self.has_printed(part) {
             self.line(part);
         }
     }

@@ -55,7 +55,7 @@ fn a_relay_with_a_different_key_is_ignored() {
     let chain = Chain::on_wires(2, QUIET);
     let (mut one, _other) = (start(&chain, 1, "key"), start(&chain, 2, "other"));
     one.line("lost: relay 2 downstream does not reply");
-    assert!(!one.has_said("setpoint: "));
+    assert!(!one.has_printed("setpoint: "));
     let last = one.stopped().pop().unwrap();
     assert!(
         last.contains(" 0 received, ") && !last.contains(" 0 rejected"),
@@ -132,7 +132,7 @@ fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     let line = chain.relays[0].line("epoch: ");
     let remedy = "epoch: the epoch of relay 2 went back, and its frames are rejected; raise the number in the --epoch-file of relay 2 and restart it";
     assert!(line.ends_with(remedy), "{line}");
-    assert!(!back.has_said("converged: "));
+    assert!(!back.has_printed("converged: "));
     back.stopped();
     chain.files.write("epoch2", "42\n");
     chain.relays.push(start(&chain, 2, "key"));

@@ -12,14 +12,14 @@ use serde_json::Value;
 
 use crate::binary::companion;
 use crate::chain::{Chain, QUICK};
-use crate::files::{asked, until};
+use crate::files::{status_of, until};
 use crate::medium::Medium;
 use crate::process::{LIMIT, Relay, lines_of, words};
 use crate::stays::fill_disk;
 
 /// Statistics of the answers to status queries of one relay.
 #[derive(Debug, Default)]
-struct Seen {
+struct StatusStatistics {
     answers: u64,
     slowest: Duration,
     /// Number of status answers in which the relay has no setpoint.
@@ -28,8 +28,8 @@ struct Seen {
 }
 
 /// Queries a relay's status five times a second until `stop` is set.
-fn watch(socket: &Path, stop: &AtomicBool) -> Seen {
-    let mut seen = Seen::default();
+fn watch(socket: &Path, stop: &AtomicBool) -> StatusStatistics {
+    let mut seen = StatusStatistics::default();
     while !stop.load(Ordering::Relaxed) {
         let begun = Instant::now();
         let mut text = String::new();
@@ -90,7 +90,7 @@ fn round(channel: &Medium, sockets: &[PathBuf], relays: &mut [Relay; 3]) {
 }
 
 /// Resumes reading of the first relay's lines. Returns the number of reports on dropped lines.
-fn told(first: &Relay, reader: PipeReader, dropped: u64) -> usize {
+fn reports_of_dropped_lines(first: &Relay, reader: PipeReader, dropped: u64) -> usize {
     let lines = lines_of(reader);
     let end = Instant::now() + LIMIT;
     while dropped > 0 && Instant::now() < end {
@@ -106,7 +106,7 @@ fn told(first: &Relay, reader: PipeReader, dropped: u64) -> usize {
     0
 }
 
-fn said_once_a_round(said: &[String], parts: [&str; 3], rounds: usize) {
+fn check_logged_once_a_round(said: &[String], parts: [&str; 3], rounds: usize) {
     for part in parts {
         let times = said.iter().filter(|line| line.contains(part)).count();
         assert_eq!(times, rounds, "{part} in {said:#?}");
@@ -147,7 +147,7 @@ fn faults_of_ports_and_disks_end_no_relay() {
     stop.store(true, Ordering::Relaxed);
     let seen = watchers.map(|watcher| watcher.join().unwrap());
 
-    let dropped = asked(&sockets[0])["lines_dropped"].as_u64().unwrap();
+    let dropped = status_of(&sockets[0])["lines_dropped"].as_u64().unwrap();
     println!("{took} s, {rounds} rounds, {dropped} lines dropped by the first");
     for (seen, index) in seen.iter().zip(1..) {
         println!("relay {index}: {seen:?}");
@@ -157,16 +157,16 @@ fn faults_of_ports_and_disks_end_no_relay() {
     }
     assert!(dropped > 0);
     let [first, second, third] = relays;
-    assert_eq!(told(&first, reader, dropped), 1);
+    assert_eq!(reports_of_dropped_lines(&first, reader, dropped), 1);
     second.stopped();
     let said = std::fs::read_to_string(&log).unwrap();
     let said: Vec<String> = said.lines().map(str::to_owned).collect();
     let parts = ["port lost: --shared ", "port back: --shared ", "hang-up: "];
-    said_once_a_round(&said, parts, rounds);
+    check_logged_once_a_round(&said, parts, rounds);
     let parts = [
         "cannot be written: ",
         "is written again, after ",
         "hang-up: ",
     ];
-    said_once_a_round(&third.stopped(), parts, rounds);
+    check_logged_once_a_round(&third.stopped(), parts, rounds);
 }

@@ -12,7 +12,7 @@ use uav_relay_scenario::scene::Scene;
 
 use crate::chain::Chain;
 use crate::datagrams::Ports;
-use crate::files::{Files, asked, until, write};
+use crate::files::{Files, status_of, until, write};
 use crate::medium::{Medium, QUIET};
 use crate::process::{LIMIT, Relay};
 
@@ -44,7 +44,7 @@ fn is_about(said: &Value, expected: f64) -> bool {
 }
 
 /// Returns FIFO lines with three positions of relay `relay` and the interference power there, W.
-fn heard(scene: &Scene, relay: usize) -> String {
+fn fifo_lines(scene: &Scene, relay: usize) -> String {
     let mut lines = String::new();
     for step in 0..3_u8 {
         let at = Placement {
@@ -111,7 +111,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     for (index, relay) in (1..).zip(&mut relays) {
         write(
             field.files.path(&format!("positions{index}")),
-            &heard(&scene, index),
+            &fifo_lines(&scene, index),
         );
         let line = relay.line("estimate: interferer ");
         let at = line.split("at the receiver ").nth(1).unwrap();
@@ -127,8 +127,8 @@ fn the_relays_know_the_measurements_of_both_stations() {
     field.media[0].plug(4);
     rx.line("port back: --tty ");
     let is_louder = |said: &Value| said["relay"]["receiver_w"].as_f64().unwrap() > 1.3 * rx_w;
-    write_until(&level, 2.0 * rx_w, || is_louder(&asked(status(2))));
-    let said = asked(status(4));
+    write_until(&level, 2.0 * rx_w, || is_louder(&status_of(status(2))));
+    let said = status_of(status(4));
     assert_eq!(said["station"]["hears"], serde_json::json!([1, 2, 3]));
     assert_eq!(said["links"]["ports"][0]["times_gone"], 1);
     assert!(
@@ -143,7 +143,9 @@ fn the_relays_know_the_measurements_of_both_stations() {
 
     // A lost relay is reported because measurements are sent to it.
     drop(relays.remove(2));
-    write_until(&level, rx_w, || rx.has_said("lost: relay 3 does not reply"));
+    write_until(&level, rx_w, || {
+        rx.has_printed("lost: relay 3 does not reply")
+    });
     for station in [tx, rx] {
         let last = station.stopped().pop().unwrap();
         assert!(last.contains("stopped"), "{last}");

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::binary::{companion, ground};
 use crate::chain::{Chain, QUICK};
-use crate::files::{Files, asked, until};
+use crate::files::{Files, status_of, until};
 use crate::medium::Medium;
 use crate::process::{LIMIT, Relay, wait_until, words};
 use crate::pty::Pty;
@@ -33,7 +33,7 @@ fn a_vanished_port_returns_and_the_other_one_goes_on() {
         let line = relay.line("is gone; retried until it is back");
         assert!(line.contains("port lost: --upstream "), "{line}");
         let sent = |said: &Value| said["links"]["ports"][1]["bytes_out"].as_u64().unwrap();
-        let before = sent(&asked(&socket));
+        let before = sent(&status_of(&socket));
         until(&socket, |said| sent(said) > before + 20);
         hub.plug(0);
         relay.line("port back: --upstream ");
@@ -63,7 +63,7 @@ fn goes_on_where_nobody_reads(program: &Path, options: &str) {
         let socket = files.text("status");
         let options = format!("{options} --status-socket {socket}");
         let relay = Relay::run(program, &words(&options), stdout);
-        asked(&socket);
+        status_of(&socket);
         // Each line has some 1 500 bytes: 64 KiB fit into the pipe, 1 024 lines into the queue.
         let end = Instant::now() + LIMIT;
         let mut dropped = 0;
@@ -71,7 +71,7 @@ fn goes_on_where_nobody_reads(program: &Path, options: &str) {
             assert!(Instant::now() < end, "{name}: {dropped} dropped");
             relay.signal(Signal::USR1);
             let asked_at = Instant::now();
-            dropped = asked(&socket)["lines_dropped"].as_u64().unwrap();
+            dropped = status_of(&socket)["lines_dropped"].as_u64().unwrap();
             assert!(asked_at.elapsed() < Duration::from_secs(2), "{name}");
         }
         let begun = Instant::now();
@@ -128,7 +128,7 @@ fn the_socket_answers_despite_stuck_clients() {
     for stream in &mut stuck {
         let _ = stream.write(b"GET / HTTP/1.1\r\n\r\n");
     }
-    let said = asked(&socket);
+    let said = status_of(&socket);
     assert_eq!(said["relay"]["index"], 1);
     assert_eq!(said["relay"]["downstream"]["name"], Value::Null);
     assert!(said["relay"]["setpoint"]["x_m"].is_f64(), "{said:#}");
@@ -259,7 +259,7 @@ fn a_slow_disk_delays_only_its_own_frames() {
             "sends although its vote is not stored"
         );
         let begun = Instant::now();
-        let said = asked(&socket);
+        let said = status_of(&socket);
         slowest = slowest.max(begun.elapsed());
         if sent(&said) != before {
             (before, since) = (sent(&said), begun);
@@ -275,7 +275,7 @@ fn a_slow_disk_delays_only_its_own_frames() {
     second = of_two(&chain, 2, "");
     first.line("back: relay 2");
     second.line("setpoint: ");
-    assert!(sent(&asked(&socket)) > before);
+    assert!(sent(&status_of(&socket)) > before);
     first.signal(Signal::TERM);
     assert_eq!(first.end().status, Some(0));
     assert!(Path::new(&views).exists() && !Path::new(&slow).exists());

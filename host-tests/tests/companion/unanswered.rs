@@ -4,7 +4,7 @@ use std::net::UdpSocket;
 use std::time::Duration;
 
 use crate::datagrams::Ports;
-use crate::files::{Files, asked, until};
+use crate::files::{Files, status_of, until};
 use crate::peer::relay;
 use crate::process::Relay;
 use crate::pty::Pty;
@@ -36,14 +36,14 @@ impl Unanswered {
     }
 
     /// Checks that the report of no answer comes after 3 s, contains `parts`, and is in the status.
-    fn is_said(&mut self, parts: &[&str]) {
+    fn check_report(&mut self, parts: &[&str]) {
         let line = self.relay.line(parts[0]);
         let seconds = seconds(&line);
         assert!((3.0..3.0 + LATE_S).contains(&seconds), "{line}");
         for part in parts {
             assert!(line.contains(part), "{part} not in {line}");
         }
-        let said = asked(self.status());
+        let said = status_of(self.status());
         let autopilot = &said["autopilot"];
         let why = autopilot["unanswered"].as_str().unwrap();
         assert!(line.ends_with(why), "{why} is not the end of {line}");
@@ -51,7 +51,7 @@ impl Unanswered {
     }
 
     /// Checks that the report is not repeated for 7 s, in which the relay is nearly idle.
-    fn is_said_once(&mut self) {
+    fn check_no_repetition(&mut self) {
         let before = self.relay.cost();
         std::thread::sleep(Duration::from_secs(7));
         let (used, woken) = self.relay.cost_since(before);
@@ -59,7 +59,7 @@ impl Unanswered {
         assert!(woken < 300, "woken {woken} times");
         let again = self.relay.lines_with("autopilot: ");
         assert!(again.is_empty(), "{again:?}");
-        let said = asked(self.status());
+        let said = status_of(self.status());
         assert!(said["autopilot"]["unanswered"].is_string(), "{said}");
     }
 }
@@ -77,13 +77,13 @@ fn an_unreachable_udp_port_is_logged_once() {
         format!("127.0.0.1:{}", ports.port),
         format!("from local port {}", ports.local),
     );
-    unanswered.is_said(&[
+    unanswered.check_report(&[
         "autopilot: no answer at ",
         &at,
         &local,
         "connection refused",
     ]);
-    unanswered.is_said_once();
+    unanswered.check_no_repetition();
     // The autopilot is found once it is running.
     let drone = ports.drone(9);
     unanswered.relay.line("autopilot: found a PX4");
@@ -111,13 +111,13 @@ fn a_silent_udp_port_is_logged_once() {
     let silent = UdpSocket::bind(("127.0.0.1", ports.port)).unwrap();
     let mut unanswered = Unanswered::at(ports);
     let local = format!("from local port {}", ports.local);
-    unanswered.is_said(&[
+    unanswered.check_report(&[
         "autopilot: no answer at ",
         &local,
         "keeps the first address and port",
         "udp:HOST:PORT@LOCAL",
     ]);
-    unanswered.is_said_once();
+    unanswered.check_no_repetition();
     let mut frame = [0; 300];
     assert!(silent.recv(&mut frame).unwrap() > 0, "it was spoken to");
 }
@@ -127,8 +127,8 @@ fn a_silent_tty_is_logged_once() {
     let pty = Pty::new();
     let path = pty.path().to_str().unwrap();
     let mut unanswered = Unanswered::start(path);
-    unanswered.is_said(&["autopilot: no answer at ", path, "115200 bit/s", "TX"]);
-    unanswered.is_said_once();
+    unanswered.check_report(&["autopilot: no answer at ", path, "115200 bit/s", "TX"]);
+    unanswered.check_no_repetition();
 }
 
 /// Checks the report on bytes that are not MAVLink 2, as at a wrong baud rate.
@@ -145,7 +145,7 @@ fn noise_is_distinguished_from_silence() {
     }
     let line = unanswered.relay.line("are not MAVLink 2");
     assert!(line.contains("autopilot: "), "{line}");
-    assert!(!unanswered.relay.has_said("no answer"), "bytes came");
+    assert!(!unanswered.relay.has_printed("no answer"), "bytes came");
 }
 
 /// Checks the report on frames of a ground station, a radio or a plane. The companion can control none of them.
@@ -157,8 +157,8 @@ fn other_systems_are_distinguished_from_an_autopilot() {
     let mut unanswered = Unanswered::at(ports);
     let line = unanswered.relay.line("is from a PX4 or an ArduCopter");
     assert!(line.contains("autopilot: no frame received at "), "{line}");
-    assert!(!unanswered.relay.has_said("no answer"), "frames came");
+    assert!(!unanswered.relay.has_printed("no answer"), "frames came");
     drone.order("vehicle");
     unanswered.relay.line("autopilot: found a PX4");
-    assert!(asked(unanswered.status())["autopilot"]["unanswered"].is_null());
+    assert!(status_of(unanswered.status())["autopilot"]["unanswered"].is_null());
 }

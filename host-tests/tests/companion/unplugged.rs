@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::flying::{ASKED, Flight};
-use crate::peer::{Heard, agreed};
+use crate::peer::{ReceivedMessage, agreed};
 
 #[test]
 fn a_port_that_vanishes_is_opened_again() {
@@ -11,7 +11,7 @@ fn a_port_that_vanishes_is_opened_again() {
     let mut flight = Flight::found("arducopter", "");
     flight.takes_off();
     flight.is_engaged();
-    flight.drone.hears(Heard::is_target);
+    flight.drone.receive(ReceivedMessage::is_target);
     for _ in 0..2 {
         let (_, sleeps) = flight.relay.cost();
         flight.drone.order("unplug");
@@ -28,7 +28,7 @@ fn a_port_that_vanishes_is_opened_again() {
         flight.relay.line("autopilot: cannot be engaged");
         flight.drone.order("mode pilot");
         flight.is_engaged();
-        flight.drone.hears(Heard::is_target);
+        flight.drone.receive(ReceivedMessage::is_target);
     }
     flight.arrives(place);
     let gone = flight.relay.lines_with("is gone");
@@ -41,5 +41,5 @@ fn a_port_that_vanishes_is_opened_again() {
     flight.drone.forget();
     flight.drone.order("plug");
     flight.relay.line("is back");
-    flight.drone.is_asked_for(&ASKED);
+    flight.drone.wait_for_requests(&ASKED);
 }

@@ -66,7 +66,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
         chain.lines("resumed: this relay flies version 3");
         chain.settles_at(&uploaded);
         for relay in &mut chain.relays {
-            assert!(!relay.has_said("uploaded: ") && !relay.has_said("adopted: "));
+            assert!(!relay.has_printed("uploaded: ") && !relay.has_printed("adopted: "));
         }
         let line = ground(&chain.files, "2", &ends).refused(1);
         let held = "--version 2: must be within 4 to 65535, because the relays have version 3";
@@ -164,10 +164,10 @@ fn the_ground_reports_progress_until_all_relays_fly() {
     assert_eq!(*state.lock().unwrap(), Wire::Cut);
     // Several polls later the others still do not fly it.
     std::thread::sleep(Duration::from_secs(4));
-    assert!(!station.has_said("flown: "), "the chain is cut");
-    chain.relays[2].says("adopted: the chain flies version 5");
+    assert!(!station.has_printed("flown: "), "the chain is cut");
+    chain.relays[2].wait_for("adopted: the chain flies version 5");
     for relay in &mut chain.relays[..2] {
-        assert!(!relay.has_said("adopted: "));
+        assert!(!relay.has_printed("adopted: "));
     }
     *state.lock().unwrap() = Wire::Open;
     let line = station.line("flown: ");
@@ -177,7 +177,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
     );
     station.succeeds();
     for relay in &mut chain.relays {
-        relay.says("adopted: the chain flies version 5");
+        relay.wait_for("adopted: the chain flies version 5");
     }
 }
 
@@ -225,7 +225,7 @@ fn a_useless_upload_file_is_named_and_ignored() {
         let place = if words.is_none() { &uploaded } else { &loaded };
         relay.settles_at(place[0]);
         assert_eq!(
-            relay.has_said("resumed: this relay flies version 5"),
+            relay.has_printed("resumed: this relay flies version 5"),
             words.is_none()
         );
         let stdout = relay.stopped();
@@ -280,13 +280,20 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         let line = ground(&chain.files, "5", &more).refused(1);
         assert_eq!(line, format!("--version 5: {why}; {far}"));
         let relays = &mut chain.relays;
-        assert!(!relays[0].has_said("upload refused: "), "nothing was sent");
+        assert!(
+            !relays[0].has_printed("upload refused: "),
+            "nothing was sent"
+        );
         let line = ground(&chain.files, "5", &format!("{more} --no-fence")).refused(1);
         let by = "relay 1, or a relay beyond it, rejects the upload";
         assert_eq!(line, format!("--version 5: {by}: {why}"));
         let own = "upload refused: the altitudes must be within the relay's own geofence, ";
         relays[0].line(&format!("{own}{range}"));
-        assert!(relays.iter_mut().all(|relay| !relay.has_said("adopted: ")));
+        assert!(
+            relays
+                .iter_mut()
+                .all(|relay| !relay.has_printed("adopted: "))
+        );
     }
 }
 

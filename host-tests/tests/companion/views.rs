@@ -56,7 +56,7 @@ fn restarted_relays_keep_their_votes() {
         chain
             .relays
             .iter_mut()
-            .all(|relay| !relay.has_said("restored: "))
+            .all(|relay| !relay.has_printed("restored: "))
     );
     drop(chain.relays.pop());
     chain.settles_at(&simulated(&Scenario::default(), 2));
@@ -103,7 +103,7 @@ fn two_relays_that_recall_a_view_without_them_do_not_fly() {
         chain
             .relays
             .iter_mut()
-            .all(|relay| !relay.has_said("setpoint: "))
+            .all(|relay| !relay.has_printed("setpoint: "))
     );
 }
 

@@ -15,7 +15,7 @@ const I_MAX_W: f32 = 3.476_175_5e-7;
 
 /// Statistics of the estimates of Upsilon, the mean inverse interference, for one pair of Beta shapes.
 #[derive(Default, Debug)]
-struct Found {
+struct EstimateStatistics {
     /// Number of estimates that could be made.
     made: u32,
     /// Number of estimates within 5 % of the truth.
@@ -38,9 +38,9 @@ fn estimate(alpha: f64, beta: f64, samples: u32, seed: u64) -> Option<Estimate> 
 }
 
 /// Returns statistics of estimates from `samples` samples each, one for each of [`SEEDS`] seeds.
-fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> Found {
+fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> EstimateStatistics {
     let truth = FieldPoint::beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);
-    let mut found = Found::default();
+    let mut found = EstimateStatistics::default();
     // Every pair of shapes has its own samples.
     let first = first.wrapping_mul(1_000_003) ^ alpha.to_bits() ^ beta.to_bits().rotate_left(32);
     for k in 0..SEEDS {

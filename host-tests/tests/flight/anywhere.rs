@@ -180,14 +180,14 @@ fn is_orderly(setup: &Setup) -> bool {
     apart && back && quick && setup.uploads.is_empty()
 }
 
-struct Judged {
+struct FlightResult {
     what: Option<String>,
     margin_m: f64,
     settled: bool,
     orderly: bool,
 }
 
-fn judged(seed: u64) -> Judged {
+fn judged(seed: u64) -> FlightResult {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();
     let margin_m = outcome.margin_m;
@@ -211,7 +211,7 @@ fn judged(seed: u64) -> Judged {
             spec.start,
         )
     });
-    Judged {
+    FlightResult {
         what,
         margin_m,
         settled,

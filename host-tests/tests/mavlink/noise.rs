@@ -1,6 +1,6 @@
 //! Damaged frames on a line.
 
-use super::theirs::{by_the_crate, said};
+use super::theirs::{by_the_crate, random_message};
 use super::*;
 
 const FRAMES: usize = 20_000;
@@ -22,7 +22,7 @@ fn every_complete_frame_is_found_in_noise() {
     let mut rng = rng(4);
     let (mut line, mut whole) = (Vec::new(), Vec::new());
     for number in 0..FRAMES {
-        let (message, expected) = said(&mut rng);
+        let (message, expected) = random_message(&mut rng);
         let mut frame = by_the_crate(&message, number as u8);
         if rng.random_bool(0.2) {
             hurt(&mut rng, &mut frame);
@@ -57,7 +57,7 @@ fn every_complete_frame_is_found_in_noise() {
 /// Checks that a frame that is carried in another frame's payload is not read.
 #[test]
 fn frames_nested_in_a_message_are_not_parsed() {
-    let inner = by_the_crate(&said(&mut rng(5)).0, 1);
+    let inner = by_the_crate(&random_message(&mut rng(5)).0, 1);
     let mut payload = [0; 128];
     payload[..inner.len()].copy_from_slice(&inner);
     let tunnel = mavlink::dialects::common::TUNNEL_DATA {
@@ -81,7 +81,7 @@ fn an_unknown_message_costs_only_its_bytes() {
         ..mavlink::dialects::common::ATTITUDE_DATA::DEFAULT
     };
     let mut line = by_the_crate(&mavlink::dialects::common::MavMessage::ATTITUDE(unknown), 1);
-    let (message, expected) = said(&mut rng);
+    let (message, expected) = random_message(&mut rng);
     line.extend(by_the_crate(&message, 2));
     let mut parser = Parser::new();
     let read = parse(&mut parser, &line);
@@ -104,7 +104,7 @@ fn adversarial_bytes_cost_one_checksum_per_five_bytes() {
     println!("{checksums} checksums in {} bytes", line.len());
     assert!((line.len() / 6..=line.len() / 5).contains(&checksums));
     // The next frame is found.
-    let (message, expected) = said(&mut rng(7));
+    let (message, expected) = random_message(&mut rng(7));
     let after = [by_the_crate(&message, 1), vec![0; 300]].concat();
     let read = parse(&mut parser, &after);
     assert_eq!(read.last().unwrap().message, Some(expected));

@@ -161,7 +161,7 @@ pub(super) fn by_the_crate(message: &MavMessage, sequence: u8) -> Vec<u8> {
 }
 
 /// Draws a message of an autopilot, and how the crate must read it.
-pub(super) fn said(rng: &mut ChaCha8Rng) -> (MavMessage, Incoming) {
+pub(super) fn random_message(rng: &mut ChaCha8Rng) -> (MavMessage, Incoming) {
     match rng.random_range(0..4) {
         0 => {
             let custom_mode: u32 = rng.random();
@@ -237,7 +237,7 @@ fn every_field_that_the_mavlink_crate_writes_is_read() {
     let mut rng = rng(3);
     let mut parser = Parser::new();
     for number in 0..2_000 {
-        let (message, expected) = said(&mut rng);
+        let (message, expected) = random_message(&mut rng);
         let read = parse(&mut parser, &by_the_crate(&message, number as u8));
         assert_eq!(read.len(), 1, "{message:?}");
         assert_eq!(read[0].message, Some(expected));

@@ -74,7 +74,7 @@ struct Case {
 
 /// Durations measured in one simulated chain, ms.
 #[derive(Clone, Copy, Debug, Default)]
-struct Found {
+struct Durations {
     /// Longest time with setpoints at both duplicates, from `LIMIT_MS` after the first frame between them.
     both: u64,
     /// Longest time with setpoints at both duplicates, from the start of the second one.
@@ -90,7 +90,7 @@ struct Found {
     reported: [bool; 2],
 }
 
-fn flown(case: Case) -> Found {
+fn flown(case: Case) -> Durations {
     let rng = &mut ChaCha8Rng::seed_from_u64(case.seed);
     let relays = rng.random_range(3..=8);
     let twice = rng.random_range(1..=relays);
@@ -137,7 +137,7 @@ fn flown(case: Case) -> Found {
         }
         arrives
     });
-    let mut found = Found::default();
+    let mut found = Durations::default();
     let (mut run, mut run_at_all) = (0, 0);
     bench.run(Instant::from_millis(later));
     bench.switch_on(copy);
@@ -168,8 +168,8 @@ fn flown(case: Case) -> Found {
 }
 
 /// Simulates `COUNT` chains with duplicate relays, and prints the results. Returns each with its seed.
-fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Found)> {
-    let found: Vec<(u64, Found)> = (0..number("COUNT", 12))
+fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Durations)> {
+    let found: Vec<(u64, Durations)> = (0..number("COUNT", 12))
         .map(|seed| {
             let case = Case {
                 medium,
@@ -181,7 +181,7 @@ fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Foun
             (seed, flown(case))
         })
         .collect();
-    let most = |of: fn(&Found) -> u64| found.iter().map(|(_, found)| of(found)).max().unwrap();
+    let most = |of: fn(&Durations) -> u64| found.iter().map(|(_, found)| of(found)).max().unwrap();
     let both = found.iter().filter(|(_, found)| found.both > 0).count();
     let stays = found.iter().filter(|(_, found)| found.first_stays).count();
     let reported = found

@@ -182,12 +182,17 @@ impl<'a> World<'a> {
 
     /// Delivers bytes of a frame at the end of a line, then runs the receiver's main loop.
     pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
-        self.hear(line, bytes, frame)?;
+        self.deliver_and_check(line, bytes, frame)?;
         self.turn(end(line).0)
     }
 
     /// Delivers bytes of a frame at the end of a line. The model checks how the relay counts a pass.
-    pub(crate) fn hear(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
+    pub(crate) fn deliver_and_check(
+        &mut self,
+        line: usize,
+        bytes: &[u8],
+        frame: &Flying,
+    ) -> Checked {
         let (to, port) = end(line);
         let from = match port {
             Port::Upstream => Side::Upstream,

@@ -84,7 +84,7 @@ impl World<'_> {
         for _ in 0..frames {
             if let Some(frame) = self.wires.take(line, 0) {
                 self.tally.add("frames in bursts");
-                self.hear(line, &frame.bytes, &frame)?;
+                self.deliver_and_check(line, &frame.bytes, &frame)?;
             }
         }
         self.turn(end(line).0)

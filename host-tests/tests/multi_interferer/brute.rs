@@ -24,7 +24,7 @@ const REFINEMENTS: u32 = 32;
 const SHRINK: f64 = 0.6;
 
 /// SIR and positions of a chain.
-type Found = (f64, Vec<f64>);
+type BestChain = (f64, Vec<f64>);
 
 /// Returns the SIR of the best chain at altitude `h`; 0 if the separation leaves no chain on the grid.
 pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
@@ -62,7 +62,7 @@ pub(crate) fn best(scene: &Scene, h: f64) -> f64 {
 
 /// Returns the best chains with relay k at a point of `grids[k - 1]`, best first. There is one chain for each of
 /// `parts` segments that relay 1 can be in.
-fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<Found> {
+fn on(scene: &Scene, h: f64, grids: &[Vec<f64>], parts: f64) -> Vec<BestChain> {
     let d = scene.distance_m;
     let (mut worth, mut ways) = (at_last(scene, h, &grids[grids.len() - 1]), Vec::new());
     for k in (1..grids.len()).rev() {

@@ -106,7 +106,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
     }
 }
 
-fn ask(rng: &mut impl Rng) -> PlanRequest {
+fn random_request(rng: &mut impl Rng) -> PlanRequest {
     let number = if rng.random_bool(0.7) {
         Number::Of(rng.random_range(1..=12))
     } else {
@@ -156,7 +156,7 @@ fn plans_keep_every_limit_and_proven_numbers_are_minimal() {
     let (mut planned, mut unmet, mut proven, mut one_proven) = (0, 0, 0, 0);
     for _ in 0..count(250) {
         let scenario = scenario(&mut rng);
-        let ask = ask(&mut rng);
+        let ask = random_request(&mut rng);
         let plan = match plan(&scenario, &ask) {
             Ok(plan) => plan,
             Err(NoPlan::Unmet(why, best)) => {

@@ -41,7 +41,7 @@ fn agreed() -> Placement {
     }
 }
 
-fn said(fleet: &mut Fleet, text: &str) {
+fn wait_for_line(fleet: &mut Fleet, text: &str) {
     fleet.wait(text, |lines| lines.iter().any(|line| line.text == text));
 }
 
@@ -81,7 +81,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         Kind::Px4 => "autopilot: found, PX4",
         Kind::ArduCopter => "autopilot: found, ArduCopter",
     };
-    said(&mut fleet, name);
+    wait_for_line(&mut fleet, name);
     vehicle.run(2_000);
     vehicle.armed = true;
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_TAKEOFF;
@@ -95,7 +95,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         vehicle.texts.iter().any(ready)
     });
     vehicle.run(1_000);
-    said(
+    wait_for_line(
         &mut fleet,
         "autopilot: in the air, not controlled by the relay",
     );
@@ -115,7 +115,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     });
     vehicle.run(2_000);
     assert!(apart(vehicle.place, to) < 1.0, "{:?}", vehicle.place);
-    said(&mut fleet, "autopilot: setpoint control engaged");
+    wait_for_line(&mut fleet, "autopilot: setpoint control engaged");
     for pair in vehicle.told.windows(2) {
         // At 5 m/s no step is longer than half a second.
         let step = apart(pair[0].place, pair[1].place);
@@ -137,7 +137,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     let taken = vehicle.now();
     vehicle.run(3_000);
     match kind {
-        Kind::ArduCopter => assert!(!vehicle.was_told_since(taken)),
+        Kind::ArduCopter => assert!(!vehicle.has_target_since(taken)),
         Kind::Px4 => {
             let all = vehicle.told.iter().filter(|told| told.at > taken);
             for told in all {
@@ -162,7 +162,7 @@ fn an_arducopter_flies_to_the_agreed_place() {
 #[test]
 fn a_drone_without_sites_sends_no_targets() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
-    said(
+    wait_for_line(
         &mut fleet,
         "no sites: no autopilot is controlled, and drones are not kept apart while they move",
     );
@@ -176,7 +176,7 @@ fn a_drone_without_sites_sends_no_targets() {
 #[test]
 fn the_smallest_image_refuses_sites() {
     let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);
-    said(
+    wait_for_line(
         &mut fleet,
         "configuration refused: it has sites, and this image was built without flight",
     );

@@ -129,7 +129,7 @@ fn three_drones_locate_an_interferer_like_the_simulation() {
         for (drone, vehicle) in (1..).zip(&mut vehicles) {
             vehicle.place = places(drone)[which];
             let at = axis.place(axis.point(vehicle.place).unwrap()).unwrap();
-            vehicle.hears(noise(at));
+            vehicle.send_noise(noise(at));
         }
         let began = vehicles[0].now();
         while vehicles[0].now() < began + 1_000 {

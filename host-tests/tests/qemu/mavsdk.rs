@@ -59,23 +59,23 @@ impl Mavsdk {
     }
 
     /// Collects the messages that MAVSDK has received.
-    pub(crate) fn listen(&mut self) {
+    pub(crate) fn drain_messages(&mut self) {
         self.heard.extend(self.new.try_iter());
     }
 
-    pub(crate) fn has_heard(&self, name: &str) -> bool {
+    pub(crate) fn has_received(&self, name: &str) -> bool {
         self.heard
             .iter()
             .any(|heard| heard["mavpackettype"] == name)
     }
 
     /// Returns true if the operator has received the status text `text`.
-    pub(crate) fn reads(&self, text: &str) -> bool {
+    pub(crate) fn has_text(&self, text: &str) -> bool {
         self.heard.iter().any(|heard| heard["text"] == text)
     }
 
     /// Returns true if the companion has requested message `id`.
-    pub(crate) fn is_asked_for(&self, id: u32) -> bool {
+    pub(crate) fn has_request_for(&self, id: u32) -> bool {
         let asks = |heard: &&Value| heard["command"] == 511;
         let mut asked = self.heard.iter().filter(asks);
         asked.any(|heard| heard["param1"].as_f64() == Some(id.into()))

@@ -41,7 +41,7 @@ impl Three {
                 self.fleet.give_up(what);
             }
             self.fleet.listen();
-            self.mavsdk.listen();
+            self.mavsdk.drain_messages();
             self.others.iter_mut().for_each(Vehicle::step);
             self.choose_again();
         }
@@ -121,7 +121,7 @@ fn three_images_fly_with_autopilots_one_by_mavsdk() {
 
     // On the ground each autopilot is found, its messages are requested, and no targets are sent.
     three.until("heartbeat of the first", |three| {
-        three.mavsdk.has_heard("HEARTBEAT")
+        three.mavsdk.has_received("HEARTBEAT")
     });
     three.mavsdk.order("px4");
     three.until("autopilots found", |three| {
@@ -131,7 +131,7 @@ fn three_images_fly_with_autopilots_one_by_mavsdk() {
                 .all(|drone| three.has_logged(*drone, "autopilot: found, ArduCopter"))
     });
     three.until("requests for messages", |three| {
-        [33, 245].iter().all(|id| three.mavsdk.is_asked_for(*id))
+        [33, 245].iter().all(|id| three.mavsdk.has_request_for(*id))
             && three.others.iter().all(|vehicle| vehicle.asked.len() >= 2)
     });
     assert_eq!(three.mavsdk.target(), None);
@@ -160,7 +160,7 @@ fn three_images_fly_with_autopilots_one_by_mavsdk() {
         let places = three.places();
         places.is_some_and(|places| places.iter().zip(&to).all(|(at, to)| apart(*at, *to) < 1.0))
     });
-    assert!(three.mavsdk.reads("relay: engaged, flies to position"));
+    assert!(three.mavsdk.has_text("relay: engaged, flies to position"));
     let flies = |text: &String| text == "relay: engaged, flies to position";
     assert!(
         three
@@ -175,7 +175,7 @@ fn three_images_fly_with_autopilots_one_by_mavsdk() {
         let released = |text: &String| text.starts_with("relay: released");
         three.others[0].texts.iter().any(released)
     });
-    assert!(!three.mavsdk.reads("relay: released, holds position"));
+    assert!(!three.mavsdk.has_text("relay: released, holds position"));
     let places = three.places().unwrap();
     for (at, to) in [(places[0], to[0]), (places[2], to[2])] {
         assert!(apart(at, to) < 1.0, "{at:?}, {to:?}");

@@ -141,8 +141,8 @@ impl Vehicle {
     }
 
     /// Sends the vehicle's position and a SiK radio's noise value.
-    pub(crate) fn hears(&mut self, noise: u8) {
-        self.say(POSITION, self.now());
+    pub(crate) fn send_noise(&mut self, noise: u8) {
+        self.send_by_id(POSITION, self.now());
         let radio = MavHeader {
             system_id: u32::from(b'3'),
             component_id: b'D',
@@ -156,19 +156,19 @@ impl Vehicle {
         self.send(radio, &MavMessage::RADIO_STATUS(said));
     }
 
-    pub(crate) fn was_told_since(&self, at: u64) -> bool {
+    pub(crate) fn has_target_since(&self, at: u64) -> bool {
         self.told.last().is_some_and(|told| told.at > at)
     }
 
     pub(crate) fn step(&mut self) {
-        self.hear();
+        self.receive();
         let now = self.now();
         self.fly(now);
         for (index, (id, period)) in PERIODS.into_iter().enumerate() {
             let says = id == HEARTBEAT || self.asked.contains(&id);
             if says && now >= self.said_at[index] + period {
                 self.said_at[index] = now;
-                self.say(id, now);
+                self.send_by_id(id, now);
             }
         }
         std::thread::sleep(Duration::from_millis(1));
@@ -180,7 +180,7 @@ impl Vehicle {
     }
 
     /// Reads a status text for the operator. The pilot chooses another mode for a while if it asks for that.
-    fn reads(&mut self, text: String) {
+    fn read_status_text(&mut self, text: String) {
         if self.granted && text == "relay: waits, change the mode first" {
             self.elsewhere_until = self.now() + ELSEWHERE;
         }
@@ -201,7 +201,7 @@ impl Vehicle {
         }
     }
 
-    fn say(&mut self, id: u32, now: u64) {
+    fn send_by_id(&mut self, id: u32, now: u64) {
         let boot = u32::try_from(now).unwrap();
         let message = match id {
             HEARTBEAT => {
@@ -279,7 +279,7 @@ impl Vehicle {
         }
     }
 
-    fn hear(&mut self) {
+    fn receive(&mut self) {
         let mut bytes = [0; 1024];
         match self.socket.read(&mut bytes) {
             Ok(count) => self.waiting.extend(&bytes[..count]),
@@ -309,7 +309,9 @@ impl Vehicle {
                 self.asked.insert(command.param1 as u32);
             }
             MavMessage::SET_POSITION_TARGET_GLOBAL_INT(target) => self.target(target),
-            MavMessage::STATUSTEXT(text) => self.reads(text.text.to_str().unwrap().to_owned()),
+            MavMessage::STATUSTEXT(text) => {
+                self.read_status_text(text.text.to_str().unwrap().to_owned());
+            }
             MavMessage::NAMED_VALUE_FLOAT(_) => {}
             MavMessage::TIMESYNC(sync) => {
                 let header = MavHeader {

@@ -14,7 +14,7 @@ const PATIENCE: Duration = Duration::from_millis(600_000);
 
 /// Result of a chain with random mission and settings.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Came {
+enum ChainResult {
     Refused,
     Agreed,
     Infeasible,
@@ -49,10 +49,10 @@ fn chain(
     Some((line, mission, common))
 }
 
-fn fly(seed: u64) -> Came {
+fn fly(seed: u64) -> ChainResult {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Some((mut line, mission, common)) = chain(&mut rng, settings) else {
-        return Came::Refused;
+        return ChainResult::Refused;
     };
     for _ in 0..60 {
         line.run_for(Duration::from_micros(PATIENCE.as_micros() / 60));
@@ -67,9 +67,9 @@ fn fly(seed: u64) -> Came {
         "seed {seed}: {phases:?}, {mission:?}, {common:?}"
     );
     if is_infeasible(&line) {
-        Came::Infeasible
+        ChainResult::Infeasible
     } else {
-        Came::Agreed
+        ChainResult::Agreed
     }
 }
 
@@ -79,11 +79,11 @@ fn any_mission_ends_in_positions_or_infeasible() {
     let of = |what| came.iter().filter(|came| **came == what).count();
     println!(
         "{} agreed, {} have no places, {} refused",
-        of(Came::Agreed),
-        of(Came::Infeasible),
-        of(Came::Refused)
+        of(ChainResult::Agreed),
+        of(ChainResult::Infeasible),
+        of(ChainResult::Refused)
     );
-    assert!(of(Came::Agreed) > came.len() / 4);
+    assert!(of(ChainResult::Agreed) > came.len() / 4);
 }
 
 /// Checks that settings with which an agreement may take any time give finite numbers. These are fixed steps, long

@@ -30,7 +30,7 @@ fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
         change(&mut setup);
         let truth = setup.true_interference.as_ref().unwrap().scene.clone();
         let outcome = run(setup).unwrap();
-        let off = heard_at_rx(&outcome).map(|heard| heard / truth.interference_rx_w() - 1.0);
+        let off = measured_at_rx(&outcome).map(|heard| heard / truth.interference_rx_w() - 1.0);
         let stand = outcome.snapshots.last().unwrap();
         let flown = stand.goals.as_ref().map_or(0.0, |goals| {
             let mut scene = truth.clone();
@@ -43,7 +43,7 @@ fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
 }
 
 /// Returns the first relay's estimate of the interference power at the receiver, W; `None` without one.
-fn heard_at_rx(outcome: &Outcome) -> Option<f64> {
+fn measured_at_rx(outcome: &Outcome) -> Option<f64> {
     match outcome.relays.first()?.believed.estimate {
         InterferenceEstimate::Source { receiver_w, .. } if receiver_w > 0.0 => {
             Some(f64::from(receiver_w))

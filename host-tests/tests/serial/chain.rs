@@ -4,7 +4,7 @@ use host_tests::fixtures;
 use uav_relay::serial::{Io, Nb, Pair, SerialLink, SerialPort, SerialStats, Shared};
 use uav_relay::{Duration, Event, Instant, Mission, Placement, Relay, Settings, Side, Wiring};
 
-use crate::pipe::{End, IoEnd, NbEnd, Trouble};
+use crate::pipe::{End, IoEnd, NbEnd, ReadErrors};
 
 pub(crate) const BAUD: u32 = 115_200;
 
@@ -63,7 +63,7 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    pub(crate) fn new(kind: Kind, relay: Relay, ends: &[End], trouble: &Trouble) -> Self {
+    pub(crate) fn new(kind: Kind, relay: Relay, ends: &[End], trouble: &ReadErrors) -> Self {
         let nb = |end: &End| {
             let (end, trouble) = (end.clone(), trouble.clone());
             SerialLink::new(Nb(NbEnd { end, trouble }), BAUD)
@@ -96,7 +96,7 @@ pub(crate) fn chain(
     wiring: Wiring,
     relays: u16,
     capacity: usize,
-    trouble: &Trouble,
+    trouble: &ReadErrors,
 ) -> (Vec<Node>, Vec<End>) {
     let count = usize::from(relays);
     let mut far = Vec::new();

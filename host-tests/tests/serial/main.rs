@@ -8,7 +8,7 @@ mod uart;
 use chain::{BYTE_TIME, Kind, Node, chain, has_lost, relay, run, setpoints};
 use host_tests::bench::agreed;
 use host_tests::fixtures;
-use pipe::{End, Trouble};
+use pipe::{End, ReadErrors};
 use uav_relay::serial::{READ_LIMIT, SerialStats};
 use uav_relay::{Instant, Mission, Placement, Side, Wiring};
 
@@ -26,7 +26,7 @@ fn a_chain_on_ports_of_any_size_settles_like_bare_relays() {
     for kind in KINDS {
         for wiring in [Wiring::Pair, Wiring::Shared] {
             for capacity in [1, 3, 16, 1000] {
-                let (mut nodes, _far) = chain(kind, wiring, 3, capacity, &Trouble::default());
+                let (mut nodes, _far) = chain(kind, wiring, 3, capacity, &ReadErrors::default());
                 run(&mut nodes, Instant::ZERO, Instant::from_millis(2_000));
                 let name = format!("{kind:?} {wiring:?} {capacity}");
                 assert_eq!(setpoints(&nodes), expected, "{name}");
@@ -48,7 +48,7 @@ fn an_unread_link_does_not_starve_the_other_link() {
         let [nobody, deaf] = End::wire(3);
         let [up, down] = End::wire(16);
         let [last, _rx] = End::wire(16);
-        let none = Trouble::default();
+        let none = ReadErrors::default();
         let mut nodes = [
             Node::new(kind, relay(3, 2, Wiring::Pair), &[deaf, up], &none),
             Node::new(kind, relay(3, 3, Wiring::Pair), &[down, last], &none),
@@ -108,7 +108,7 @@ fn on_a_shared_channel_frames_wait_and_none_is_dropped() {
         let mut ends = End::channel(2, 3);
         let (nobody, end) = (ends.remove(0), ends.remove(0));
         let relay = relay(2, 1, Wiring::Shared);
-        let mut nodes = [Node::new(kind, relay, &[end], &Trouble::default())];
+        let mut nodes = [Node::new(kind, relay, &[end], &ReadErrors::default())];
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(60_000));
         assert_eq!(nobody.waiting(), 3);
         assert_eq!(nodes[0].driver.stats()[0], SerialStats::default());
@@ -130,7 +130,7 @@ fn read_errors_are_counted_by_kind_and_survived() {
     let expected = bare(3);
     for kind in KINDS {
         for wiring in [Wiring::Pair, Wiring::Shared] {
-            let (mut nodes, _far) = chain(kind, wiring, 3, 16, &Trouble::times(10, 40));
+            let (mut nodes, _far) = chain(kind, wiring, 3, 16, &ReadErrors::times(10, 40));
             run(&mut nodes, Instant::ZERO, Instant::from_millis(30_000));
             assert_eq!(setpoints(&nodes), expected, "{kind:?} {wiring:?}");
             // The second relay receives both neighbours.
@@ -149,10 +149,10 @@ fn read_errors_are_counted_by_kind_and_survived() {
 
 #[test]
 fn a_failing_port_does_not_starve_the_others() {
-    let dead = Trouble::times(usize::MAX, 1);
+    let dead = ReadErrors::times(usize::MAX, 1);
     let [up, _] = End::wire(16);
     let [down, _] = End::wire(16);
-    up.stuff(&[1; 10_000]);
+    up.add_received(&[1; 10_000]);
     let mut node = Node::new(Kind::Nb, relay(2, 1, Wiring::Pair), &[up, down], &dead);
     let now = Instant::from_millis(1);
     let wake = node.driver.poll(now, &mut node.relay);
@@ -167,9 +167,14 @@ fn a_poll_reads_up_to_its_limit_and_asks_to_be_called_soon() {
     for kind in KINDS {
         let [up, _] = End::wire(16);
         let [down, _] = End::wire(16);
-        up.stuff(&[7; 3 * READ_LIMIT]);
+        up.add_received(&[7; 3 * READ_LIMIT]);
         let ends = [up.clone(), down];
-        let mut node = Node::new(kind, relay(2, 1, Wiring::Pair), &ends, &Trouble::default());
+        let mut node = Node::new(
+            kind,
+            relay(2, 1, Wiring::Pair),
+            &ends,
+            &ReadErrors::default(),
+        );
         let mut now = Instant::ZERO;
         for left in [2 * READ_LIMIT, READ_LIMIT, 0] {
             let wake = node.driver.poll(now, &mut node.relay);
@@ -191,7 +196,7 @@ fn a_poll_reads_up_to_its_limit_and_asks_to_be_called_soon() {
 fn an_idle_facade_has_only_the_relays_timeouts() {
     for kind in KINDS {
         // A single settled relay only renews its lease, without frames.
-        let (mut nodes, far) = chain(kind, Wiring::Pair, 1, 16, &Trouble::default());
+        let (mut nodes, far) = chain(kind, Wiring::Pair, 1, 16, &ReadErrors::default());
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
         assert!(nodes[0].relay.setpoint().is_some());
         let Node { driver, relay, .. } = &mut nodes[0];
@@ -204,7 +209,7 @@ fn an_idle_facade_has_only_the_relays_timeouts() {
         assert!(far.iter().all(|end| end.carried() == 0));
 
         // A settled chain of three wakes up for heartbeats only: a few polls a second.
-        let (mut nodes, _far) = chain(kind, Wiring::Pair, 3, 1000, &Trouble::default());
+        let (mut nodes, _far) = chain(kind, Wiring::Pair, 3, 1000, &ReadErrors::default());
         let now = run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
         for node in &mut nodes {
             let wake = node.driver.poll(now, &mut node.relay);
@@ -221,7 +226,7 @@ fn an_idle_facade_has_only_the_relays_timeouts() {
 fn frames_for_an_absent_port_are_counted() {
     let [end, far] = End::wire(1000);
     let relay = relay(2, 1, Wiring::Pair);
-    let mut nodes = [Node::new(Kind::Nb, relay, &[end], &Trouble::default())];
+    let mut nodes = [Node::new(Kind::Nb, relay, &[end], &ReadErrors::default())];
     run(&mut nodes, Instant::ZERO, Instant::from_millis(1_000));
     let stats = nodes[0].driver.stats()[0];
     assert!(stats.unrouted > 0);

@@ -61,7 +61,7 @@ impl End {
     }
 
     /// Adds bytes to those that this end has received.
-    pub(crate) fn stuff(&self, bytes: &[u8]) {
+    pub(crate) fn add_received(&self, bytes: &[u8]) {
         self.medium.borrow_mut().inboxes[self.number].extend(bytes);
     }
 
@@ -90,7 +90,7 @@ impl End {
 
 /// Schedule of read errors: one every `every` bytes, each of which loses its byte.
 #[derive(Clone, Default)]
-pub(crate) struct Trouble {
+pub(crate) struct ReadErrors {
     pub(crate) every: usize,
     pub(crate) left: usize,
     pub(crate) count: usize,
@@ -105,7 +105,7 @@ const KINDS: [ErrorKind; 5] = [
     ErrorKind::Other,
 ];
 
-impl Trouble {
+impl ReadErrors {
     pub(crate) fn times(left: usize, every: usize) -> Self {
         Self {
             every,
@@ -114,7 +114,7 @@ impl Trouble {
         }
     }
 
-    fn strike(&mut self) -> Option<ErrorKind> {
+    fn next_error(&mut self) -> Option<ErrorKind> {
         self.seen += 1;
         if self.left == 0 || !self.seen.is_multiple_of(self.every) {
             return None;
@@ -128,7 +128,7 @@ impl Trouble {
 /// End of a medium as a port of `embedded_hal_nb`.
 pub(crate) struct NbEnd {
     pub(crate) end: End,
-    pub(crate) trouble: Trouble,
+    pub(crate) trouble: ReadErrors,
 }
 
 mod as_nb {
@@ -143,7 +143,7 @@ mod as_nb {
     impl Read<u8> for NbEnd {
         fn read(&mut self) -> nb::Result<u8, ErrorKind> {
             let byte = self.end.get().ok_or(nb::Error::WouldBlock)?;
-            match self.trouble.strike() {
+            match self.trouble.next_error() {
                 Some(kind) => Err(nb::Error::Other(kind)),
                 None => Ok(byte),
             }
@@ -168,7 +168,7 @@ mod as_nb {
 /// End of a medium as a port of `embedded_io`. It panics where a real port would block.
 pub(crate) struct IoEnd {
     pub(crate) end: End,
-    pub(crate) trouble: Trouble,
+    pub(crate) trouble: ReadErrors,
 }
 
 mod as_io {
@@ -192,7 +192,7 @@ mod as_io {
             // The trait permits reads of fewer bytes than available: here at most 5.
             for place in into.iter_mut().take(5) {
                 let Some(byte) = self.end.get() else { break };
-                if self.trouble.strike().is_some() {
+                if self.trouble.next_error().is_some() {
                     return if count == 0 {
                         Err(ErrorKind::Other)
                     } else {

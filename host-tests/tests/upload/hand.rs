@@ -50,7 +50,7 @@ fn new_place(base: &Mission, version: u16) -> Upload {
 }
 
 /// Runs the ground station and one relay for two seconds. Returns the relay's events.
-fn talk(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) -> Vec<Event> {
+fn exchange(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) -> Vec<Event> {
     let mut events = Vec::new();
     let mut frame = [0; MAX_FRAME];
     for ms in from_ms..from_ms + 2_000 {
@@ -164,11 +164,11 @@ fn a_single_relay_flies_an_upload_and_reports_it() {
     ] {
         let mut relay = alone(base, wiring);
         let mut ground = Ground::new(&base, end, IDENTITY.network, wiring, auth(1));
-        assert_eq!(talk(&mut ground, &mut relay, port, 0).len(), 2);
+        assert_eq!(exchange(&mut ground, &mut relay, port, 0).len(), 2);
         assert_eq!(ground.progress(), Progress::Idle);
         let now = Instant::from_millis(2_000);
         ground.upload(now, new_place(&base, 2)).unwrap();
-        let events = talk(&mut ground, &mut relay, port, 2_000);
+        let events = exchange(&mut ground, &mut relay, port, 2_000);
         for event in [
             Event::Uploaded,
             Event::Adopted,
@@ -191,7 +191,7 @@ fn a_single_relay_flies_an_upload_and_reports_it() {
         ground
             .upload(Instant::from_millis(4_000), new_place(&base, 1))
             .unwrap();
-        let events = talk(&mut ground, &mut relay, port, 4_000);
+        let events = exchange(&mut ground, &mut relay, port, 4_000);
         assert_eq!(events, []);
         assert_eq!(ground.progress(), Progress::Outdated { version: 2 });
         assert_eq!(relay.version(), 2);
@@ -228,7 +228,7 @@ fn a_ground_of_another_key_network_or_mission_is_ignored() {
     for (mut ground, of, counter) in grounds {
         let mut relay = alone(base, Wiring::Pair);
         ground.upload(Instant::ZERO, new_place(&of, 1)).unwrap();
-        talk(&mut ground, &mut relay, Port::Upstream, 0);
+        exchange(&mut ground, &mut relay, Port::Upstream, 0);
         assert_eq!(ground.progress(), Progress::Offering);
         assert_eq!((relay.version(), relay.upload()), (0, None));
         assert!(counter(&relay) > 0, "{:?}", relay.stats());

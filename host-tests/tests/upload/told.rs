@@ -120,10 +120,10 @@ fn at_120(relays: u16, band: Band) -> Mission {
 }
 
 /// Gives relays with a motion guard the positions of their drones, which they need.
-fn tell_places(wires: &mut Wires, base: &Mission) {
+fn report_positions(wires: &mut Wires, base: &Mission) {
     let distance = base.config().distance_m;
     let step = distance / f32::from(base.relays() + 1);
-    wires.stand(|index| {
+    wires.place_drones(|index| {
         uav_relay::Placement::on_line(step * f32::from(index), base.config().common.altitude_m)
     });
 }
@@ -159,7 +159,7 @@ fn an_upload_outside_the_geofence_is_refused_and_reported() {
     ] {
         for end in ENDS {
             let mut wires = Wires::new(base, 1, |_| guarded(&base));
-            tell_places(&mut wires, &base);
+            report_positions(&mut wires, &base);
             assert!(wires.until(60, Wires::has_converged));
             wires.upload(&base, end, Upload::new(&base, 5, config).unwrap());
             let over = |it: &Wires| {
@@ -382,7 +382,7 @@ fn the_ground_learns_which_mission_is_flown() {
         let loss = [0.0, 0.3][rng.random_range(0..2)];
         wires.lose(loss);
         let end = ENDS[rng.random_range(0..2)];
-        wires.ask_flown(&base, end);
+        wires.request_flown(&base, end);
         let known = |it: &Wires| it.flown(end).filter(FlownMission::is_known);
         assert!(wires.until(60, |it| known(it).is_some()), "round {round}");
         let near = if end == Side::Upstream { 1 } else { relays };
@@ -392,7 +392,7 @@ fn the_ground_learns_which_mission_is_flown() {
         let sent = Upload::new(&base, 4, moved(&base, 700.0, -300.0)).unwrap();
         wires.upload(&base, ENDS[1 - end as usize], sent);
         assert!(wires.until(300, |it| it.versions().iter().all(|it| *it == 4)));
-        wires.ask_flown(&base, end);
+        wires.request_flown(&base, end);
         assert!(wires.until(60, |it| known(it).is_some()), "round {round}");
         let flown = known(&wires).unwrap();
         assert_eq!((flown.by, flown.version), (near, 4));

@@ -71,7 +71,7 @@ impl Wires {
     }
 
     /// Makes the ground station at `end`, loaded with `base`, request the mission in flight.
-    pub(crate) fn ask_flown(&mut self, base: &Mission, end: Side) {
+    pub(crate) fn request_flown(&mut self, base: &Mission, end: Side) {
         let now = self.bench.now;
         self.bench.ground(base, end, AUTH).ask_flown(now);
     }
@@ -94,7 +94,7 @@ impl Wires {
     }
 
     /// Places the drones by relay index. They follow their setpoints from then on.
-    pub(crate) fn stand(&mut self, place: impl Fn(u16) -> Placement) {
+    pub(crate) fn place_drones(&mut self, place: impl Fn(u16) -> Placement) {
         self.places = (1..)
             .zip(&self.bench.relays)
             .map(|(index, _)| place(index))

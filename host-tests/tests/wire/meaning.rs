@@ -20,9 +20,9 @@ use super::message::{WireMessage, list, number};
 use super::offer;
 
 /// Fields of a message, or of a group in it, which are read in the types of the crate.
-struct Of<'a>(&'a Fields<'static>);
+struct MessageFields<'a>(&'a Fields<'static>);
 
-impl Of<'_> {
+impl MessageFields<'_> {
     fn byte(&self, name: &str) -> u8 {
         number(self.0, name) as u8
     }
@@ -52,9 +52,9 @@ impl Of<'_> {
         self.0.get(name) != Some(&Value::None)
     }
 
-    fn group(&self, name: &str) -> Option<Of<'_>> {
+    fn group(&self, name: &str) -> Option<MessageFields<'_>> {
         match self.0.get(name).unwrap() {
-            Value::Group(fields) => Some(Of(fields)),
+            Value::Group(fields) => Some(MessageFields(fields)),
             _ => None,
         }
     }
@@ -85,7 +85,7 @@ impl Of<'_> {
 /// Returns the crate's message with the values that `wire_message` has by the tables of the format.
 pub(crate) fn message(wire_message: &WireMessage) -> Message {
     let fields = wire_message.fields();
-    let of = Of(&fields);
+    let of = MessageFields(&fields);
     match wire_message.name() {
         "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(wire_message.name(), &of)),
         "Verdict" => Message::Verdict(Answer {
@@ -180,7 +180,7 @@ pub(crate) fn message(wire_message: &WireMessage) -> Message {
     }
 }
 
-fn sweep(name: &str, of: &Of<'_>) -> Sweep {
+fn sweep(name: &str, of: &MessageFields<'_>) -> Sweep {
     let anchor = of.real("anchor");
     let ladder = Ladder::from_parts(anchor.abs(), of.byte("gap"), of.byte("growth")).unwrap();
     let chosen = name == "Aside";
@@ -202,15 +202,15 @@ fn sweep(name: &str, of: &Of<'_>) -> Sweep {
     }
 }
 
-fn roster(of: &Of<'_>) -> Roster {
+fn roster(of: &MessageFields<'_>) -> Roster {
     let Some(Value::List(seats)) = of.0.get("seats") else {
         panic!("no seats");
     };
     let seat = |seat: &Value<'static>| match seat {
         Value::Group(fields) => OwnSeat {
-            index: Of(fields).word("relay"),
-            held_m: Of(fields).real("altitude_m"),
-            power_w: Of(fields).real("power_w"),
+            index: MessageFields(fields).word("relay"),
+            held_m: MessageFields(fields).real("altitude_m"),
+            power_w: MessageFields(fields).real("power_w"),
         },
         other => panic!("{other:?}"),
     };
@@ -222,7 +222,7 @@ fn roster(of: &Of<'_>) -> Roster {
     }
 }
 
-fn hello(of: &Of<'_>) -> Hello {
+fn hello(of: &MessageFields<'_>) -> Hello {
     Hello {
         mission: of.word("mission"),
         latest_view: of.id("latest_view"),
@@ -241,7 +241,7 @@ fn hello(of: &Of<'_>) -> Hello {
     }
 }
 
-fn vote(name: &str, of: &Of<'_>) -> Message {
+fn vote(name: &str, of: &MessageFields<'_>) -> Message {
     let mission_id = of.mission_id("mission", "version");
     let (view, place) = (of.id("proposed_view"), of.word("place"));
     if name == "Decision" {
@@ -276,7 +276,7 @@ fn vote(name: &str, of: &Of<'_>) -> Message {
 }
 
 /// Decodes an upload with the crate, and checks each number. Only the crate can construct an upload.
-fn upload(wire_message: &WireMessage, of: &Of<'_>) -> Upload {
+fn upload(wire_message: &WireMessage, of: &MessageFields<'_>) -> Upload {
     let upload = Upload::decode(&offer::kept(wire_message)).unwrap();
     let config = upload.config();
     let band = |least, most| Band {
@@ -334,7 +334,7 @@ fn upload(wire_message: &WireMessage, of: &Of<'_>) -> Upload {
 }
 
 /// Decodes summed measurements with the crate, and checks each number. Only relays can add measurements up.
-fn sense(wire_message: &WireMessage, of: &Of<'_>) -> Message {
+fn sense(wire_message: &WireMessage, of: &MessageFields<'_>) -> Message {
     let message = Message::decode(wire_message.body()).unwrap();
     let (Message::Sense(heard) | Message::Sensed(heard)) = &message else {
         panic!("{message:?}");

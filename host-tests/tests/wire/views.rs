@@ -107,11 +107,11 @@ fn a_pass_of_another_view_causes_a_view_request() {
         let message = &one_of_each(FIRST, own.wrapping_add(1))[kind];
         let mut out = after.receive(port, message);
         out.extend(after.advance_1_ms());
-        assert_eq!(asks_for_a_view(&out), calls, "{message:?}");
+        assert_eq!(requests_view(&out), calls, "{message:?}");
     }
 }
 
-fn asks_for_a_view(out: &[(Port, WireMessage)]) -> bool {
+fn requests_view(out: &[(Port, WireMessage)]) -> bool {
     let asks = |message: &WireMessage| message.is("Hello") && message.has(FORMS);
     out.iter()
         .any(|(port, message)| *port == UP && asks(message))
@@ -245,5 +245,5 @@ fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
     assert_eq!(bench.now, at(16_010));
     assert!(bench.events().contains(&Event::LeaseLapsed));
     out.extend(bench.advance_1_ms());
-    assert!(asks_for_a_view(&out), "{out:?}");
+    assert!(requests_view(&out), "{out:?}");
 }

@@ -94,13 +94,13 @@ impl RandomScene {
         if scene.sources.len() > 1 {
             return Ok(optimum(&scene).ok_or(NO_SCENE)?.sir);
         }
-        Ok(scene.chain_sir(&self.told()?))
+        Ok(scene.chain_sir(&self.known_positions()?))
     }
 
     /// Simulates a chain that knows the interferer, and returns the positions of its relays.
     ///
     /// If there are several, it knows the paper's hypothetical interferer instead of them.
-    pub fn told(&self) -> Result<Vec<Placement>, FigureError> {
+    pub fn known_positions(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
         let places: Option<_> = outcome.relays.iter().map(|relay| relay.setpoint).collect();
@@ -281,7 +281,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     let mut first = None;
     for stand in outcome.snapshots.iter().filter(|stand| stand.at >= begun) {
         let scene = true_interference.scene_at(stand.at);
-        let places = wild.with(&scene).told()?;
+        let places = wild.with(&scene).known_positions()?;
         let best = scene.chain_sir(&places);
         let first = first.get_or_insert(places);
         followed += scene.chain_sir(&stand.places) / best;

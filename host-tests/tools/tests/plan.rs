@@ -613,7 +613,7 @@ fn free_altitudes_give_the_joint_optimum() {
     assert!(number(&fewer["sir"]) >= 2.0);
 }
 
-fn said(arguments: &str) -> String {
+fn output_of(arguments: &str) -> String {
     let output = plan(arguments);
     assert!(output.status.success(), "{arguments:?}: {output:?}");
     String::from_utf8(output.stdout).unwrap()
@@ -691,7 +691,7 @@ fn maps_are_written_for_scenarios_with_sites() {
     let folder = tempfile::tempdir().unwrap();
     let [geojson, kml] = ["plan.geojson", "plan.kml"]
         .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
-    said(&format!(
+    output_of(&format!(
         "--scenario {} --uavs 3 --geojson {geojson} --kml {kml}",
         example("site.toml")
     ));
@@ -725,14 +725,14 @@ fn a_target_in_decibels_is_answered_in_decibels() {
         "{line}"
     );
 
-    let table = said("--target-sir-db 6");
+    let table = output_of("--target-sir-db 6");
     for part in [
         "worst hop: 6.000 dB (SIR 3.98107",
         "target: SIR 6 dB; that many relays reach up to 6.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
-    let table = said("--target-sir 4");
+    let table = output_of("--target-sir 4");
     for part in [
         "worst hop: SIR 4.00000",
         "target: SIR 4; that many relays reach up to 4.",
@@ -770,7 +770,7 @@ fn json_has_both_units() {
 #[test]
 fn a_theorems_case_is_explained_for_the_drone() {
     let json = json("--uavs 1");
-    let table = said("--uavs 1");
+    let table = output_of("--uavs 1");
     let words = json["case_words"].as_str().unwrap();
     assert!(words.starts_with("the drone "), "{words}");
     let line = format!(
@@ -786,7 +786,7 @@ fn a_theorems_case_is_explained_for_the_drone() {
             "(one relay aside, case ",
         ),
     ] {
-        let table = said(&format!("--uavs 1 {arguments}"));
+        let table = output_of(&format!("--uavs 1 {arguments}"));
         let line = table
             .lines()
             .find(|line| line.contains(theorem))
@@ -803,7 +803,7 @@ fn a_map_has_rounded_numbers_with_units_in_their_names() {
         .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
     let scenario = example("decibels.toml");
     let maps = format!("--geojson {geojson} --kml {kml}");
-    said(&format!("--scenario {scenario} --uavs 3 {maps}"));
+    output_of(&format!("--scenario {scenario} --uavs 3 {maps}"));
     let is_short = |name: &str, number: &str| {
         let decimals = number.split_once('.').map_or("", |(_, decimals)| decimals);
         let most = match name {
@@ -882,7 +882,7 @@ fn the_noise_is_k_t_b_f_and_names_its_terms() {
     let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
     let plain = std::fs::read_to_string(example("scenario.toml")).unwrap();
     std::fs::write(file.path(), format!("{plain}{noisy}")).unwrap();
-    let table = said(&format!("--uavs 6 --scenario {}", file.path().display()));
+    let table = output_of(&format!("--uavs 6 --scenario {}", file.path().display()));
     let line = "noise: -94.965 dBm, 3.187948e-13 W, at every receiver: k T0 B F with T0 = 290 K, B = 20000000 Hz, F = 6 dB\n";
     assert!(table.contains(line), "{table}");
     let noise = &json_of(&file)["noise"];
@@ -915,7 +915,7 @@ fn the_noise_is_k_t_b_f_and_names_its_terms() {
     }
 }
 
-fn unheard(tool: &str, arguments: &str) -> Option<i32> {
+fn status_with_closed_output(tool: &str, arguments: &str) -> Option<i32> {
     let pipe = || {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
@@ -954,7 +954,7 @@ fn a_closed_output_does_not_change_the_status() {
         (figures, "--help", 0),
     ] {
         assert_eq!(
-            unheard(tool, arguments),
+            status_with_closed_output(tool, arguments),
             Some(status),
             "{tool} {arguments:?}"
         );

@@ -101,7 +101,7 @@ impl Case {
         }
     }
 
-    fn ask(&self, number: Number) -> PlanRequest {
+    fn request(&self, number: Number) -> PlanRequest {
         let _ = self;
         PlanRequest {
             number,
@@ -132,7 +132,7 @@ impl Case {
         };
         let hops = TrueHops::new(&self.scenario, &setup, &mission);
         // Slow chains send small packets, so that the traffic ends in time.
-        let places = plan(&self.scenario, &self.ask(Number::Of(relays))).unwrap();
+        let places = plan(&self.scenario, &self.request(Number::Of(relays))).unwrap();
         let rates = self
             .both_bps(&places)
             .into_iter()
@@ -183,7 +183,7 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
         let case = Case::draw(seed, access, has_steps);
         let mut what = format!("SEED={seed} COUNT=1, {access:?}");
         _ = write!(what, ", steps {has_steps}, {} relays", case.relays);
-        let best = plan(&case.scenario, &case.ask(Number::Of(case.relays))).unwrap();
+        let best = plan(&case.scenario, &case.request(Number::Of(case.relays))).unwrap();
         let promised_bps = case.radio.chain_bps(&best.sirs);
         carried += u32::from(promised_bps > 0.0);
         let sent = case.send(case.relays, false, None);
@@ -204,7 +204,7 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
         // A target rate is met by the number of relays that the planner names.
         if seed % 5 == 0 && promised_bps > 0.0 && case.scenario.relays.is_empty() {
             let target_bps = 0.9 * promised_bps;
-            let ask = case.ask(Number::Of(1));
+            let ask = case.request(Number::Of(1));
             let rates = Rates::new(&case.scenario, &ask, &case.radio, Some(target_bps)).unwrap();
             let meeting = rates.meeting.unwrap();
             let relays = u16::try_from(meeting.places.len()).unwrap();

@@ -14,7 +14,7 @@ use super::wire::{
     ACK, COMMAND, EXTENDED_STATE, GLOBAL_POSITION, HEARTBEAT, POSITION_TARGET, SENT, SET_POSITION,
     VALUE, checksum, frame,
 };
-use crate::heap::without;
+use crate::heap::without_allocation;
 use crate::input::Input;
 
 const MAX_OPERATIONS: usize = 256;
@@ -102,7 +102,7 @@ impl Link {
             3 => match input.below(7) {
                 6 => self.clear_lost_relay(input),
                 landed => {
-                    self.deliver_frame(input, &frame(EXTENDED_STATE, [1, 1], &[0, landed], 0))
+                    self.deliver_frame(input, &frame(EXTENDED_STATE, [1, 1], &[0, landed], 0));
                 }
             },
             4 => {
@@ -133,7 +133,7 @@ impl Link {
             }
             10 => {
                 let setpoint = input.flag().then(|| any_place(input));
-                without(|| self.autopilot.handle_setpoint(self.now, setpoint));
+                without_allocation(|| self.autopilot.handle_setpoint(self.now, setpoint));
             }
             11 => {
                 let look = input.flag().then(|| Bearing {
@@ -145,20 +145,20 @@ impl Link {
             }
             12 => {
                 let (sir, place) = (input.any_number(), any_place(input));
-                without(|| {
+                without_allocation(|| {
                     self.autopilot
                         .handle_values(self.now, Some(sir), Some(place));
                 });
             }
             13 => {
                 let text = String::from_utf8_lossy(input.piece()).into_owned();
-                without(|| self.autopilot.say(&text));
+                without_allocation(|| self.autopilot.say(&text));
             }
             14 => {
                 self.rx = if input.flag() { MOVED } else { RX };
                 if let Some(axis) = line_to(self.rx) {
                     self.axis = axis;
-                    without(|| self.autopilot.fly_along(self.now, axis));
+                    without_allocation(|| self.autopilot.fly_along(self.now, axis));
                 }
             }
             15 => {
@@ -197,7 +197,7 @@ impl Link {
     /// be equal.
     fn deliver_bytes(&mut self, bytes: &[u8], lengths: u16) {
         let mut other = self.autopilot.clone();
-        without(|| self.autopilot.handle_bytes(self.now, bytes));
+        without_allocation(|| self.autopilot.handle_bytes(self.now, bytes));
         let mut rest = bytes;
         for len in lengths.to_le_bytes().into_iter().cycle() {
             if rest.is_empty() {
@@ -255,7 +255,7 @@ impl Link {
         } else {
             Side::Downstream
         };
-        without(|| {
+        without_allocation(|| {
             self.autopilot
                 .handle_event(Event::NeighbourLost { side, node });
         });
@@ -298,9 +298,9 @@ impl Link {
 
     /// Calls the link as a turn of a firmware's loop does, and checks its frames, positions and events.
     fn settle(&mut self) {
-        without(|| self.autopilot.handle_timeout(self.now));
+        without_allocation(|| self.autopilot.handle_timeout(self.now));
         let mut frames = 0;
-        while let Some(frame) = without(|| self.autopilot.poll_transmit(self.now)) {
+        while let Some(frame) = without_allocation(|| self.autopilot.poll_transmit(self.now)) {
             match &mut self.peer {
                 Some(peer) => {
                     assert_eq!(frame.get(2), Some(&1));

@@ -455,7 +455,7 @@ impl Chain {
             now: Instant::ZERO,
             events: 0,
             accepted_positions: 0,
-            pending_planned: pending_planned,
+            pending_planned,
             attacker: None,
             flight: None,
             fleet: Vec::new(),

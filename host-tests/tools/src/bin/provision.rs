@@ -209,7 +209,7 @@ impl<'a> Asked<'a> {
             .signed(secret)
             .signed_to_autopilots(autopilot_key)
             .measuring(measure(options, &self.scenario)?)
-            .asking_after(self.probe_after_ms))
+            .with_probe_after(self.probe_after_ms))
     }
 
     /// Predicts the positions on which the relays will settle; `None` if they are not needed or not known.

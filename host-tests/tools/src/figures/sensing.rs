@@ -20,7 +20,7 @@ pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
 /// Table row: SIR relative to the optimum after a number of agreements, over many scenes.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-struct Found {
+struct AgreementShare {
     scene: &'static str,
     relays: u16,
     /// Number of agreements on positions that used measurements of the interference.
@@ -55,12 +55,12 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
 ];
 
 /// Returns SIR / optimum after each number of agreements, over `scenes` random scenes of each kind.
-fn by_agreement(scenes: u64) -> Result<Vec<Found>, FigureError> {
+fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
         let each: Shares = shares(scenes, relays, sources, run)?;
         for (agreements, mut shares) in each.into_iter().enumerate() {
-            rows.push(Found {
+            rows.push(AgreementShare {
                 scene: what,
                 relays,
                 agreements,

@@ -154,7 +154,7 @@ impl Flight {
     }
 
     /// Sets the silence after which a relay probes its neighbour, ms; 0 selects the firmware's default.
-    pub fn asking_after(self, probe_after_ms: u32) -> Self {
+    pub fn with_probe_after(self, probe_after_ms: u32) -> Self {
         Self {
             probe_after_ms,
             ..self

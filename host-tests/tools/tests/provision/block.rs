@@ -91,7 +91,7 @@ fn a_block_follows_the_table() {
 fn the_silence_limit_is_in_the_block_and_the_settings() {
     let flight = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();
     let usual = flight.block(3).unwrap();
-    let block = flight.asking_after(0x0102).block(3).unwrap();
+    let block = flight.with_probe_after(0x0102).block(3).unwrap();
     assert_eq!(block[..372], usual[..372]);
     assert_eq!(block[372..376], [2, 1, 0, 0]);
     let ms = |block, wiring| {
