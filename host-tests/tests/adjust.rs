@@ -101,8 +101,9 @@ fn fine_search_gains_sir_over_a_coarse_grid() {
     assert!((ten / 5.555 - 1.0).abs() < 1e-3, "{ten}");
 }
 
-/// Compares the moves of the paper's grid search with those that a separate program computes. The starting positions
-/// are far from those with equal SIR on all hops.
+/// Checks that the paper's grid search makes the same moves as a separate program.
+///
+/// It starts from positions at which the SIRs of the hops differ much.
 #[test]
 fn grid_search_moves_as_the_reference_program() {
     let link = Link {

@@ -86,8 +86,9 @@ fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) ->
     best
 }
 
-/// Checks that no grid of positions has a stronger weakest signal than `blind_places`. The random links have 1 to 3
-/// relays.
+/// Checks that no positions on a grid beat `blind_places`, which maximises the weakest signal.
+///
+/// The random links have 1 to 3 relays; the interference does not count.
 #[test]
 fn no_grid_has_a_stronger_weakest_signal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(11));

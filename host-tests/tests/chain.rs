@@ -109,7 +109,9 @@ fn random_links_settle_at_their_optimum() {
     assert!(hopeless > 0);
 }
 
-/// Checks the number of sweeps (along the chain) and the last target SIR with the paper's step of 0.1.
+/// Checks the number of targets that the paper's fixed-step search tries, and the last target.
+///
+/// Each target takes one sweep (a round of messages along the chain), and is 0.1 below the one before.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [
@@ -273,8 +275,9 @@ fn a_shared_channel_gives_the_positions_of_two_wires() {
     }
 }
 
-/// Checks relays with their own altitudes and powers. The leader's predicted target is wrong, but the search still
-/// finds the optimum.
+/// Checks that relays with their own altitudes and powers reach the optimum.
+///
+/// The leader does not know these at first, so that the target SIR that it predicts is wrong.
 #[test]
 fn a_chain_of_different_relays_is_solved_exactly() {
     let mission = mission(8);

@@ -277,7 +277,9 @@ fn near_optimal_in_uneven_fields() {
     assert!(tally.tight() >= 99.0);
 }
 
-/// Checks relays with different altitudes and powers in uneven fields. Half of the scenes have a least separation.
+/// Checks that relays with different altitudes and powers in uneven interference come near the optimum.
+///
+/// Half of the scenes have a least separation.
 #[test]
 fn near_optimal_in_uneven_fields_by_unlike_relays() {
     let mut rng = generator(905);

@@ -88,8 +88,9 @@ fn the_recorded_places_reach_the_recorded_optimum() {
     }
 }
 
-/// Compares recorded optima with those of two other programs: a joint solver and a general optimiser. The latter
-/// optimises all (x, y, h) from 24 starts.
+/// Checks that the recorded optima agree with those of a joint solver and of a general optimiser.
+///
+/// Both are separate programs. The general optimiser searches all (x, y, h) from 24 starts.
 #[test]
 fn optima_of_independent_programs_are_recorded() {
     for (n, want) in [
@@ -127,8 +128,9 @@ fn optima_of_independent_programs_are_recorded() {
     }
 }
 
-/// Checks the 2 000 numbered optima, which are recorded without positions. Forty of them were found again, with
-/// positions, from another random seed.
+/// Checks that forty of the 2 000 numbered optima were found again, from another random seed.
+///
+/// The numbered optima are recorded without positions, the forty others with positions.
 #[test]
 fn the_numbered_optima_are_reproduced() {
     let stored = optima().unwrap();
@@ -279,7 +281,7 @@ fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f
     best.0
 }
 
-/// Compares the recorded optimum of one relay with a search over lateral offset, altitude and x.
+/// Checks that the recorded optimum of one relay is that of a search over x, y and altitude.
 #[test]
 fn one_relay_agrees_with_brute_force() {
     let plane = of("figures aside").step_by(18);

@@ -55,8 +55,9 @@ fn places(outcome: &Outcome) -> Vec<f64> {
     xs(&setpoints(outcome))
 }
 
-/// Compares the closed form for the start of a hop with the reference. The hop's end is given; errors are fractions
-/// of its length.
+/// Checks the closed form for a hop's farthest start that meets a target SIR against the reference.
+///
+/// The hop's end is given. The tolerance is a fraction of the hop's length.
 #[test]
 fn retreats_agree_with_the_reference() {
     let mut rng = generator(61);
@@ -91,8 +92,9 @@ fn retreats_agree_with_the_reference() {
     assert!(worst < 1e-6);
 }
 
-/// Compares chains in a constant field with the closed-form optimum. They have 1 to 50 relays, with and without
-/// prediction.
+/// Checks that chains in a constant field reach the closed-form optimum.
+///
+/// They have 1 to 50 relays, with and without the leader's prediction of the target SIR.
 #[test]
 fn the_optimum_in_a_uniform_field_is_found() {
     let mut rng = generator(62);
@@ -145,7 +147,9 @@ fn the_fixed_step_is_that_of_the_paper() {
     assert!(steps > 1000);
 }
 
-/// Checks relays with own altitudes or powers, for which the leader's predicted target is wrong.
+/// Checks that relays with own altitudes or powers in a field meet their agreed target SIR.
+///
+/// The leader does not know these at first, so that the target that it predicts is wrong.
 #[test]
 fn different_relays_meet_the_agreed_target_in_a_field() {
     let mut rng = generator(68);

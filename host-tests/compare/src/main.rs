@@ -140,8 +140,9 @@ fn solve(options: &Options) -> Result<Results, Failure> {
     })
 }
 
-/// Solves one problem with this crate, and then with every other solver. Those report when they first reach the SIR
-/// of this crate's chain.
+/// Solves one problem with this crate, and then with every other solver.
+///
+/// Each other solver reports when it first reaches the SIR of this crate's chain.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
     let mut runs = own::runs(problem)?;
     let level = table::level(problem, &runs)?;

@@ -20,12 +20,14 @@ use crate::results::{Answer, Mark, Run, Solution};
 /// Relative tolerance of the SIR that this crate aims for: that of `cargo chain`.
 const TOLERANCE: f64 = 1e-4;
 
-/// Number of timed batches; the next constant is their duration. The processor clock has a resolution of
-/// milliseconds.
+/// Number of timed batches, of which the median counts.
 const BATCHES: usize = 5;
+/// Minimum duration of a timed batch. The processor clock has a resolution of milliseconds only.
 const LONG_ENOUGH: Duration = Duration::from_millis(200);
 
-/// Solves `problem` with this crate in two ways. Other solvers are compared with the first one.
+/// Solves `problem` with this crate: first by one computation, then by all relays with messages.
+///
+/// Other solvers are compared with the first of these runs.
 pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     let briefed = mission::mission(&problem.scenario()?, problem.relays, TOLERANCE);
     let (mission, _) = briefed.map_err(|error| error.to_string())?;
@@ -59,8 +61,10 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     Ok(runs)
 }
 
-/// Computes the relays' positions from the mission alone, as the leader predicts them. At most about fifty passes
-/// over N hops, and N^2 / 2 hops for positions.
+/// Computes the positions of all relays from the mission alone, as the leader predicts them.
+///
+/// The search for the target SIR evaluates a chain of N hops at most about fifty times. The positions then cost N^2 /
+/// 2 evaluations of a hop.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     let none = || "no target SIR can be met".to_owned();
     let common = |_| mission.config().common;

@@ -24,8 +24,9 @@ pub(crate) struct Problem {
     pub(crate) relays: u16,
 }
 
-/// True optima (linear SIR) for each kind of problem and number of relays, to nine or ten digits. They are of an
-/// independent program.
+/// True optima (linear SIR) for each kind of problem and number of relays, to nine or ten digits.
+///
+/// An independent program has computed the values.
 const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (
         Choice::Places,

@@ -355,7 +355,10 @@ fn list<'f>(fields: &mut Fields<'f>, name: &str, change: impl FnOnce(&mut Vec<Va
     }
 }
 
-/// Sorts the views in a Proposal. Their order is: agreed on, accepted, proposal that was accepted, proposed.
+/// Reorders the views of a Proposal so that they ascend, as the format requires.
+///
+/// The ascending order is: the view agreed on, the view accepted since, the proposal that was accepted, the proposed
+/// view.
 fn proposal(fields: &mut Fields<'_>) {
     let view = |fields: &Fields<'_>, name| Numbers(fields).get(name) as u32;
     let mut order = vec![view(fields, "agreed_view"), view(fields, "proposed_view")];

@@ -3,8 +3,10 @@
 use uav_relay::CRC_32C;
 use uav_relay::wire::frame::Header;
 
-/// Returns the header and body of a frame, without tag and CRC. Bits of an address above its 12 go on the wire as
-/// they are; `flags` is the top nibble of the second word.
+/// Returns the header and body of a frame, without tag and CRC. `flags` is the top nibble of the second word.
+///
+/// Addresses are not checked: bits above their valid 12 overwrite other header bits, so that invalid frames can be
+/// built.
 pub fn before(header: Header, flags: u16, body: &[u8]) -> Vec<u8> {
     let first = 0x1000 | header.sender;
     let mut plain = first.to_le_bytes().to_vec();
@@ -33,10 +35,10 @@ pub fn stuffed(plain: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Decodes `stuffed`, a frame without its delimiter, by the definition of COBS. Returns the bytes, and true if the
-/// last run is complete.
+/// Decodes `stuffed`, a frame without its delimiter, by the definition of COBS.
 ///
-/// A published decoder would not do, because a truncated stream is checked up to the cut, too.
+/// Returns the decoded bytes, and true if the last run is complete. Published decoders return no bytes of a truncated
+/// frame, but tests need those before the cut.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {
     let mut plain = Vec::with_capacity(stuffed.len());
     let (mut rest, mut whole) = (stuffed, true);

@@ -230,8 +230,11 @@ pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     single((offer.get("relays") - 1.0) * step) <= distance
 }
 
-/// Returns the target SIRs of a sweep's ladder (linear), in ascending order. Each f64 result is rounded to f32, as a
-/// relay's f32 operation does.
+/// Returns the target SIRs (linear, ascending) that a sweep message lists in compact form.
+///
+/// The list starts from the target `anchor`. `gap` encodes the relative gap to the next target, 0 for a single
+/// target; `growth` encodes the factor from each gap to the next. Each f64 result is rounded to f32, as a relay's f32
+/// operation does.
 pub fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];

@@ -15,7 +15,7 @@ pub struct Vectors {
     pub frames: Vec<Frame>,
     /// Handshakes and a message with authentication tags, in the order of sending.
     pub signed: Vec<Signed>,
-    /// Ladders of target SIRs.
+    /// Lists of target SIRs with the compact form in which a sweep message has them.
     pub ladders: Vec<Ladder>,
     /// Byte streams that a receiver rejects, or whose message has no effect.
     pub rejected: Vec<Rejected>,
@@ -71,16 +71,16 @@ pub struct Signed {
     pub wire: Vec<u8>,
 }
 
-/// Test vector: a ladder, the target SIRs of a sweep in a compact form.
+/// Test vector: the compact form of a sweep message's list of target SIRs, and the targets.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Anchor of the ladder, the bits of its f32 in hexadecimal.
+    /// Target SIR from which the list starts: the bits of its f32 in hexadecimal.
     pub anchor: String,
-    /// Gap code of the ladder.
+    /// Code of the relative gap between the first targets of the list, 0 for a single target.
     pub gap: u8,
-    /// Growth code of the ladder.
+    /// Code of the factor by which each gap between targets exceeds the one before.
     pub growth: u8,
-    /// Target SIRs of the ladder, the bits of their f32 in hexadecimal.
+    /// Target SIRs that the compact form stands for: the bits of each f32 in hexadecimal.
     pub targets: Vec<String>,
 }
 

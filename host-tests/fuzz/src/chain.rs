@@ -12,7 +12,7 @@ use super::input::Input;
 use super::setting;
 use super::watch::{Sent, Watched};
 
-/// Maximum number of fuzzed operations in one run, which take some milliseconds of computing.
+/// Maximum number of fuzzed operations in one run. Each takes some milliseconds of computing.
 const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
@@ -23,14 +23,14 @@ const MAX_IN_TRANSIT: usize = 24;
 /// Maximum number of rounds in one operation. A round delivers a frame to each relay.
 const MAX_ROUNDS: u8 = 128;
 
-/// Rounding error of a position, as a part of the distance from Tx to Rx: one step of its f32.
+/// Rounding error of a position, as a fraction of the distance from Tx to Rx: one step of its f32.
 const ROUNDING: f64 = 1.3e-7;
 
 /// Fuzz target. Reads `data` as a mission, settings of each relay, and operations on the frames between them.
 ///
 /// # Panics
-/// A relay breaks a promise that `watch` checks, two neighbours hold positions of one pass that are too close, or the
-/// chain does not agree after faults have ended.
+/// A relay breaks a promise that `watch` checks, two neighbours that got their positions by one pass (a round of messages
+/// along the chain) are too close, or the chain does not agree after faults have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }

@@ -91,8 +91,10 @@ fn check_decoded(plain: &[u8]) {
     assert_eq!(opened.handshake, flags == 3);
 }
 
-/// Checks a relay that requires authentication tags. The body with valid addresses and tag is accepted once, and
-/// rejected as forged with a flipped bit.
+/// Checks a relay that requires authentication tags.
+///
+/// The relay must accept the body with valid addresses and tag once. With a flipped bit it must reject the frame as
+/// forged.
 fn check_signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
     let Some(HandshakenPair {

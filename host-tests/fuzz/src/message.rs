@@ -52,7 +52,9 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     body.bytes
 }
 
-/// Optional field of a sweep message, between the sender's power and the list of reaches.
+/// Field that a sweep message has between the sender's power and the list of positions.
+///
+/// A list entry is the farthest position at which the next relay meets one target SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,
@@ -103,7 +105,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the profiles of up to eight relays, as a Gather has them, mostly with rising relay indices.
+    /// Appends the profiles of up to eight relays, as in a Gather message, mostly with rising indices.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));

@@ -45,16 +45,18 @@ pub struct Sent {
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,
-    /// Node number of the relay. The next field is the number of relays in the mission.
+    /// Node number of the relay.
     node: u16,
+    /// Number of relays in the mission.
     all: u16,
     settings: Settings,
     stats: Stats,
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Sites of the mission that the relay flies. The next field is the distance of the loaded mission, m.
+    /// Sites of the mission that the relay flies.
     sites: Option<Sites>,
+    /// Distance from Tx to Rx in the mission that the relay was loaded with, m.
     loaded_m: f32,
     frames: Frames,
     /// Number of bytes received since the last frame delimiter, for each port.

@@ -10,8 +10,9 @@ use super::*;
 /// Number of simulated runs for each kind of channel; the environment variable `SEEDS` overrides it.
 const SEEDS: u64 = 200;
 
-/// Time at which relay 4 fails, s. Such a run ends at `ENDS_S`.
+/// Time at which relay 4 fails in a run that measures the recovery, s.
 const DIES_S: u64 = 60;
+/// Time at which a run with a failing relay ends, s.
 const ENDS_S: u64 = 900;
 
 /// Returns eight relays on a CSMA channel of 57 600 baud that loses the fraction `share` of the frames. The losses
@@ -96,11 +97,11 @@ fn availability_in_an_hour_on_a_bad_channel() {
     }
 }
 
-/// Random seeds of simulated hours in which half of the frames are lost, in runs of 20.
+/// Random seeds of simulated hours in which one relay repeatedly loses the links to both neighbours.
 ///
-/// The environment variable `SEEDS` (as `201-800`) overrides them. In these hours, one relay repeatedly loses the
-/// links to both neighbours. If every silence between its own rare requests counted as one more loss, its links would
-/// be held down for good, and the chain would be complete for only 4, 2, 11 and 28 % of the hour.
+/// Half of the frames are lost, in runs of 20. If each silence between the relay's own rare requests counted as one
+/// more loss, its links would be held down for good, and the chain would be complete for only 4, 2, 11 and 28 % of
+/// the hour. The environment variable `SEEDS` (as `201-800`) overrides the seeds.
 const LONG_SEARCHES: [u64; 4] = [519, 625, 777, 1_030];
 
 #[test]

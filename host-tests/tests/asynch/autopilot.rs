@@ -90,8 +90,9 @@ struct Vehicle {
     given_at: Cell<Instant>,
     place: Cell<Placement>,
     told: RefCell<Vec<(Instant, Placement)>>,
-    /// Commands of a ground station that the autopilot has yet to forward; `results` has the answers.
+    /// Commands of a ground station that the autopilot has yet to forward to the companion.
     commands: RefCell<VecDeque<MavMessage>>,
+    /// Results of the ground station's commands, as the companion answers them.
     results: RefCell<Vec<u32>>,
 }
 
@@ -394,8 +395,9 @@ fn a_stuck_writer_does_not_stop_the_readers() {
     );
 }
 
-/// Checks an operator's command that declares a neighbour lost for good and so clears it. The firmware passes the
-/// relay's events to the autopilot link.
+/// Checks that an operator's command clears a lost neighbour, which means that its drone is gone.
+///
+/// The firmware passes the relay's events to the autopilot link.
 #[test]
 fn an_operator_clears_a_lost_relay() {
     let mut scene = Scene::of(2, true);

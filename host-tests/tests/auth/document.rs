@@ -42,8 +42,9 @@ fn the_example_frames_follow_the_rules() {
     }
 }
 
-/// Checks that a relay accepts the documentation's worked handshake and computes the same tag. The examples are for
-/// relay 2 of 3 and its first nonce toward relay 1.
+/// Checks that a relay accepts the handshake of the documentation's example and computes the same tag.
+///
+/// The example is for relay 2 of 3 and its first nonce toward relay 1.
 #[test]
 fn the_example_handshake_is_accepted_with_equal_tags() {
     let settings = Settings {

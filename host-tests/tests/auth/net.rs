@@ -69,7 +69,9 @@ pub(crate) struct Net {
     pub(crate) genuine: Vec<u32>,
     /// Start counts of both ends of each link (from, to) when a message was last accepted there.
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Start count of the sender that the receiver last learned, and the receiver's own then, by link.
+    /// Start counts of both ends of each link (from, to) when a frame last arrived there.
+    ///
+    /// The first count is that of the sender when it sent the frame, the second that of the receiver on arrival.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
     /// Indices of frames whose sender signed them before it learned of the receiver's last start.
     outdated: BTreeSet<usize>,

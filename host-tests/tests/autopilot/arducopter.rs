@@ -82,7 +82,9 @@ fn the_target_is_sent_again_after_a_mode_change() {
     assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
 }
 
-/// Checks that the last target of a flight has no velocity, at whatever time the autopilot confirms it.
+/// Checks that the last target of a flight has no velocity.
+///
+/// The time at which the autopilot confirms that target differs between the flights.
 #[test]
 fn a_late_confirmation_of_the_last_target_counts() {
     for late in 0..100_u16 {

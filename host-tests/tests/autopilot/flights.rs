@@ -95,15 +95,18 @@ struct Flight {
     to: Cable,
     from: Cable,
     companion: Option<Companion>,
-    /// Time of the companion's last start. The next fields are its next start and the end of its pause.
+    /// Time of the companion's last start.
     started: Instant,
+    /// Time at which the companion starts again; `None` while it runs.
     starts_at: Option<Instant>,
+    /// Time until which the companion is paused and does not run.
     paused_until: Instant,
     mends_at: Instant,
     gps_until: Instant,
     setpoint: Option<Placement>,
-    /// Time at which the pilot last chose OFFBOARD or GUIDED. The next field is the last flight in it.
+    /// Time at which the pilot last chose OFFBOARD or GUIDED.
     handed_over_at: Option<Instant>,
+    /// Last time at which the drone flew in OFFBOARD or GUIDED.
     flown_at: Instant,
     texts: Vec<(Instant, String)>,
     engaged: u32,

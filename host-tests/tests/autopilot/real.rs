@@ -15,16 +15,17 @@ pub(crate) type Point = [f64; 3];
 /// Time step of the simulated airframe, s.
 pub(crate) const STEP_S: f64 = 0.02;
 
-/// Time without targets after which a PX4 leaves OFFBOARD. `RESUMES` is the time with targets until it resumes.
+/// Time without targets after which a PX4 leaves OFFBOARD.
 const LOST: Duration = Duration::from_millis(1_000);
+/// Time with targets after which a PX4 in failsafe resumes OFFBOARD.
 const RESUMES: Duration = Duration::from_millis(1_200);
 
-/// Longest time until a companion knows of a failsafe, by a heartbeat or by the link's delay.
+/// Longest time until the companion knows of a PX4's failsafe: heartbeat interval and link delay.
 const KNOWN_WITHIN: Duration = Duration::from_millis(1_300);
 
-/// Time for which an ArduCopter keeps a velocity without new targets. `RECKONS` is the time for which it navigates
-/// without GPS.
+/// Time for which an ArduCopter keeps a velocity without new targets.
 const VELOCITY: Duration = Duration::from_millis(3_000);
+/// Time for which an ArduCopter navigates without GPS.
 const RECKONS: Duration = Duration::from_millis(8_000);
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -140,9 +141,10 @@ pub(crate) struct Real {
     hold: Point,
     began: Instant,
     pub(crate) away_until: Option<Instant>,
-    /// Fraction by which the autopilot's clock runs slow; `lost_us` is the time that it has lost, µs.
+    /// Fraction by which the autopilot's clock runs slow since `slow_since`.
     pub(crate) slow: f64,
     slow_since: Instant,
+    /// Time that the autopilot's clock has lost by a step, µs; negative if it has gained time.
     pub(crate) lost_us: i64,
     pub(crate) echoes: bool,
     /// True while the autopilot sends no positions.
@@ -156,9 +158,9 @@ pub(crate) struct Real {
     fell_at: Instant,
     /// Time at which the companion sent the newest target.
     sent_at: Instant,
-    /// Number of times that OFFBOARD resumed without the pilot, by targets sent in a known failsafe. `resumed_late`
-    /// counts those by targets that were sent before the failsafe was known.
+    /// Number of times that a PX4 resumed OFFBOARD because the companion sent targets in a known failsafe.
     pub(crate) resumed: u32,
+    /// Number of times that a PX4 resumed OFFBOARD before the companion knew of the failsafe.
     pub(crate) resumed_late: u32,
     pub(crate) requests: Vec<u32>,
 }
@@ -363,7 +365,9 @@ impl Real {
         }
     }
 
-    /// Flies by the pilot's sticks for one step. The drone has the velocity at once, m/s.
+    /// Flies the drone for one step as its pilot does by the sticks, at `velocity` in m/s.
+    ///
+    /// The drone has that velocity at once.
     pub(crate) fn shove(&mut self, velocity: Point) {
         self.body.fly_at(velocity, &PX4);
         self.hold = self.body.at;

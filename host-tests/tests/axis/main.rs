@@ -149,7 +149,7 @@ fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
     point
 }
 
-/// Compares the crate, and the port of GeographicLib, with points computed by GeographicLib itself.
+/// Checks that the crate, and the port of GeographicLib, agree with points of GeographicLib itself.
 #[test]
 fn points_agree_with_geographiclib() {
     let mut reader = csv::Reader::from_reader(&include_bytes!("points.csv")[..]);

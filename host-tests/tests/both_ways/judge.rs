@@ -43,8 +43,9 @@ impl Chain {
         power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
     }
 
-    /// Returns the hop's value: the smaller of its forward SIR and its backward SIR divided by `reverse`. The hop
-    /// ends at `node`, which is at `to`.
+    /// Returns a hop's two-way SIR: the smaller of its forward SIR and backward SIR / `reverse`.
+    ///
+    /// The hop goes from x = `from` to x = `to`, m, and ends at `node` (0 is Tx, N + 1 is Rx).
     pub(crate) fn hop(&self, node: usize, from: f64, to: f64) -> f64 {
         let climb = if node == 1 || node > self.relays() {
             self.altitude_m
@@ -57,7 +58,9 @@ impl Chain {
         there.min(back / self.reverse)
     }
 
-    /// Returns the value of the worst hop with relays at `x`.
+    /// Returns the two-way SIR of a chain's worst hop, with the relays at `x`.
+    ///
+    /// The two-way SIR of a hop is the smaller of its forward SIR and its backward SIR divided by `reverse`.
     pub(crate) fn value(&self, x: &[f64]) -> f64 {
         let mut from = 0.0;
         let mut worst = f64::INFINITY;
@@ -68,8 +71,9 @@ impl Chain {
         worst
     }
 
-    /// Returns the best positions with relay k at a point of `grids[k - 1]`. The points of a grid are in ascending
-    /// order.
+    /// Returns the positions with the best two-way SIR, with relay k at a point of `grids[k - 1]`.
+    ///
+    /// The points of a grid are in ascending order.
     fn best_on(&self, grids: &[Vec<f64>]) -> Vec<f64> {
         let first = grids[0].iter().map(|&x| self.hop(1, 0.0, x));
         let mut best: Vec<f64> = first.collect();
@@ -126,8 +130,9 @@ impl Chain {
         points
     }
 
-    /// Improves positions by searches in windows around them, which shrink when they no longer help. Returns the
-    /// value and the positions.
+    /// Improves positions by searches in windows around them, which shrink when they no longer help.
+    ///
+    /// Returns the two-way SIR of the worst hop, and the positions.
     pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let mut x = start.to_vec();
         let mut value = self.value(&x);
@@ -156,7 +161,7 @@ impl Chain {
         (value, x)
     }
 
-    /// Returns the best value that the search finds, and the positions for it.
+    /// Returns the best two-way SIR of a worst hop that the search finds, and the positions for it.
     pub(crate) fn best(&self) -> (f64, Vec<f64>) {
         let grid = self.grid();
         let start = self.best_on(&vec![grid; self.relays()]);

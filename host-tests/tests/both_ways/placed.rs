@@ -7,7 +7,10 @@ use uav_relay_oracle::random::count;
 use super::judge::Chain;
 use super::scenes::{ENDS, LOS, NLOS, adversarial, in_noise, log_uniform, mission, narrow, usual};
 
-/// Returns the value and the positions that the relays agree on. The value is 0 without an agreement.
+/// Returns the two-way SIR of the worst hop, and the positions, on which the relays agree.
+///
+/// The SIR is 0 without an agreement. The two-way SIR of a hop is the smaller of its forward SIR and its backward SIR
+/// divided by the chain's `reverse`.
 fn reached(chain: &Chain) -> (f64, Vec<f64>) {
     let mission = mission(chain);
     let Some(agreed) = solve(&mission, &[]) else {
@@ -19,8 +22,9 @@ fn reached(chain: &Chain) -> (f64, Vec<f64>) {
 
 type Draw<R> = fn(&mut R, [f64; 2], f64) -> Chain;
 
-/// Compares the relays' agreement with a grid search in random scenes. At least 99.5 % of the values are within 1e-4
-/// of the best found, and none is below 0.99 of it.
+/// Checks in random scenes that the relays' agreement is as good as the best that a grid search finds.
+///
+/// At least 99.5 % of the two-way SIRs are within 1e-4 of the best one, and none is below 0.99 of it.
 fn as_good_as_the_judge(seed: u64, scenes: usize, noisy: bool, draw: Draw<ChaCha8Rng>) {
     let mut rng = generator(seed);
     for ends in ENDS {
@@ -82,8 +86,9 @@ fn the_best_places_near_an_interferer_in_noise_are_found() {
     as_good_as_the_judge(3305, 60, true, adversarial);
 }
 
-/// Checks that relays stay at Tx if an interferer lies between them and a weak Rx. A chain whose last relay passes
-/// the interferer has less than 0.3 of the value.
+/// Checks that relays stay at Tx if an interferer lies between them and a weak Rx.
+///
+/// A chain whose last relay passes the interferer has a two-way SIR of less than 0.3 of theirs.
 #[test]
 fn relays_stay_at_tx_where_an_interferer_is_between_them_and_a_weak_rx() {
     let chain = Chain {

@@ -52,8 +52,10 @@ pub(crate) fn mission(chain: &Chain) -> Mission {
     .unwrap()
 }
 
-/// Draws a scene as in the specification of two-way chains. `ends` are the powers of Tx and Rx in W, `reverse` is the
-/// fraction for the return direction.
+/// Draws a scene as in the specification of two-way chains.
+///
+/// `ends` are the powers of Tx and Rx, W. `reverse` is the fraction of the target SIR that suffices on the way from
+/// Rx to Tx.
 pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
     let relays = log_uniform(rng, 1.0, 50.99) as usize;
     let mut powers_w = vec![1.0; relays + 2];
@@ -73,7 +75,10 @@ pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
     }
 }
 
-/// Draws a scene with an interferer near the line, close to the last relays or passed by a strong Tx.
+/// Draws a scene that is hard to solve: one to six relays, and the interferer close to the line.
+///
+/// `ends` are the powers of Tx and Rx, W. `reverse` is the fraction of the target SIR that suffices on the way from
+/// Rx to Tx.
 pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
     let mut chain = usual(rng, ends, reverse);
     let relays = rng.random_range(1..=6);

@@ -27,7 +27,7 @@ while True:
         os.write(masters[1 - masters.index(ready)], os.read(ready, 4096))
 "#;
 
-/// Replaces socat in a script of the page where it is not installed.
+/// Replaces `socat` by a Python program in a script of `examples/LINUX.md`, if it is not installed.
 fn with_socat(script: &str, folder: &Path) -> String {
     if Command::new("socat").arg("-V").output().is_ok() {
         return script.to_owned();
@@ -37,14 +37,17 @@ fn with_socat(script: &str, folder: &Path) -> String {
     script.replace("socat ", &format!("python3 {} ", file.display()))
 }
 
-/// Returns the script of the first block ```` ```LANGUAGE tested ```` under a heading of the page.
+/// Returns the first block ```` ```LANGUAGE tested ```` below a heading of `examples/LINUX.md`.
 fn block(heading: &str, language: &str) -> String {
     let section = PAGE.split(heading).nth(1).unwrap();
     let script = section.split(&format!("```{language} tested\n")).nth(1);
     script.unwrap().split("```").next().unwrap().to_owned()
 }
 
-/// Runs the two relays of the page's first example until both have agreed. A user ends them by Ctrl-C.
+/// Checks that the two relays of the first example in `examples/LINUX.md` agree.
+///
+/// The script of the example runs until both have logged their agreement, and is then terminated. A user would end it
+/// by Ctrl-C.
 #[test]
 fn two_relays_on_one_computer_agree() {
     let script = block("## The companion of a drone", "sh");
@@ -76,7 +79,9 @@ fn two_relays_on_one_computer_agree() {
     assert_eq!(agreed, [true; 2]);
 }
 
-/// Runs the bench script twice in one folder. Files of the first run must not disturb the second.
+/// Checks that the script for two computers on a bench in `examples/LINUX.md` runs twice in one folder.
+///
+/// Files that the first run leaves behind must not disturb the second one.
 #[test]
 fn the_bench_of_the_page_runs_twice() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();

@@ -12,7 +12,7 @@ use crate::pty::Pty;
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Chain of two relay processes without drones, which are loaded with the distance of [`SITED`].
+/// Chain of two relay processes without drones. Their mission has the distance of the sites in [`SITED`].
 struct Bench(Chain);
 
 impl Bench {

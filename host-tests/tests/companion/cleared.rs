@@ -125,8 +125,9 @@ fn an_incomplete_command_is_answered() {
     assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
 
-/// Checks that a MAVLink command through the neighbour's autopilot clears a lost relay. A ground station sends such a
-/// command.
+/// Checks that a relay clears a lost neighbour on a MAVLink command that its autopilot forwards.
+///
+/// An operator sends that command with a ground station.
 #[test]
 fn an_operator_clears_a_relay_by_a_mavlink_command() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));

@@ -52,7 +52,9 @@ fn a_relay_locates_the_interferer_by_samples_from_a_fifo() {
     assert!(!believed.ends_with("0.000e0 W"), "{believed}");
 }
 
-/// Checks that a relay uses a radio's noise measurements in the air. It plans to move, to measure at other positions.
+/// Checks that a relay in the air uses the noise measurements of its radio.
+///
+/// It shows this by a log line: the relays will spread, in order to measure at other positions.
 #[test]
 fn noise_of_a_radio_on_the_autopilots_link_is_used() {
     let mut flight = Flight::found("arducopter", LISTENING);

@@ -2,8 +2,9 @@
 
 use crate::flying::Flight;
 
-/// Signing key, written as a ground station does. `OTHER` is another one with white space around it.
+/// MAVLink signing key of one party, in hexadecimal.
 const ONE: &str = "1111111122222222333333334444444455555555666666667777777788888888";
+/// MAVLink signing key of the other party, which differs in one digit and has white space around it.
 const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788888889\n";
 
 /// Checks a drone and a relay with different signing keys, or with only one key. The relay logs the mismatch, does

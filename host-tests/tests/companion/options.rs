@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::process::Relay;
 
-/// Valid options of a relay, to which the wrong ones in [`WRONG`] without `--index` are added.
+/// Valid options of a relay. The wrong options in [`WRONG`] that have no `--index` are tried after these.
 const GOOD: &str = "--index 2 --of 3 --upstream a --downstream b ";
 
 /// Options with the sites of transmitter and receiver, and their distance.

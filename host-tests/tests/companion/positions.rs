@@ -7,8 +7,9 @@ use crate::files::{Files, write};
 use crate::medium::QUIET;
 use crate::process::{LIMIT, Relay, bits};
 
-/// Checks relays that receive their drones' positions. Their first setpoints are these positions, and the last ones
-/// are those of a chain without motion guards.
+/// Checks that relays that receive their drones' positions first hold these as setpoints.
+///
+/// Their last setpoints must be those of a chain without motion guards.
 #[test]
 fn two_relays_with_positions_keep_apart_by_their_guards() {
     let mut free = Chain::start(2, "");

@@ -118,7 +118,9 @@ fn a_bad_key_or_epoch_is_named() {
     }
 }
 
-/// Checks a restart with an older epoch file: the neighbour logs how to repair this, and that works.
+/// Checks that a relay restarted with an older epoch file is rejected, and joins after the repair.
+///
+/// The neighbour's log tells how to repair this: by a larger number in the epoch file.
 #[test]
 fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     let mut chain = Chain::on_wires(2, QUIET);

@@ -57,7 +57,7 @@ fn files(chain: &Chain, index: usize) -> String {
     )
 }
 
-/// Returns true if a status answer shows a chain of three relays and this one's setpoint and lease.
+/// Returns true if a relay's status answer shows three relays in the chain, a setpoint and a lease.
 fn of_three(said: &Value) -> bool {
     said["relay"]["relays"] == 3
         && said["relay"]["setpoint"].is_object()

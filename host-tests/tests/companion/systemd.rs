@@ -45,7 +45,9 @@ fn systemd_accepts_the_unit() {
     assert!(said.contains("uav-relay@"), "it verifies anything: {said}");
 }
 
-/// Checks that the program accepts the unit's options and the example file.
+/// Checks that the companion accepts the example configuration `examples/drone.toml`.
+///
+/// The only error is the missing key file.
 #[test]
 fn the_example_file_is_complete() {
     let file = root().join("examples/drone.toml");

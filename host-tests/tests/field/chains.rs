@@ -8,8 +8,9 @@ use uav_relay_oracle::reference::{Link, Relay};
 
 use super::off;
 
-/// Upsilon = E[1/I] of the chains that a separate program computed, 1/W. It is 0.8 of `p_u` U / (eta h^2) with the
-/// paper's channel and h = 20 m.
+/// Upsilon = E[1/I], 1/W, of the constant field in the chains that a separate program computed.
+///
+/// I is the interference power. With this value, a relay straight above Rx at 20 m has an expected SIR of 0.8 at Rx.
 const UPSILON: f64 = 2_301_379.773_574_951;
 
 /// Returns the paper's multi-hop scenario with constant interference along the line.

@@ -48,8 +48,10 @@ fn random_field(rng: &mut impl Rng) -> StochasticLink {
     link
 }
 
-/// Returns the fewest relays that meet `target` from positions on a grid; 0 if more than `most`. Hops may be `longer`
-/// grid steps longer than `target` permits.
+/// Returns the fewest relays that meet `target` (linear SIR) with all relays at grid points.
+///
+/// The grid divides the line into 4000 steps. `longer` is a tolerance: a hop may be longer than `target` permits by
+/// that many steps. Returns 0 if more than `most` relays are needed.
 fn on_a_grid(link: &StochasticLink, target: f64, most: usize, longer: f64) -> usize {
     const STEPS: usize = 4000;
     let (d, relay) = (link.distance_m, link.relays[0]);
@@ -196,8 +198,9 @@ fn identical_relays_in_a_field_are_optimal() {
     assert!(above > 5);
 }
 
-/// Checks that the number of relays with different powers in a field is not called proven. It is found by Algorithm
-/// 4.
+/// Checks that the fewest relays found for a field, if powers differ, are not reported as proven.
+///
+/// Algorithm 4, which finds them, may miss a chain with fewer relays.
 #[test]
 fn different_relays_in_a_field_are_not_called_proven() {
     let link = field(1000.0, 20.0, vec![(0.0, 3e6), (1000.0, 5e6)]);

@@ -7,8 +7,7 @@ mod known;
 use host_tests::placing::xs;
 use uav_relay::{Mission, Placement, Profile};
 
-/// Relative loss of a target SIR because positions are rounded to f32. Half a rounding step of x is 6e-8 D, compared
-/// with an altitude of 0.002 D.
+/// Relative loss of SIR that is tolerated because relays' positions are rounded to f32.
 pub(crate) const ROUNDING: f64 = 1e-4;
 
 pub(crate) fn round(value: f64) -> f64 {

@@ -30,8 +30,9 @@ use super::*;
 const ERROR_M: f64 = 2.0;
 const NOISE_M: f64 = 0.3;
 
-/// Time of the last random event, s. The flight ends at `ENDS_S`.
+/// Time of the last random event of a flight, s.
 const EVENTS_S: u64 = 180;
+/// Time at which a flight ends, s.
 const ENDS_S: u64 = 420;
 
 fn during(rng: &mut ChaCha8Rng) -> Instant {
@@ -162,7 +163,10 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns true if the drones' order along the line is always certain, so that all must arrive.
+/// Returns true if all drones must arrive, because their order along the line is certain all the time.
+///
+/// It is certain if the starts are farther apart than the position errors, every pilot returns the drone, silent
+/// relays return soon, and no mission is uploaded.
 fn is_orderly(setup: &Setup) -> bool {
     let Some(spec) = &setup.fleet else {
         return false;

@@ -15,8 +15,10 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
     places.collect()
 }
 
-/// Checks that drones reach agreed positions closer along x than the least separation. It flies the chains with such
-/// positions among 200 random scenes.
+/// Checks that drones reach agreed positions that are closer along x than the least separation.
+///
+/// In space they keep the separation, by their altitudes or lateral offsets. Such positions come from the scenes
+/// among 200 random ones in which the joint method agrees on them.
 #[test]
 fn drones_get_to_positions_that_are_closer_along_x() {
     let mut rng = ChaCha8Rng::seed_from_u64(number("SEED", 1));

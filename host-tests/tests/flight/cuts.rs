@@ -8,16 +8,19 @@ use super::*;
 /// Longest time from the last repair of the chain until all relays are in one membership view, s.
 const SOON_S: f64 = 120.0;
 
-/// Returns all pairs of cuts of the chain. A cut is the number of the relay behind which the chain is separated, and
-/// the first cut of a pair heals first.
+/// Returns all pairs of different links to cut, each link named by the relay before it.
+///
+/// The first cut of a pair is also the first to heal.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {
     (1..8)
         .flat_map(|first| (1..8).map(move |second| (first, second)))
         .filter(|(first, second)| first != second)
 }
 
-/// Checks that all relays are in one membership view soon after two overlapping cuts of the chain. Times are start,
-/// end, start, end, s; in the last set the cuts heal a second apart.
+/// Checks that all relays are in one membership view soon after two overlapping cuts of the chain.
+///
+/// The four numbers of a row are the times in s at which the first cut begins and ends, and the second one. In the
+/// last row, the cuts heal within a second of each other.
 #[test]
 fn all_relays_are_in_one_view_soon_after_two_cuts() {
     let all = [

@@ -11,8 +11,10 @@ const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
     up_m: 25.0,
 };
 
-/// Returns all relays' lateral offsets and altitudes while relays 1 to 3 are cut off, and after that. With `room`,
-/// the motion guard permits the offsets of relays that leave the line.
+/// Returns the relays' lateral offsets and altitudes, m, during a cut behind relay 3 and long after it.
+///
+/// Relays without a quorum leave the line, sideways and upward. `room` selects whether the motion guard permits their
+/// way.
 fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
     [seconds(110), seconds(300)].map(|end| {
         let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(1));

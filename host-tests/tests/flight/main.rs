@@ -20,8 +20,9 @@ use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 const SEPARATION_M: f64 = 10.0;
 
-/// Constant error of each drone's reported position, m. `NOISE_M` is the noise of each report.
+/// Constant error of each drone's reported position, m.
 const BIAS_M: f64 = 0.5;
+/// Random error of each report of a drone's position, m, in addition to the constant one.
 const NOISE_M: f64 = 0.5;
 
 /// Rounding error of a position, m: positions are f32 of up to 1 km.
@@ -42,9 +43,10 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
     setup
 }
 
-/// Returns the smallest permitted distance of drones that were each started at most `starts` times, m.
+/// Returns the smallest permitted distance between drones, m, each started at most `starts` times.
 ///
-/// The motion guard separates estimated positions. Each is off by its bias, and by the noise once for each start.
+/// The motion guard keeps the separation between reported positions. Both positions have a constant error, and the
+/// random error of one report for each start.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }

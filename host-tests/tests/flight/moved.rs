@@ -11,14 +11,16 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use super::*;
 
-/// Noise of the drones' positions, m. The next constants are their hovering error and the permitted shortfall of the
-/// separation, as in `fleet`.
+/// Random error of each report of a drone's position, m.
 const NOISE_M: f64 = 0.3;
+/// Error of the hovering position that is configured in the motion guard, m.
 const HOVER_M: f64 = 1.5;
+/// Permitted shortfall of the separation, m: constant error and hovering error of both drones.
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
-/// Largest displacement of the receiver along the line and to the side, m. It turns the line by about 17 degrees.
+/// Largest displacement of the receiver along the line, m.
 const ON_M: f32 = 300.0;
+/// Largest displacement of the receiver to the side, m. It turns the line by about 17 degrees.
 const ASIDE_M: f32 = 300.0;
 
 fn flight(seed: u64) -> Setup {

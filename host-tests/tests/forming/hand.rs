@@ -93,8 +93,9 @@ impl Chain {
     }
 }
 
-/// Altitude band of one altitude. `WIDE` permits a range of altitudes.
+/// Altitude range that permits only 20 m.
 pub(crate) const LOW: Band = Band::at(20.0);
+/// Altitude range from 20 m to 300 m.
 pub(crate) const WIDE: Band = Band {
     least_m: 20.0,
     most_m: 300.0,

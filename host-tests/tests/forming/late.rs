@@ -6,8 +6,10 @@ use uav_relay::{Adjust, Local, Method, Settings};
 use crate::hand::{Chain, LOW, WIDE, is_stop};
 use host_tests::bench::Bench;
 
-/// Checks that no relay follows a leader's first pass if that is delayed beyond the leader's reboot. It arrives
-/// during the last round of the next agreement by Algorithm 2.
+/// Checks that a message of the leader from before its reboot does not spoil the agreement after it.
+///
+/// The message starts a round along the chain, is delayed, and arrives in the last round of the new agreement, by
+/// Algorithm 2. No relay may follow it.
 #[test]
 fn a_sweep_from_before_a_reboot_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {

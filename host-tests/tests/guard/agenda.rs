@@ -28,12 +28,16 @@ pub(crate) enum FlightEvent {
     Back(usize, Side, usize),
     Forget(usize, Side),
     Speed(usize, f64),
-    /// Event: the drone's pilot takes control; the guard is informed. The next events move the drone and give control
-    /// back.
+    /// Event: the drone's pilot takes control of the drone.
     PilotTakesOver(usize),
+    /// Event: the drone's motion guard is informed that its pilot has control.
     GuardLearnsOfPilot(usize),
+    /// Event: the pilot moves the drone across the line. The second field has the axis (1 for y, 2 for altitude),
+    /// true for the positive direction, and the distance, m.
     Aside(usize, (usize, bool, f64)),
+    /// Event: the pilot moves the drone along the line, to a fraction of the space between neighbours.
     Along(usize, f64),
+    /// Event: the pilot gives control back to the motion guard.
     PilotHandsBack(usize),
 }
 

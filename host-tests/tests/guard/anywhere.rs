@@ -36,8 +36,9 @@ const ACCELERATION: f64 = 3.0;
 /// Longest time from a release at full speed until the drone hovers, overshoot included, s.
 const BRAKES_S: f64 = 8.0;
 
-/// Time of the last fault, s. The flight ends when all drones have arrived, or fails at `LAST_S`.
+/// Time of the last fault of a flight, s. The flight ends when all drones have arrived.
 const ROUGH_S: f64 = 120.0;
+/// Time at which a flight fails if not all drones have arrived, s.
 const LAST_S: f64 = 900.0;
 
 /// Line of relays over the ground. All lines start at the same transmitter.
@@ -80,8 +81,9 @@ struct Drone {
     at: Point,
     velocity: Point,
     bias: Point,
-    /// Point that the autopilot is following, over the ground. The next field is its velocity.
+    /// Point that the autopilot is following, over the ground, m.
     target: Point,
+    /// Velocity of the point that the autopilot is following, m/s.
     target_velocity: Point,
     guard: Guard,
     line: Line,

@@ -141,10 +141,11 @@ fn one_relay_may_have_a_fixed_altitude() {
     );
 }
 
-/// Checks the number of round trips if some relays have a power or altitude of their own. One round trip computes,
-/// further ones each collect the data of up to eight such relays, and one computes again.
+/// Checks the number of round trips if some relays have a power or altitude of their own.
 ///
-/// If the leader is one of these relays, the first round trip is omitted.
+/// The first round trip computes and finds that relays differ. Each further one collects the data of up to eight of
+/// these relays, and the last one computes again. If the leader is one of these relays, the first round trip is
+/// omitted.
 #[test]
 fn different_relays_take_three_round_trips_or_more() {
     for (relays, own, trips) in [

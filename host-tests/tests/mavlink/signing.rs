@@ -14,8 +14,9 @@ use super::*;
 const KEY: [u8; 32] = [0x5A; 32];
 const OTHER: [u8; 32] = [0xA5; 32];
 
-/// Time 2026-11-22 12:00 UTC in Unix seconds. `STAMP` is the same in MAVLink's unit of 10 µs since 2015.
+/// Time of the tests: 2026-11-22 12:00 UTC, as Unix seconds.
 const UNIX_S: u64 = 1_795_348_800;
+/// Time of the tests in MAVLink's unit: 10 µs since 2015-01-01.
 const STAMP: u64 = (UNIX_S - 1_420_070_400) * 100_000;
 
 /// Number of MAVLink time stamp units of 10 µs in a minute.

@@ -36,8 +36,9 @@ const FLIES_MS: u64 = 60_000;
 /// Time of observation after the second duplicate relay was switched on, ms.
 const WATCHED_MS: u64 = 100_000;
 
-/// Time at which two settled chains come into range, ms. They are observed for `MET_MS` after that.
+/// Time at which two settled chains come into range of each other, ms.
 const MEETING_MS: u64 = 200_000;
+/// Time of observation after two settled chains have come into range, ms.
 const MET_MS: u64 = 60_000;
 
 /// Medium between two duplicate relays and the other relays.
@@ -238,9 +239,9 @@ fn one_of_two_hidden_duplicates_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }
 
-/// Two chains with a common index on a shared channel, each with half of the other relays.
+/// Two chains that meet on a shared channel and both have a relay with one index.
 ///
-/// They come into range once both hold.
+/// Each chain has half of the other relays. They come into range once the relays of both have agreed on positions.
 #[derive(Clone, Copy, Debug)]
 struct Meeting {
     relays: u16,

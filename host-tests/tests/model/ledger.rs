@@ -14,8 +14,10 @@ use super::scenario::Scenario;
 use super::signs::{LONGEST, QUESTIONS, Signs};
 use super::wires::{Ended, Flying, message};
 
-/// Maximum number of frames that a relay sends in one turn of its main loop. These are a pass, `Busy`, a decision,
-/// two for a lease renewal, and a heartbeat and a hello on each side.
+/// Maximum number of frames that a relay sends in one turn of its main loop.
+///
+/// These are a pass (a message that travels along the chain), `Busy`, a decision, two for a lease renewal, and a
+/// heartbeat and a hello on each side.
 pub(crate) const MOST_FRAMES: u32 = 9;
 
 /// Model of one relay: its state as observed since it was switched on.
@@ -34,9 +36,9 @@ pub(crate) struct Ledger {
     longest: Duration,
     /// Membership view that the relay has accepted; 0 after each start.
     pub(crate) view: ViewId,
-    /// Number of the last pass of this view in which the relay took part.
+    /// Number of the last pass (round of messages along the chain) that the relay accepted in this view.
     pub(crate) pass: Option<u16>,
-    /// Numbers of the last passes in which the relay took part before its reboots.
+    /// Number of the last pass (round of messages along the chain) of the relay before each of its reboots.
     pub(crate) passes_before: Vec<u16>,
     /// Largest Upsilon = E[1/I] that the relay has measured, also before its reboots, 1/W.
     pub(crate) measured_per_w: Option<f64>,

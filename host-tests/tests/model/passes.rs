@@ -18,7 +18,10 @@ use super::wires::Pass;
 /// that travels along the chain. No other pass has a multiple of this number.
 const FIRST: u16 = 64;
 
-/// Number of passes before the last one that count as over. A restarted leader may also skip so many.
+/// Number of latest passes (rounds of messages along the chain) that are known to be over.
+///
+/// A pass with an older number counts as one from before a reboot. A leader's next pass may skip at most so many
+/// numbers.
 const NEAR: u16 = 32;
 
 /// Returns what a membership view adds to the digest in its passes. It is the lower half plus the byte-swapped upper
@@ -39,14 +42,18 @@ const fn next(last: u16) -> u16 {
 pub(crate) enum PassClass {
     Accepted,
     Again,
-    /// Classification: a late pass, which is over already.
+    /// Classification: a pass (a message along the chain) that arrives late and is over already.
     Late,
-    /// Classification: a pass of another view, from before the leader's reboot, or after a missed pass.
+    /// Classification: a pass (a message along the chain) that does not continue the known ones.
+    ///
+    /// It is of another membership view, from before the leader's reboot, or the relay has missed the pass before it.
     Foreign,
 }
 
 impl Ledger {
-    /// Checks that a relay's membership view never goes back. A new view begins without a pass.
+    /// Checks that a relay's membership view never goes back.
+    ///
+    /// In a new view, no pass (a round of messages along the chain) counts as received yet.
     pub(crate) fn check_view(&mut self, relay: &Relay) -> Checked {
         let view = relay.view();
         prop_assert!(view >= self.view, "{view:?} after {:?}", self.view);
@@ -57,9 +64,10 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks how a relay counts a received pass. Returns the pass's classification.
+    /// Checks how a relay counts a received pass, a message that travels along the chain. Returns its classification.
     ///
-    /// `stands`: the relay has a position. `suspended`: it may be in a view change.
+    /// `stands` is true if the relay has a position, `suspended` if its membership view may be changing. `before` and
+    /// `after` are the relay's statistics before and after the pass.
     pub(crate) fn check_received(
         &mut self,
         scenario: &Scenario,
@@ -107,7 +115,9 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay takes part in the first pass of its membership view again, after a reboot.
+    /// Returns true if the relay takes part in its view's first pass for the second time, after a reboot.
+    ///
+    /// A pass is a round of messages along the chain.
     pub(crate) fn repeats_first_pass(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))
@@ -131,7 +141,9 @@ impl Ledger {
         }
     }
 
-    /// Checks a pass that the relay sends. It must be the accepted one or, at the leader, a new one.
+    /// Checks a pass, a message that travels along the chain, that the relay sends.
+    ///
+    /// A leader may send a new pass; any other relay must send the pass that it accepted last.
     pub(crate) fn check_sent(&mut self, scenario: &Scenario, leads: bool, pass: Pass) -> Checked {
         let view = digest(&scenario.mission).wrapping_add(mark(self.view));
         prop_assert_eq!(pass.digest, view, "a pass of another view is said");

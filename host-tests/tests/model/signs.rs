@@ -3,14 +3,14 @@
 use uav_relay::wire::message::Message;
 use uav_relay::{Duration, Instant};
 
-/// Number of unanswered heartbeat requests before a neighbour is lost. `OPEN` is the number that may still be
-/// answered.
+/// Number of unanswered heartbeat requests before a neighbour may be reported as lost.
 pub(crate) const QUESTIONS: usize = 16;
+/// Number of heartbeat intervals after which a late reply no longer proves that the neighbour is alive.
 const OPEN: u32 = 4;
 
-/// Factor on the most requests ever open before a reply: after so many, a loss is certain. `LONGEST` is the factor on
-/// `dead_after`.
+/// Factor on the most requests that were ever unanswered before a reply. After more, the neighbour must be reported.
 const MARGIN: usize = 3;
+/// Factor on `dead_after`: the silence after which a neighbour must be reported as lost in any case.
 pub(crate) const LONGEST: u32 = 8;
 
 /// Model of what a relay knows about the life of a neighbour.
@@ -18,15 +18,17 @@ pub(crate) const LONGEST: u32 = 8;
 pub(crate) struct Signs {
     /// Number and time of every heartbeat request to the neighbour.
     pub(crate) asked: Vec<(u16, Instant)>,
-    /// Last time when the neighbour was certainly alive. `possibly_alive` is the last time when it may have been.
+    /// Last time at which the neighbour was certainly alive.
     pub(crate) certainly_alive: Instant,
+    /// Last time at which the neighbour may have been alive, by replies and messages that may be late.
     pub(crate) possibly_alive: Instant,
     /// Time at which the last possible sign of life was received.
     pub(crate) last: Instant,
-    /// Number of requests since the last certain sign of life. The next fields are the number since the last possible
-    /// sign, and the most before a certain one.
+    /// Number of heartbeat requests since the last certain sign of life.
     pub(crate) open: usize,
+    /// Number of heartbeat requests since the last possible sign of life.
     pub(crate) open_since_possible: usize,
+    /// Largest number of heartbeat requests that were ever unanswered at once, at least [`QUESTIONS`].
     pub(crate) most_open: usize,
     /// True while the relay reports the neighbour as lost.
     pub(crate) missed: bool,
@@ -55,8 +57,10 @@ impl Signs {
         }
     }
 
-    /// Records signs of life of the neighbour. A reply proves life at the time of its request; a pass or a lease
-    /// renewal may prove it on reception.
+    /// Records signs of life of the neighbour in a message from it.
+    ///
+    /// A heartbeat reply proves life at the time of its request. A lease renewal, or a pass (a round of messages
+    /// along the chain), is a possible sign of life on reception.
     pub(crate) fn on_received(&mut self, message: &Message, tick: Duration, now: Instant) {
         match message {
             Message::Heartbeat { reply: answer, .. } => {
@@ -88,8 +92,9 @@ impl Signs {
         }
     }
 
-    /// Returns true if the relay must report the neighbour as lost. The silence is `most` with enough unanswered
-    /// requests, or `longest`.
+    /// Returns true if the relay must report the neighbour as lost.
+    ///
+    /// The silence must be at least `most` with enough unanswered heartbeat requests, or at least `longest`.
     pub(crate) fn is_to_be_missed(&self, most: Duration, longest: Duration) -> bool {
         let Some((_, asked)) = self.asked.last() else {
             return false;

@@ -41,7 +41,7 @@ struct Line {
 pub(crate) struct Ended {
     /// Number of frames that arrived as they were sent.
     pub(crate) intact: u32,
-    /// Number of other frames that are not empty.
+    /// Number of frames that arrived changed or incomplete; empty ones do not count.
     pub(crate) broken: u32,
 }
 
@@ -57,9 +57,9 @@ pub(crate) struct Pass {
     pub(crate) number: u16,
     /// Digest of the mission, plus what the membership view adds to it.
     pub(crate) digest: u16,
-    /// True if Algorithm 2 moves relays by this pass.
+    /// True if Algorithm 2 moves relays by this pass (a message that travels along the chain).
     pub(crate) moves: bool,
-    /// True if the pass builds on data that earlier passes collected from the relays.
+    /// True if the relays need data for this pass that earlier messages along the chain have collected.
     pub(crate) follows: bool,
 }
 

@@ -35,8 +35,9 @@ fn count(case: &Case, name: &str) -> u32 {
     case.args[name].as_u64().unwrap().try_into().unwrap()
 }
 
-/// Compares the single interferer fitted to several ones with values of a separate program. That program integrates
-/// errors by the midpoint rule on nx x nh cells.
+/// Checks the single interferer that is fitted to several ones against values of a separate program.
+///
+/// That program integrates the error of the fit by the midpoint rule on nx x nh cells.
 #[test]
 fn the_fit_agrees_with_the_reference_program() {
     let cases = cases::of("hyp_msi").unwrap();

@@ -60,8 +60,9 @@ fn for_one_source_the_optimum_is_that_of_the_reference() {
     assert!(worst < 1e-9, "{worst}");
 }
 
-/// Compares the optimum of one to four relays with brute force. In a third of the scenes the relays have different
-/// powers; half of the scenes have a least separation.
+/// Checks that the optimum of one to four relays is that of a brute-force search.
+///
+/// In a third of the scenes the relays have different powers; half of the scenes have a least separation.
 #[test]
 fn brute_force_finds_the_same() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(77));
@@ -119,8 +120,9 @@ fn a_scene_without_an_optimum_has_none() {
     assert!(held(false) && !held(true));
 }
 
-/// Checks chains of as many relays as the separation permits, of one more, and of a thousand. The thousand relays
-/// have different powers.
+/// Checks that a chain of as many relays as the separation permits is placed, and one of a thousand.
+///
+/// The thousand relays have different powers. One relay too many must be refused.
 #[test]
 fn crowded_and_long_chains_are_placed() {
     let crowd = |n, apart| Scene {

@@ -8,10 +8,12 @@ use uav_relay_scenario::hypothetical::{Raster, fit};
 use super::above;
 use super::scenes::scene;
 
-/// Number of random positions of a fitted interferer in each scene.
+/// Number of positions that are drawn for a single interferer in place of several, in each scene.
 const DRAWN: usize = 20_000;
 
-/// Number of best random positions by a coarse raster that are compared on the raster of the fit.
+/// Number of best drawn positions of the interferer whose error is computed again on the fine raster.
+///
+/// A coarse raster has selected them.
 const WEIGHED: usize = 100;
 
 #[test]

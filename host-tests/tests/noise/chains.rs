@@ -10,7 +10,7 @@ use uav_relay_oracle::reference::Link;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Draws a link with receiver noise, or in one of ten cases without. Numbers are rounded to f32.
+/// Draws a link, in nine of ten cases with receiver noise. Numbers are rounded to f32.
 fn drawn(rng: &mut impl Rng, style: &Style) -> Link {
     let link = random::link(rng, style);
     as_relays_know_it(&if rng.random_bool(0.1) {
@@ -34,8 +34,7 @@ fn hop_sinrs_agree_with_the_reference() {
     hop_sirs_agree(&mut generator(1101), |rng| drawn(rng, &Style::ANY));
 }
 
-/// Compares chains of 1 to 50 identical relays in noise with the optimum. They are within 1e-4 of it, and never
-/// above.
+/// Checks that 1 to 50 identical relays in noise are within 1e-4 of the optimum, and not above.
 #[test]
 fn the_optimum_is_found_in_noise() {
     let mut rng = generator(1102);

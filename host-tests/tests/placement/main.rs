@@ -29,8 +29,10 @@ fn hop_sirs_agree_with_the_reference() {
     });
 }
 
-/// Compares the reach of a hop, the farthest position that meets a target SIR, with the reference. A third of the
-/// targets are near the hop's gain, where the printed formulas lose their digits.
+/// Checks the farthest position at which a hop meets a target SIR against the reference.
+///
+/// A third of the targets are near the SIR of a hop whose sender and interferer are equally far away. There the
+/// printed formulas lose their digits.
 #[test]
 fn reaches_agree_with_the_reference() {
     let seen = reaches_agree(&mut generator(12), 20_000, false, |rng, of| {
@@ -83,8 +85,9 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
     assert!(met > 5_000, "{met}");
 }
 
-/// Compares chains of 1 to 50 relays with the optimum, identical or with their own powers. D is 10 m to 100 km, and
-/// the interferer is anywhere.
+/// Checks that chains of 1 to 50 relays, identical or with their own powers, reach the optimum.
+///
+/// D is 10 m to 100 km, and the interferer is anywhere.
 #[test]
 fn the_optimum_is_found_on_random_links() {
     let own_power = Style {
@@ -132,8 +135,9 @@ fn chains_of_different_relays_meet_the_agreed_target() {
     );
 }
 
-/// Checks a chain that can meet an SIR of 37 743 but not one of 31 292. A search must not oscillate between them for
-/// ever.
+/// Checks the search for the target SIR if a higher target can be met and a lower one cannot.
+///
+/// The chain can meet an SIR of 37 743 but not one of 31 292. The search must end, at the higher one.
 #[test]
 fn a_feasible_target_counts_above_an_infeasible_one() {
     let mut rng = ChaCha8Rng::seed_from_u64(124);

@@ -12,7 +12,9 @@ fn sweep_in(bytes: &[u8]) -> Sweep {
     }
 }
 
-/// Returns the last relay after it received a sweep message twice. The second copy has its number raised by `off`.
+/// Returns the last relay after it received a sweep message, and then a copy with a larger number.
+///
+/// `off` is added to the number of the copy.
 fn after_two(sweep: &[u8], now: Instant, off: u16) -> Relay {
     let mut tail = relay(mission(2), 2);
     tail.handle_bytes(now, Port::Upstream, sweep);
@@ -95,8 +97,9 @@ fn the_first_pass_after_a_reboot_is_never_the_next_one() {
     }
 }
 
-/// Checks that a rebooted relay takes no part in a later pass. Before, it has received a delayed copy of the first
-/// pass.
+/// Checks that a rebooted relay takes no part in a later pass, a round of messages along the chain.
+///
+/// After its reboot, it has received a delayed copy of the first pass.
 #[test]
 fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(3), 1));
@@ -109,8 +112,9 @@ fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
     assert_eq!(rebooted.setpoint(), None);
 }
 
-/// Checks that a pass with the same number and other content counts as another pass. A relay before this one that
-/// rebooted sends such a pass.
+/// Checks that a sweep message with the same number but other content counts as another one.
+///
+/// A relay before this one that rebooted sends such a message.
 #[test]
 fn the_same_number_with_other_content_is_another_pass() {
     let changes: [fn(&mut Sweep); 4] = [

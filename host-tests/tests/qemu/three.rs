@@ -19,9 +19,9 @@ struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of times that MAVSDK's pilot has reacted to refused setpoint control. `chooses` is true while OFFBOARD
-    /// is due again.
+    /// Number of refusals of setpoint control in the first drone's log to which its pilot has reacted.
     found: usize,
+    /// True while the pilot has chosen another mode because of a refusal, and is to choose OFFBOARD again.
     chooses: bool,
 }
 

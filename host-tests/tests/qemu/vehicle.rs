@@ -26,12 +26,14 @@ const FASTEST_M_S: f32 = 8.0;
 /// Time for which the pilot chooses another mode, ms: that of six heartbeats.
 const ELSEWHERE: u64 = 1_500;
 
-/// Message id of the heartbeat. `PERIODS` has the intervals of all messages in ms; heartbeats are frequent because
-/// this process may be delayed.
+/// Id of the MAVLink message HEARTBEAT.
 const HEARTBEAT: u32 = 0;
 const POSITION: u32 = 33;
 const TARGET: u32 = 87;
 const SYS_STATE: u32 = 245;
+/// Ids of the messages that the vehicle sends, and their intervals, ms.
+///
+/// Heartbeats are frequent because this process may be delayed.
 const PERIODS: [(u32, u64); 4] = [
     (HEARTBEAT, 250),
     (POSITION, 200),
@@ -60,7 +62,9 @@ pub(crate) struct Vehicle {
     goal: Option<(Placement, Geodetic)>,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
-    /// True if the pilot chooses OFFBOARD or GUIDED, and again when asked; false in manual flight.
+    /// True if the pilot chooses OFFBOARD or GUIDED; false if it flies the drone manually.
+    ///
+    /// The pilot also chooses another mode for a while, and then this one again, if the companion asks for that.
     pub(crate) granted: bool,
     /// Time until which the pilot chooses another mode than OFFBOARD or GUIDED, ms.
     elsewhere_until: u64,

@@ -143,7 +143,9 @@ fn any_measured_power_and_position_in_any_mission() {
     });
 }
 
-/// Checks chains that measure one power everywhere, even one whose square overflows or underflows f32.
+/// Checks that relays that measure one power everywhere agree, for powers from 1e-30 W to 1e6 W.
+///
+/// The square of such a power may overflow or underflow an f32.
 #[test]
 fn one_power_everywhere_over_the_accepted_range() {
     let decades: Vec<i32> = (-300..=60).collect();

@@ -94,8 +94,10 @@ fn degenerate_reaches_are_right() {
     assert_eq!(base.chain_sir(&[1.0]), 0.0);
 }
 
-/// Checks a chain in which relay 1 must not go as far as possible. There it would be too close to the interferer for
-/// relay 2's altitude.
+/// Checks that the reference finds a chain in which relay 1 must not go as far along as it could.
+///
+/// At its farthest position, relay 2's altitude would be too near to the interferer. The chain with all relays as far
+/// along as possible has less than a fifth of the best SIR.
 #[test]
 fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
     let link = Link {
@@ -121,7 +123,9 @@ fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
     assert!(link.chain_sir(&link.placement(best).unwrap()) >= best * (1.0 - 1e-14));
 }
 
-/// Checks the paper's fixed-step search with an interferer behind Tx. It must start at a higher target SIR there.
+/// Checks that the paper's fixed-step search starts at a high enough target SIR.
+///
+/// With an interferer behind Tx, the first hop's SIR is not highest with the relay above Tx, but farther along.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Relay {

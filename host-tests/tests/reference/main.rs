@@ -112,8 +112,9 @@ fn single_hops_match_the_file() {
     }
 }
 
-/// Checks that air-ground hops use eta and hops between drones `mu_los`, by SIRs worked out by hand. Both are equal
-/// in the file.
+/// Checks that hops between air and ground use eta and hops between drones `mu_los`.
+///
+/// The SIRs are worked out by hand, because the two factors are equal in all cases of the file.
 #[test]
 fn each_hop_uses_its_own_path_loss() {
     let relays = [(30.0, 4.0), (15.0, 7.0)].map(|(altitude_m, power_w)| Relay {

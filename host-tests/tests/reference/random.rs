@@ -19,7 +19,7 @@ fn for_links(
     }
 }
 
-/// Compares the reach of a hop with a scan for the last position that meets the target SIR.
+/// Checks the farthest position that meets a target SIR against a scan of many positions.
 #[test]
 fn reaches_agree_with_a_scan() {
     let (mut hills, mut blocked, mut inside) = (0, 0, 0);
@@ -82,10 +82,11 @@ fn reaches_agree_with_a_scan() {
     assert!(inside > 500 && hills > 100 && blocked > 100);
 }
 
-/// Compares the optimum with brute force, with and without a least separation.
+/// Checks that the optimum of one and two relays is that of brute force.
 ///
-/// At different altitudes the optimum needs sets of reachable positions: the chain in which each relay goes as far as
-/// possible is sometimes worse.
+/// The cases are with and without a least separation. At different altitudes, the optimum may not be the chain in
+/// which each relay goes as far along as possible, so that the reference follows all possible positions of each
+/// relay.
 #[test]
 fn one_and_two_relays_agree_with_brute_force() {
     for (seed, count, n, chain, points, apart) in [

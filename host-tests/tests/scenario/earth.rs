@@ -26,8 +26,9 @@ fn place(lines: &str) -> (f64, f64) {
     }
 }
 
-/// Compares the position of an interferer on earth with a library of geodesics. The tolerance is one unit of the
-/// coordinates, 1.1 cm.
+/// Checks the position of an interferer given by coordinates against a library of geodesics.
+///
+/// The tolerance is one unit of the coordinates, 1.1 cm.
 #[test]
 fn an_interferer_by_coordinates_agrees_with_geodesics() {
     let earth = Geodesic::wgs84();
@@ -104,8 +105,10 @@ fn coordinates_off_the_line_are_refused() {
     refused(&nowhere, Problem::NoSite, &parts);
 }
 
-/// Checks that an interferer on a tower is refused if the tower changes the interference by over 1 dB. The change is
-/// (d^2 + h^2) / (d^2 + (h - t)^2), for a tower of height t.
+/// Checks that an interferer on a tower is refused if the tower changes the interference by over 1 dB.
+///
+/// The interferer is the horizontal distance d from the line, the relays' altitude is h, the tower's height t: the
+/// change is (d^2 + h^2) / (d^2 + (h - t)^2).
 #[test]
 fn an_interferer_on_a_tower_is_refused_if_its_height_matters() {
     let azimuth = "lat_deg = 47.404\nlon_deg = 8.548";

@@ -120,8 +120,9 @@ fn milliwatts(dbm: f64) -> f64 {
     10_f64.powf(dbm / 10.0)
 }
 
-/// Compares the crate's SINRs with a link budget. They are equal, or lower if the receiving antennas have different
-/// gains.
+/// Checks the crate's SINRs against a link budget.
+///
+/// They are equal if all receiving antennas have the same gain, and otherwise not higher.
 #[test]
 fn the_chain_has_the_sinrs_of_a_link_budget() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);

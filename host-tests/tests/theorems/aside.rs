@@ -15,15 +15,20 @@ use super::ALLOWED;
 use super::lateral_scene::LateralScene;
 use super::scene::Scene;
 
-/// Result of a scene: the theorem's case, its SIR against brute force, and the error of its stated SIR.
+/// Result of the solution for one scene, compared with brute force.
 struct SceneResult {
+    /// Name of the theorem's case by which the solution was found.
     case: String,
+    /// Fraction by which the solution's SIR falls short of the best one that brute force finds.
     short: f64,
+    /// Relative error of the SIR that the solution states.
     told: f64,
 }
 
-/// Checks that results of `best` are as good as brute force in random scenes, and counts their cases. `band` gives
-/// the altitudes that brute force searches.
+/// Checks in random scenes that the solutions of `best` are as good as brute force.
+///
+/// Returns how often each case of the solution occurred. `band` gives the range of altitudes, m, that brute force
+/// searches.
 fn no_worse_than_brute_force(
     seed: u64,
     draw: impl Fn(&mut ChaCha8Rng) -> LateralScene + Sync,
@@ -92,7 +97,9 @@ const CASES: [&str; 8] = [
 
 type Draw = fn(&mut ChaCha8Rng) -> LateralScene;
 
-/// Checks a relay at a given altitude with lateral offsets. All cases must occur but those of `absent`.
+/// Checks that the best position of a relay at a given altitude, with lateral offsets, is found.
+///
+/// It is compared with brute force in random scenes. Every case of the solution must occur, except those of `absent`.
 fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -105,7 +112,9 @@ fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
     }
 }
 
-/// Checks a relay with lateral offsets at any altitude, and that all cases of `cases` occur.
+/// Checks that the best position of a relay at any altitude, with lateral offsets, is found.
+///
+/// It is compared with brute force in random scenes. The cases of the solution in `cases` must occur.
 fn anywhere(seed: u64, draw: Draw, cases: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,

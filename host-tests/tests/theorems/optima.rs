@@ -8,8 +8,10 @@ use uav_relay_oracle::random::{self, count, log_uniform};
 use super::ALLOWED;
 use super::scene::Scene;
 
-/// Checks that results of `best` are as good as brute force in random scenes, and counts their cases. `over` gives
-/// the ranges of x and altitude to search.
+/// Checks in random scenes that the solutions of `best` are as good as brute force.
+///
+/// Returns how often each case of the solution occurred. `over` gives the ranges of x and altitude, m, that brute
+/// force searches.
 fn no_worse_than_brute_force(
     seed: u64,
     draw: impl Fn(&mut ChaCha8Rng) -> Scene,
@@ -94,7 +96,9 @@ fn theorem_2(seed: u64, draw: Draw) -> Cases {
     )
 }
 
-/// Checks Theorem 3 in random scenes, and that the cases of `edges` occur.
+/// Checks that Theorem 3 gives the best position of a relay, by brute force in random scenes.
+///
+/// The theorem's cases in `edges` must occur.
 fn theorem_3(seed: u64, draw: Draw, edges: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,

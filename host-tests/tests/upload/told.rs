@@ -309,7 +309,9 @@ fn a_refusal_reaches_the_ground_despite_losses() {
     });
 }
 
-/// Checks two ground stations at once. All relays fly the newer upload, and the other station learns of it.
+/// Checks that of two uploads by two ground stations, all relays fly the newer one.
+///
+/// The other station must learn of it.
 #[test]
 fn the_newer_upload_of_two_stations_is_flown() {
     let settled: Vec<u64> = (0..count())

@@ -43,11 +43,12 @@ pub(crate) enum ScheduledEvent {
     Off(usize),
     /// Event: an operator informs the relay that the other drone with its index is gone.
     Clear(usize),
-    /// Event: the link from `from` to `to` is cut (`Mend`: mended). Overlapping cuts are counted.
+    /// Event: the link from `from` to `to` is cut. Several cuts of one link add up.
     Cut {
         from: usize,
         to: usize,
     },
+    /// Event: one cut of the link from `from` to `to` ends. The link works again if no other cut is left.
     Mend {
         from: usize,
         to: usize,
@@ -120,25 +121,31 @@ pub(crate) struct Air {
     loss: f64,
     rng: ChaCha8Rng,
     seen: Vec<ObservedState>,
-    /// Largest number of groups that flew different agreements at once. The next field is the time of that, µs.
+    /// Largest number of groups of relays that flew different agreements at once.
     pub(crate) groups: usize,
+    /// Time at which the largest number of groups flew different agreements, µs.
     pub(crate) groups_us: u64,
     /// Time since which all relays have held positions in one view, µs; `None` while they do not.
     pub(crate) whole_since_us: Option<u64>,
-    /// Number of relays that need not fly the common agreement. The next fields are the time flown by the others, the
-    /// first such time, and the longest interruption, µs.
+    /// Number of relays that may be missing from an agreement that counts as flown.
     pub(crate) spare: usize,
+    /// Total time in which the relays, except for at most `spare`, have flown one agreement, µs.
     pub(crate) flown_us: u64,
+    /// Time at which the relays, except for at most `spare`, first flew one agreement, µs.
     pub(crate) first_us: Option<u64>,
+    /// Longest interruption of the time in which the relays fly one agreement, µs.
     pub(crate) longest_us: u64,
     flies: bool,
     changed_us: u64,
     /// Number of frames sent by all relays.
     pub(crate) frames: u64,
-    /// Last receptions between a relay and its copy, µs. The next fields are the time since which both have had
-    /// setpoints, and the longest such time.
+    /// Last times at which the copied relay received its copy, and the copy received the relay, µs.
     received_us: [Option<u64>; 2],
+    /// Time since which a relay and its copy have both had setpoints, µs.
+    ///
+    /// `None` while one of them has none, or while they do not receive each other.
     both_us: Option<u64>,
+    /// Longest time in which a relay and its copy had setpoints although they received each other, µs.
     pub(crate) longest_both_us: u64,
     pub(crate) events: BTreeMap<(usize, String), u32>,
     pub(crate) story: bool,

@@ -109,8 +109,10 @@ fn a_left_out_relay_attracts_no_other() {
     assert!(share > 0.98, "{share}");
 }
 
-/// Random seeds of links that stay up a little longer than the longest hold-down. One end of such a link is released
-/// before the other, and the link is lost again soon.
+/// Random seeds of links that stay up a little longer than the longest hold-down of 90 s.
+///
+/// A relay does not use a link that fails often for the time of the hold-down. Here one end of the link uses it again
+/// before the other does, and soon after that the link is lost again.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
 /// Checks that one flapping link costs at most a tenth of the flight time, for periods of 5 s to 300 s.

@@ -130,10 +130,10 @@ fn every_schedule_ends_in_one_whole_chain_within_120_s() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks a relay and its copy: one of them loses its setpoint within 2 s. The chain is whole once one of them is
-/// removed.
+/// Checks that of a relay and its copy, one loses its setpoint within 2 s.
 ///
-/// Two chains can fly only where a copy is on either side of a cut, because each copy has its vote.
+/// The copy is a second drone with the same index. The chain must be whole once one of them is removed. Two chains
+/// may fly at once only if a cut separates relay and copy, because each of them has its vote.
 #[test]
 fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
@@ -161,10 +161,10 @@ fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
-/// Checks schedules from which a chain recovers only with difficulty.
+/// Checks that a chain becomes whole again after schedules of faults that are hard to recover from.
 ///
-/// Their causes are view numbers far ahead, an idle neighbour that is switched on elsewhere, two interleaved chains,
-/// and two candidates for one position that are received in turn.
+/// The difficulties are view numbers far ahead, an idle neighbour that is switched on elsewhere, two interleaved
+/// chains, and two candidates for one position that are received in turn.
 #[test]
 fn schedules_that_once_got_stuck_end_in_one_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
@@ -294,8 +294,10 @@ fn clocks_that_step_back_leave_one_whole_chain() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks clocks that step forward. A step ends the wait for others' leases early, so that two chains may fly until
-/// these expire.
+/// Checks that clocks that step forward seldom let two chains fly at once.
+///
+/// A relay whose clock steps forward stops waiting for the leases of others too early. Two chains may then fly until
+/// these leases expire.
 #[test]
 fn clocks_that_step_forward_seldom_split_the_chain() {
     let (count, late, two) = with_steps(true);

@@ -13,8 +13,9 @@ use super::offer::{KEPT, kept, mission_id, upload};
 use super::signed::{NOW, SignedBench, settings};
 use super::votes::*;
 
-/// Returns relay 4, which has adopted an upload of version 2 in membership view 1 of all eight relays. The upload
-/// comes with it.
+/// Returns relay 4, which has adopted an upload of mission version 2, and the upload.
+///
+/// It adopted the upload in membership view 1 of all eight relays.
 fn adopted() -> (SignedBench, WireMessage) {
     let mut met = SignedBench::fourth();
     let newer = upload(2, met.base);
@@ -137,10 +138,10 @@ fn a_stored_mission_is_flown_after_a_reboot() {
     }
 }
 
-/// Checks the numbers by which a mission offer answers a hello.
+/// Checks which mission offers count as answers to a hello: the others are stale.
 ///
-/// A number changes `dead_after` after its first use. An offer must have one of the last two, sent at most twice
-/// `dead_after` ago; a relay's offer repeats the number that it received.
+/// A relay's hello has a number, which changes `dead_after` after its first use. An offer must repeat one of the last
+/// two numbers, which was sent at most twice `dead_after` ago.
 #[test]
 fn an_offer_that_answers_no_recent_hello_is_stale() {
     let met = SignedBench::fourth();

@@ -103,12 +103,15 @@ struct Step {
     message: WireMessage,
     right_side: bool,
     right_mission: bool,
-    /// Offset of the message's pass number from that of the next pass. An answer's is counted from the last pass.
+    /// Offset of the message's pass number from the expected one.
+    ///
+    /// A pass is a round of messages along the chain. The expected number is that of the next pass, or for an answer
+    /// that of the last one.
     off: i16,
     tame: bool,
     /// Time until the next step, ms.
     wait_ms: u64,
-    /// True if a pass in this step is followed by a neighbour's answer to it.
+    /// True if a neighbour's answer follows a message that travels along the chain.
     answered: bool,
 }
 
@@ -144,16 +147,20 @@ struct Flight {
     /// Messages of the test, one of each tag, in the order of the tags.
     kinds: Vec<WireMessage>,
     ports: (Port, Port),
-    /// True once the relay may have accepted a pass. The next fields are the number of the pass sent, and of the last
-    /// one accepted.
+    /// True once the relay may have accepted a pass, a message that travels along the chain.
     begun: bool,
+    /// Number of the last pass (message that travels along the chain) that was sent to the relay.
     pass: u16,
+    /// Number of the last pass (message that travels along the chain) that the relay may have accepted.
     last: u16,
     view: ViewId,
 }
 
 impl Flight {
-    /// Returns the messages of a step with the ports at which they arrive. A pass may be followed by its answer.
+    /// Returns the messages of a step with the ports at which they arrive.
+    ///
+    /// These are the step's message and, if it starts a round along the chain, perhaps the next neighbour's answer to
+    /// it.
     fn messages(&mut self, step: &Step) -> Vec<(Port, WireMessage)> {
         let (from, to) = self.ports;
         let tag = step.message.tag();

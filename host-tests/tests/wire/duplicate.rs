@@ -24,8 +24,9 @@ fn receive(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, WireMessag
     bench.sent_with_claims()
 }
 
-/// Returns relay 4 of 8, a sweep message in its name, and the number of its index claim. The relay answered that
-/// message by a claim, as another node may have its index.
+/// Returns relay 4 of 8 after it answered a sweep message in its own name by an index claim.
+///
+/// It claims its index because another node may have it. Also returns that sweep message and the number of the claim.
 fn relay_4(wiring: Wiring, port: Port) -> (Bench, WireMessage, u32) {
     let mut bench = Bench::new(4, 8, wiring);
     bench.now = NOW;

@@ -173,8 +173,9 @@ fn a_possibly_decided_view_is_proposed_again() {
     }
 }
 
-/// Checks a leader whose proposal ends in a decision for an earlier membership view. It continues with its next
-/// proposal.
+/// Checks that a leader continues if its proposal ends in a decision for an earlier membership view.
+///
+/// It must send its next proposal.
 #[test]
 fn a_leader_continues_after_an_earlier_view_is_decided() {
     let mut head = Bench::new(1, 8, Wiring::Pair);

@@ -12,8 +12,9 @@ use super::votes::FORMS;
 const UP: Port = Port::Upstream;
 const DOWN: Port = Port::Downstream;
 
-/// Checks that the result of a profile collection is stale if it is not awaited. In a field of interference,
-/// collections and joint positions are stale, too.
+/// Checks that the result of a collection of relays' profiles is stale if the relay does not await it.
+///
+/// In a field of interference, messages that collect profiles and joint positions are stale, too.
 #[test]
 fn profiles_that_are_not_awaited_are_stale() {
     let field = Interference::Field(FIELD);
@@ -54,7 +55,7 @@ fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Wi
     WireMessage::new(name, &fields)
 }
 
-/// Returns a message that collects relays' profiles, or its result, with the profile of one more relay.
+/// Returns a collection of relays' profiles, or its result, with the profile of one more relay.
 fn with_profile(
     message: &WireMessage,
     name: &str,
@@ -91,8 +92,9 @@ fn a_collection_is_forwarded_and_its_result_returned() {
     }
 }
 
-/// Checks that a relay forwards a full collection of profiles unchanged. The next collection must continue behind the
-/// last relay in it.
+/// Checks that a relay forwards a full collection of relays' profiles unchanged.
+///
+/// The next collection must begin with the relays after the last one in it.
 #[test]
 fn a_full_roster_is_continued_by_the_next_pass() {
     let config = MissionConfig {
@@ -144,8 +146,9 @@ fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
     }
 }
 
-/// Checks that a collection of profiles with that of the receiver or of a later relay is stale. Earlier relays never
-/// report these.
+/// Checks that a collection of relays' profiles is stale if it has the receiver's or a later one's.
+///
+/// The relays that the message has passed cannot have added these.
 #[test]
 fn a_collection_with_its_receivers_profile_is_stale() {
     for index in [4, 5] {
@@ -156,8 +159,10 @@ fn a_collection_with_its_receivers_profile_is_stale() {
     }
 }
 
-/// Checks that a wrong result of a profile collection is stale and changes nothing. Its pass or relays are other
-/// ones, profiles are missing or beyond the chain, or it arrives twice.
+/// Checks that a relay treats a wrong result of a collection of profiles as stale, and changes nothing.
+///
+/// The result has another number or begins behind another relay, lacks profiles, has some of relays beyond the chain,
+/// or arrives twice.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let mut bench = fourth(false);

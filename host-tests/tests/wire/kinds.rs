@@ -22,8 +22,9 @@ pub(crate) const WEAK: Field = Field::new(&[at(0.0, 1e32)]);
 /// Field of interference from the weakest to the strongest that the format permits.
 pub(crate) const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
-/// Number of a leader's first pass in the tests. `SECOND` is the number of the next pass.
+/// Number of a leader's first pass (a round of messages along the chain) in the tests.
 pub(crate) const FIRST: u16 = 64;
+/// Number of a leader's second pass (a round of messages along the chain) in the tests.
 pub(crate) const SECOND: u16 = 65;
 
 /// Returns the paper's scenario with the given interference. Altitudes are 20 m to 300 m, lateral offsets -60 m to 40
@@ -48,7 +49,9 @@ pub(crate) fn source() -> MissionConfig {
     mission(paper(8).interference)
 }
 
-/// Returns one message of each tag, in the order of the tags. Passes have the number `number`; digests are `mission`.
+/// Returns one message of each tag, in the order of the tags.
+///
+/// Messages that travel along the chain have the number `number`; the digests are `mission`.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
     let pass = json!({ "number": number, "view_digest": mission });
     let of = |name: &str, more: serde_json::Value| {
@@ -131,14 +134,14 @@ pub(crate) fn claim(number: u32, other: u32, flags: u8) -> WireMessage {
     WireMessage::new("Claim", &fields)
 }
 
-/// Returns relay 4 of 8, the port at which it receives passes, and the port to which it forwards them.
+/// Returns relay 4 of 8, and two ports for messages along the chain: to receive and to forward them.
 pub(crate) fn relay_4(config: MissionConfig) -> (Bench, Port, Port) {
     let bench = Bench::of(config, 4, Wiring::Pair);
     let (from, to) = ways(config.interference);
     (bench, from, to)
 }
 
-/// Returns the port at which a relay receives passes, and the port to which it forwards them.
+/// Returns the ports at which a relay receives messages along the chain, and to which it forwards them.
 pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     match interference {
         Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),
@@ -146,7 +149,7 @@ pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     }
 }
 
-/// Gives the relay a position: delivers the pass `number` and its result.
+/// Gives the relay a position: delivers the sweep message `number`, and then its result.
 pub(crate) fn place(bench: &mut Bench, (from, to): (Port, Port), number: u16) {
     let kinds = one_of_each(number, bench.mission);
     bench.receive(from, &kinds[0]);

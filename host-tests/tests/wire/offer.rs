@@ -15,13 +15,16 @@ pub(crate) const SITES: [&str; 6] = [
     "rx_amsl_mm",
 ];
 
-/// Offset of the number of relays in an offer's body. The next constants are those of noise and sites.
+/// Offset of the number of relays in an offer's body, bytes.
 const RELAYS: usize = 5;
+/// Offset of the noise power in an offer's body, bytes.
 const NOISE: usize = 83;
+/// Offset of the sites of Tx and Rx in an offer's body, bytes.
 const SITES_AT: usize = 87;
 
-/// Length of an offer's body. `KEPT` is the part that a relay stores: all but the number of the answered hello.
+/// Length of an offer's body, bytes.
 pub(crate) const BYTES: usize = 113;
+/// Length of the part of an offer's body that a relay stores: all but the number of the answered hello.
 pub(crate) const KEPT: usize = 111;
 
 /// Returns an offer of mission `version` that eight relays loaded with `base` can fly.
@@ -49,8 +52,10 @@ pub(crate) fn kept(offer: &WireMessage) -> Vec<u8> {
     offer.body()[..KEPT].to_vec()
 }
 
-/// Returns the digest and version of an offered mission. The digest is from a CRC-32C of the mission, and then of
-/// that with the sites, if any.
+/// Returns the digest and version of an offered mission.
+///
+/// The digest is the low half of a CRC-32C of the mission's numbers. If the offer has sites, the digest also covers
+/// these.
 pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
     // Zero noise is left out.
     let end = if offer.number("noise_w") > 0.0 {

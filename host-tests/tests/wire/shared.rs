@@ -57,7 +57,9 @@ fn on_a_channel_the_four_nearest_of_each_side_are_received() {
     }
 }
 
-/// Checks a neighbour that reports no neighbour of its own. Messages to it wait until it chooses this relay again.
+/// Checks that a relay sends nothing to a neighbour that reports no neighbour of its own.
+///
+/// Once the neighbour chooses this relay again, and knows a newer view, the relay requests a view.
 #[test]
 fn a_returning_neighbours_newer_view_causes_a_request() {
     for (newest, calls) in [(0, false), (id(5, 1), true)] {
@@ -74,8 +76,9 @@ fn a_returning_neighbours_newer_view_causes_a_request() {
     }
 }
 
-/// Checks that a relay holds a received pass back while its next neighbour has chosen another node. It forwards the
-/// pass afterwards.
+/// Checks that a relay holds a sweep message back while its next neighbour has chosen another node.
+///
+/// It forwards the message once the neighbour has chosen this relay.
 #[test]
 fn a_pass_waits_for_a_neighbour_busy_with_another() {
     let (mut bench, sweep) = sixth();

@@ -11,8 +11,9 @@ use super::votes::*;
 const UP: Port = Port::Upstream;
 const DOWN: Port = Port::Downstream;
 
-/// Returns relay 4, idle, after it accepted membership view `view` of all eight relays. The digest of the view's
-/// passes comes with it.
+/// Returns relay 4, idle, after it accepted membership view `view` of all eight relays.
+///
+/// Also returns the digest that messages along the chain have in this view.
 fn in_view(view: u32) -> (Bench, u16) {
     let mut bench = Bench::new(4, 8, Wiring::Pair);
     let of = (bench.mission, 0);
@@ -24,8 +25,9 @@ fn in_view(view: u32) -> (Bench, u16) {
     (bench, own)
 }
 
-/// Returns relay 4 in membership view `view`, idle after an agreement on positions. It started 5 ms before. The
-/// digest of the view's passes comes with it.
+/// Returns relay 4 in membership view `view`, idle after an agreement on positions.
+///
+/// Also returns the digest that messages along the chain have in this view.
 fn agreed_in_view(view: u32) -> (Bench, u16) {
     let (mut bench, own) = in_view(view);
     let at = Instant::from_millis(5);
@@ -41,8 +43,9 @@ fn agreed_in_view(view: u32) -> (Bench, u16) {
     (bench, own)
 }
 
-/// Checks that a relay takes passes and lease renewals with the digest of its membership view. It answers those with
-/// another digest by a hello.
+/// Checks that a relay accepts messages along the chain and lease renewals only with its view's digest.
+///
+/// It answers those with another digest by a hello.
 #[test]
 fn passes_have_the_digest_of_their_view() {
     for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {
@@ -88,8 +91,9 @@ fn passes_have_the_digest_of_their_view() {
     }
 }
 
-/// Checks that a relay requests a new membership view when it receives a pass of another view. Both views are of the
-/// same mission.
+/// Checks that a relay requests a new membership view when it receives a sweep message of another view.
+///
+/// Both views are of the same mission.
 #[test]
 fn a_pass_of_another_view_causes_a_view_request() {
     let (mut bench, own) = in_view(id(2, 1));
@@ -175,8 +179,10 @@ fn a_view_request_is_forwarded_unless_its_view_is_older() {
     }
 }
 
-/// Checks that an accepted membership view counts as agreed only after a pass or lease renewal in it. All members
-/// have accepted it then.
+/// Checks that an accepted membership view counts as agreed only after a first message in it.
+///
+/// The message is a sweep along the chain or a lease renewal, which is sent only once all members have accepted the
+/// view.
 #[test]
 fn a_view_counts_after_its_first_pass_or_renewal() {
     let view = id(3, 2);

@@ -58,8 +58,9 @@ fn table(results: &Value) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Returns the SIR and the positions [x, y, altitude] of the best chain of eight relays at 20 m. They are of an
-/// independent program.
+/// Returns the SIR and the positions [x, y, altitude] of the best chain of eight relays at 20 m.
+///
+/// An independent program has computed them.
 fn best_of_eight() -> (f64, Vec<[f64; 3]>) {
     let cases = cases::of("gamma_star").unwrap();
     let found = cases.iter().find(|case| {

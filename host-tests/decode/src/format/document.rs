@@ -50,7 +50,7 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
     })
 }
 
-/// Replaces a row such as `as bytes 1 to 18 of a Sweep` by these rows of the other message.
+/// Replaces each row such as `as bytes 1 to 18 of a Sweep` by the message rows that it stands for.
 fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in rows {

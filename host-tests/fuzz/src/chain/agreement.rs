@@ -9,8 +9,10 @@ use super::{Chain, Member};
 const PATIENCE: usize = 40_000;
 
 impl Chain {
-    /// Runs the chain without faults until all relays agree in one view. Panics if they never do, unless the leader
-    /// finds that no target SIR can be met. A chain with a fixed-step schedule is not run, because it takes too long.
+    /// Runs the chain without faults until all relays agree in one view (membership of the chain).
+    ///
+    /// Panics if they never do, unless the leader finds that no target SIR can be met. A chain that lowers the target
+    /// in fixed steps is not run, because it takes too long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {

@@ -19,8 +19,10 @@ use crate::input::Input;
 
 const MAX_OPERATIONS: usize = 256;
 
-/// Maximum number of frames that the link may have to send at once. They are twice a heartbeat, three requests, an
-/// answer, a target, three lines, four numbers.
+/// Maximum number of frames that the link may have to send at once: twice the 13 kinds.
+///
+/// These are a heartbeat, three message requests, a command answer, a flight target, three status texts and four
+/// named values.
 const MAX_FRAMES: usize = 26;
 
 /// Maximum distance of a flight target from the line, m: 5 km, and the error of a flat earth there.

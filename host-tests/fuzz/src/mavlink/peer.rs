@@ -14,14 +14,16 @@ const OTHER: [u8; 32] = *b"somebody without it has this one";
 /// Length of a MAVLink signature, bytes: link number, time stamp and tag.
 const SIGNATURE: usize = 13;
 
-/// Largest time stamp of a signature. The next two constants are a minute in units of time stamps, and the number of
-/// senders that a link remembers.
+/// Largest time stamp of a signature, in units of 10 µs.
 const LAST: u64 = (1 << 48) - 1;
+/// A minute in the unit of signature time stamps, 10 µs.
 const MINUTE: u64 = 6_000_000;
+/// Number of senders of signed frames that a link remembers.
 const SENDERS: usize = 8;
 
-/// Origin of time stamps: 2015-01-01, µs since 1970. The next constant is 2026-11-22 as a stamp.
+/// Origin of signature time stamps: 2015-01-01, µs since 1970.
 const BEGIN_US: u64 = 1_420_070_400_000_000;
+/// Signature time stamp of 2026-11-22.
 const TODAY: u64 = 37_527_840_000_000;
 
 const HISTORY: usize = 32;
@@ -31,8 +33,9 @@ type Sender = ((u8, u8, u8), u64);
 
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// Current time stamp of the simulated autopilot. The next field has its newest signed frames.
+    /// Current time stamp of the simulated autopilot.
     stamp: u64,
+    /// Newest signed frames of the simulated autopilot, for replays.
     history: Vec<Vec<u8>>,
     /// Clock of the tested link as a time stamp, at the instant `at`.
     time: u64,
@@ -46,8 +49,9 @@ pub(super) struct Peer {
 }
 
 impl Peer {
-    /// Creates the autopilot's end of a signed link, and the signing settings of the tested link. `input` chooses
-    /// whether that knows the time.
+    /// Creates the autopilot's end of a signed link, and the signing settings of the tested link.
+    ///
+    /// `input` chooses whether the tested link knows the time at its start.
     pub(super) fn new(input: &mut Input<'_>, now: Instant) -> (Self, Signing) {
         let time = match input.below(4) {
             0 => 0,

@@ -49,8 +49,9 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the sums of a sensing message over up to eight positions. The inverse power v is that of a single
-/// interferer, or arbitrary.
+/// Returns the sums of a sensing message, made from drawn measurements at up to eight positions.
+///
+/// `input` chooses between the measurements of one interferer and arbitrary powers.
 fn of_places(input: &mut Input<'_>) -> [f32; SUMS] {
     let of_one = input.flag();
     let unit = input.scaled(1e-6, 1e12);

@@ -16,8 +16,9 @@ pub const NETWORK: u16 = 9;
 /// Checker of a relay's frames, with the last numbers that they contained.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
-    /// Node number of the relay. The next field is the number of relays in the mission.
+    /// Node number of the relay.
     node: u16,
+    /// Number of relays in the mission.
     all: u16,
     pub(super) sent: u32,
     pub(super) number: u16,

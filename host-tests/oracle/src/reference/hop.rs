@@ -70,11 +70,9 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// Returns a value with the sign of the SIR's slope at `x`. The value is a concave function of `x` beyond the
-    /// sender (see [`super`]).
+    /// Returns a value with the sign of the SIR's slope at `x`, for the search for its extrema.
     ///
-    /// Each path loss grows at the relative rate 2 dx / distance^2, and the interference is a part of the total
-    /// disturbance.
+    /// Beyond the sender the value is a concave function of `x` (see [`super`]), so that it has at most two zeros.
     fn rise(&self, x: f64) -> f64 {
         let (dx, dh) = (x - self.sender_x, self.own_h - self.sender_h);
         let (ix, iy, ih) = (x - self.link.x_i, self.link.y_i, self.own_h);

@@ -9,11 +9,11 @@ const TOLERANCE: f64 = 1e-13;
 const LEAST_TARGET: f64 = 1e-250;
 
 impl Link {
-    /// Returns the best SIR (linear) of all chains, the largest target that a chain meets. Accurate to 1e-13
-    /// relative.
+    /// Returns the best SIR (linear) of all chains, to 1e-13 relative: the largest target met.
     ///
-    /// `None` without relays, or if every chain has an SIR of zero. Uses greedy chains if all relays share one
-    /// altitude, the exact sets otherwise. About 50 to 60 chains.
+    /// `None` without relays, or if every chain has an SIR of zero. If all relays share one altitude, only the chain
+    /// with every relay as far along as possible is tried for a target, otherwise all positions of each relay. About
+    /// 50 to 60 targets are tried.
     pub fn optimum(&self) -> Option<f64> {
         let mut heights = self.relays.iter().map(|relay| relay.altitude_m);
         let first = heights.next()?;
@@ -24,11 +24,11 @@ impl Link {
         }
     }
 
-    /// Returns the target SIR (linear) above which the greedy [`Link::feasible`] fails, to 1e-13 relative. `None` as
-    /// for [`Link::optimum`].
+    /// Returns the largest target SIR (linear) that [`Link::feasible`] is found to meet, to 1e-13 relative.
     ///
-    /// The optimum itself if all relays share one altitude. Otherwise at most the optimum, and only one of the
-    /// targets at which the greedy chain fails: it may fail at a target and succeed at a larger one.
+    /// It is the optimum if all relays share one altitude. Otherwise it may be below the optimum, and a larger target
+    /// may be met too, because the greedy chain can fail at one target and succeed at a larger one. `None` as for
+    /// [`Link::optimum`].
     pub fn farthest_optimum(&self) -> Option<f64> {
         self.largest_target(|target| self.feasible(target).is_some())
     }
@@ -55,11 +55,11 @@ impl Link {
         Some(below)
     }
 
-    /// Returns the first target (linear) of the paper's fixed-step schedule. It is the lesser of the first hop's SIR
-    /// with relay 1 straight above Tx and the last hop's SIR with relay N straight above Rx.
+    /// Returns the first target SIR (linear) that the paper's fixed-step search tries.
     ///
-    /// With the interferer behind Tx (X < 0) hop 1 is better farther out, and its best SIR over [0, D] replaces the
-    /// one above Tx.
+    /// It is the lesser of two SIRs: that of the first hop with relay 1 straight above Tx, and that of the last hop
+    /// with relay N straight above Rx. If the interferer is behind Tx (X < 0), the first hop's best SIR over [0, D]
+    /// takes the place of the one above Tx.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {
@@ -70,12 +70,11 @@ impl Link {
         Some(near.min(self.sir_rx(self.distance_m)?))
     }
 
-    /// Runs the paper's fixed-step schedule. Returns the number of targets tried, the feasible one included, and that
-    /// target (linear).
+    /// Runs the paper's fixed-step search: lowers the target SIR by `epsilon` until a chain meets it.
     ///
-    /// The targets are `gamma_0` - i `epsilon`, i = 0, 1, ...; `gamma_0` is the lesser of the SIRs above Tx and above
-    /// Rx (for X < 0, of hop 1's best over [0, D] and the SIR above Rx), `epsilon` the step (linear, > 0). `None` if
-    /// no target is feasible. Costs one greedy chain per target, at most `gamma_0` / `epsilon`.
+    /// Returns the number of targets tried and the last one (linear). `None` if no target can be met. The first
+    /// target is the lesser of the SIRs above Tx and above Rx; for an interferer behind Tx (X < 0) the first hop's
+    /// best SIR replaces the one above Tx. Each target costs one chain. `epsilon` is linear, > 0.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

@@ -12,11 +12,11 @@ use super::link::{Link, meets};
 type Interval = (f64, f64);
 
 impl Link {
-    /// Returns the positions, m, of a chain that meets `target` (linear SIR). Each relay is as far toward Rx as
-    /// possible.
+    /// Returns the positions, m, of a chain that meets `target` (linear SIR).
     ///
-    /// `None` only if there is no such chain, whatever altitudes the relays have. Per relay and interval about 300
-    /// SIR evaluations; there are seldom more than three intervals.
+    /// Each relay is as far toward Rx as possible. `None` only if no chain meets the target, whatever altitudes the
+    /// relays have. The positions of a relay that can meet the target form intervals, seldom more than three; each
+    /// costs about 300 SIR evaluations.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let sets = self.sets(target, 0.0)?;
         let mut limit = self.distance_m;
@@ -47,8 +47,9 @@ impl Link {
         })
     }
 
-    /// Returns the positions that every relay can have while all hops before it meet `target`. Neighbours are at
-    /// least `apart_m` apart. `None` if no chain meets the target at Rx.
+    /// Returns, for each relay, the positions at which its hop and all earlier hops can meet `target`.
+    ///
+    /// Neighbours are at least `apart_m` apart. `None` if no chain meets the target at Rx.
     fn sets(&self, target: f64, apart_m: f64) -> Option<Vec<Vec<Interval>>> {
         let first = Hop::new(self, 1, 0.0)?;
         let turns = first.turns(0.0, self.distance_m);
@@ -64,8 +65,9 @@ impl Link {
         meets(self.sir_rx(tail)?, target).then_some(sets)
     }
 
-    /// Returns the possible positions of relay `k`, within 2 to N, from those of relay k-1, `set`. Relay k-1 is at
-    /// least `advance` m behind.
+    /// Returns the positions that relay `k` (2 to N) can have if relay k-1 is within `set`.
+    ///
+    /// The hop between the two must meet `target`, and relay `k` is at least `advance` m farther along x.
     fn next_set(&self, k: usize, set: &[Interval], target: f64, advance: f64) -> Vec<Interval> {
         let mut pieces = Vec::new();
         let gap_ends = set

@@ -156,8 +156,9 @@ pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     drawn
 }
 
-/// Gives relays their own powers, and fixes the cross-sections of some. The distribution is in the module's last
-/// table.
+/// Gives some relays their own power, and fixes the lateral position and altitude of some.
+///
+/// The distribution is in the module's last table.
 #[must_use]
 pub fn with_own(rng: &mut impl Rng, mut of: Scenario) -> Scenario {
     let (powers, holds): (bool, bool) = (rng.random(), rng.random());

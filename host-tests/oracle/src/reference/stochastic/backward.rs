@@ -3,20 +3,22 @@
 use super::link::StochasticLink;
 use crate::reference::link::Relay;
 
-/// Chain built backward, from Rx toward Tx, and its target SIR.
+/// Chain built from Rx back toward Tx for a target SIR, with that target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backward {
-    /// Target SIR (linear). Every hop except the first is as long as it allows.
+    /// Target SIR (linear). Every hop except the first is as long as this target allows.
     pub gamma: f64,
     /// Positions of the relays from Tx to Rx, m.
     pub places: Vec<f64>,
-    /// Number of targets tried, including the final one. For [`StochasticLink::fewest`] the number of relays.
+    /// Number of target SIRs tried, including the final one. In the result of [`StochasticLink::fewest`] it is the
+    /// number of relays.
     pub iterations: usize,
 }
 
 impl StochasticLink {
-    /// Returns the expected SIR (linear) at Rx with the last relay straight above it. No chain has more; Algorithm 4
-    /// starts with this target.
+    /// Returns the expected SIR (linear) at Rx with the last relay straight above Rx.
+    ///
+    /// It is an upper bound for every chain; Algorithm 4 starts with this target.
     pub fn ceiling(&self) -> f64 {
         self.relays.last().map_or(0.0, |tail| {
             tail.power_w * self.upsilon_at(self.distance_m)
@@ -83,10 +85,11 @@ impl StochasticLink {
         None
     }
 
-    /// Returns the largest value of [`StochasticLink::backward_sir`] over all targets, by a refined search.
+    /// Returns the best [`StochasticLink::backward_sir`] that a search over the target SIR finds.
     ///
-    /// Tries `points` targets down to 1e-8 of the ceiling, evenly spaced in their logarithm, and as many again around the best,
-    /// four times. For fields where that value has several maxima; may miss one narrower than the spacing.
+    /// It tries `points` targets down to 1e-8 of the ceiling, evenly spaced in their logarithm, and four times as
+    /// many again around the best one. It is for fields in which that SIR has several maxima; a maximum narrower than
+    /// the spacing may be missed.
     pub fn backward_best(&self, points: u32) -> f64 {
         let (mut low, mut high) = (1e-8_f64.ln(), 0.0);
         let mut best = (0.0, 0.0);
@@ -104,10 +107,10 @@ impl StochasticLink {
         best.1
     }
 
-    /// Solves the paper's problem 1: the fewest relays that meet the target SIR `gamma` if built backward. All relays
-    /// are like the first one; there are at most `most`.
+    /// Solves the paper's problem 1: the fewest relays that meet the target SIR `gamma` if built backward.
     ///
-    /// `iterations` is their number.
+    /// All relays are like the first one; there are at most `most`. The result's `iterations` is the number of
+    /// relays. `None` if more relays are needed, or if the target cannot be met.
     pub fn fewest(&self, gamma: f64, most: usize) -> Option<Backward> {
         let like: Relay = *self.relays.first()?;
         (1..=most).find_map(|n| {

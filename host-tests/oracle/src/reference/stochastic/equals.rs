@@ -3,11 +3,12 @@
 use super::link::StochasticLink;
 
 impl StochasticLink {
-    /// Returns the best expected SIR (linear) of a chain with identical relays and a constant Upsilon.
+    /// Returns the best expected SIR (linear) of identical relays in a constant interference field.
     ///
-    /// Solves the equation that all hops are equal and span the distance; at most about 2000 evaluations. `None`
-    /// without relays, or if relays or Upsilon differ. Never above the SIR of the weaker outer hop with the outer
-    /// relays straight above Tx and Rx.
+    /// It solves the equation that all hops have one SIR and together span the distance D, with at most about 2000
+    /// evaluations. It is never above the SIR of the outer hops with their relays straight above Tx and Rx. `None`
+    /// without relays, or if the relays or the table's values of Upsilon = E[1/I] (I is the interference power)
+    /// differ.
     pub fn iid_optimum(&self) -> Option<f64> {
         let (first, (_, u)) = (self.relays.first()?, *self.upsilon.first()?);
         let alike = self.relays.iter().all(|relay| relay == first)

@@ -2,8 +2,9 @@
 
 use super::super::link::{Relay, received_w};
 
-/// Chain of relays between Tx at (0, 0) and Rx at (D, 0) in an interference field. Upsilon(x) = E[1 / interference
-/// power] is known.
+/// Chain of relays between Tx at (0, 0) and Rx at (D, 0) in an interference field.
+///
+/// The field is known as Upsilon(x) = E[1/I], where I is the interference power at x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StochasticLink {
     /// Tx-Rx distance D, m, > 0.
@@ -14,14 +15,18 @@ pub struct StochasticLink {
     pub mu_los: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Strictly rising positions, m, with Upsilon, 1/W: linear in between, constant beyond the ends.
+    /// Table of the interference field: strictly rising positions x, m, each with Upsilon, 1/W.
+    ///
+    /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant beyond the first and the last one.
     pub upsilon: Vec<(f64, f64)>,
     /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,
 }
 
 impl StochasticLink {
-    /// Returns Upsilon at `x` metres, 1/W; NaN for an empty table.
+    /// Returns Upsilon, the mean inverse interference power E[1/I], at `x` metres, 1/W.
+    ///
+    /// It is interpolated from the table of the interference field; NaN if the table is empty.
     pub fn upsilon_at(&self, x: f64) -> f64 {
         let mut left: Option<(f64, f64)> = None;
         for &(at, value) in &self.upsilon {

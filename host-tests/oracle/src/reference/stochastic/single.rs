@@ -7,27 +7,25 @@ use super::link::StochasticLink;
 pub struct Single {
     /// Position of the relay along the line from Tx, m.
     pub x_m: f64,
-    /// Lesser of the target SIR and the first hop's expected SIR, linear.
+    /// Smaller one of the target SIR and the first hop's expected SIR, linear.
     pub sir: f64,
     /// Number of target SIRs tried.
     pub iterations: usize,
 }
 
 impl StochasticLink {
-    /// Runs Algorithm 3 as printed. It stops at the first target SIR that the first hop meets, else returns the best
-    /// position seen.
+    /// Runs Algorithm 3 as printed: it stops at the first target SIR that the first hop meets.
     ///
-    /// The second hop's targets fall from its largest value in steps of `step`; `None` unless there is exactly one
-    /// relay.
+    /// The targets fall by `step` from the largest SIR that the second hop can have. If the first hop meets none of
+    /// them, the best position seen is returned. `None` unless there is exactly one relay.
     pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
         self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
     }
 
-    /// Runs the corrected Algorithm 3. It continues while a lower target SIR could still be better than the best
-    /// position seen.
+    /// Runs the corrected Algorithm 3: it continues while a lower target SIR could still be better.
     ///
-    /// Prefers, of the two steps around the optimum, the one where the first hop is weaker, so for a constant Upsilon
-    /// its position may be one step off the printed one's, with an SIR at least as high.
+    /// It returns the best position seen. In a constant interference field this may be one step away from the
+    /// position of the printed algorithm, with an SIR at least as high.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
             (best.sir >= gamma - step).then_some(best)
@@ -69,10 +67,10 @@ impl StochasticLink {
         best.map(|best| Single { iterations, ..best })
     }
 
-    /// Returns the best position (m) and expected SIR of one relay by brute force. `None` unless there is exactly one
-    /// relay.
+    /// Returns the best position (m) and expected SIR (linear) of one relay by brute force.
     ///
-    /// A grid of `points` per piece of the table of Upsilon, refined four times around the best position.
+    /// It tries `points` positions between two points of the interference field's table, then refines four times
+    /// around the best position. `None` unless there is exactly one relay.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
         let [_] = self.relays.as_slice() else {
             return None;

@@ -1,11 +1,11 @@
 //! Upsilon = E[1/I] of any distribution.
 
-/// Returns Upsilon = E[1/I] of an interference power I, 1/W. It is the integral of the moment-generating function `m`
-/// over the negative half line.
+/// Returns Upsilon = E[1/I], 1/W, of a random interference power I whose distribution is given.
 ///
-/// `m`(t) = E[exp(t I)] for t <= 0, I > 0 in W. With y = e^z the integrand is analytic and falls off exponentially on
-/// both sides, so the trapezoidal rule is accurate to about 1e-13. `None` if the integral diverges in f64: E[1/I]
-/// infinite, or nearly so (a Beta distribution with alpha below about 1.1). At most some 4000 evaluations of `m`.
+/// It integrates `m`(t) = E[exp(t I)], the moment-generating function of I, over all t < 0. The trapezoidal rule in
+/// the logarithm of -t is accurate to about 1e-13, since the integrand is analytic and falls off exponentially on
+/// both sides. `None` if the integral diverges in f64: E[1/I] is infinite or nearly so (a Beta distribution with
+/// alpha below about 1.1). At most some 4000 evaluations of `m`.
 pub fn upsilon_by_mgf(m: impl Fn(f64) -> f64) -> Option<f64> {
     const STEP: f64 = 0.25;
     // Near 1 / I, where the function has fallen to a half.

@@ -28,11 +28,12 @@ fn joined(mut all: Stretches) -> Stretches {
 }
 
 impl StochasticLink {
-    /// Returns the best expected SIR (linear) of all chains with relays at least `apart_m` apart. 0 if there is no
-    /// such chain.
+    /// Returns the best expected SIR (linear) of all chains with relays at least `apart_m` apart.
     ///
-    /// Going back from Rx, the feasible positions of each relay are intervals: as a receiver moves along an interval,
-    /// so does the interval of its sender. No position is left out, however far a relay has to stay behind its reach.
+    /// It follows the sets of all possible positions of each relay, from Rx back to Tx. These sets are intervals: as
+    /// the receiver of a hop moves along an interval, so do the possible positions of its sender. Nothing is left
+    /// out, so that relays that need to stay behind their farthest position are considered. 0 if no chain is
+    /// possible.
     pub fn best_apart(&self, apart_m: f64) -> f64 {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return 0.0;
@@ -60,7 +61,9 @@ impl StochasticLink {
         low
     }
 
-    /// Splits an interval of positions at the points of the field, so that Upsilon is linear in each part.
+    /// Splits an interval of positions at the points of the interference field's table.
+    ///
+    /// In each part the field's Upsilon = E[1/I] (I is the interference power) is then linear.
     fn pieces(&self, (low, high): (f64, f64)) -> Stretches {
         let inside = self.upsilon.iter().map(|point| point.0);
         let inside = inside.filter(|x| *x > low && *x < high);
