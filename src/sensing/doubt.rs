@@ -58,7 +58,7 @@ const LEAST: f64 = 0.02;
 const DECISIVE: f64 = 6.0;
 
 /// Maximum variance of the relative errors of consistent measurements (some 1.5 dB).
-const OF_ONE_MIND: f64 = 0.1;
+const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes from a failed trial to the next trial.
 const REST: u8 = 4;
@@ -78,11 +78,11 @@ const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    Usual,
+    Normal,
     /// Trial without this node.
     Trying(u16),
     /// Notice that this node is excluded; `true` for the second one.
-    Telling(u16, bool),
+    Announcing(u16, bool),
 }
 
 /// Leader's search for the faulty relay.
@@ -90,7 +90,7 @@ enum Stage {
 pub(crate) struct Trial {
     stage: Stage,
     /// Passes until the next trial may start.
-    rest: u8,
+    cooldown: u8,
     /// Node without which the other nodes' measurements fit best.
     best: u16,
     /// Residual of the fit to all relays.
@@ -116,8 +116,8 @@ pub(crate) enum Next {
 
 impl Trial {
     pub(crate) const NONE: Self = Self {
-        stage: Stage::Usual,
-        rest: 0,
+        stage: Stage::Normal,
+        cooldown: 0,
         best: 0,
         seen: 0.0,
         seen_best: 0.0,
@@ -128,8 +128,8 @@ impl Trial {
     /// Node excluded from the next pass, 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
-            Stage::Usual => 0,
-            Stage::Trying(node) | Stage::Telling(node, _) => node,
+            Stage::Normal => 0,
+            Stage::Trying(node) | Stage::Announcing(node, _) => node,
         }
     }
 
@@ -143,8 +143,8 @@ impl Trial {
     ) -> Next {
         let fit = Fit::of(sums, relative_error);
         match self.stage {
-            Stage::Usual => {
-                self.rest = self.rest.saturating_sub(1);
+            Stage::Normal => {
+                self.cooldown = self.cooldown.saturating_sub(1);
                 // A relay that measures far more than all others dominates the sums, so that nothing fits.
                 let (odd, seen) = match fit {
                     Ok(fit) => {
@@ -153,11 +153,11 @@ impl Trial {
                     }
                     Err(_) => (sums.count() > ENOUGH, f32::MAX),
                 };
-                if !odd || self.rest > 0 {
+                if !odd || self.cooldown > 0 {
                     return Next::Review;
                 }
                 if relays < FEWEST {
-                    self.rest = REST;
+                    self.cooldown = REST;
                     return Next::Unknown;
                 }
                 *self = Self {
@@ -185,19 +185,19 @@ impl Trial {
                     return Next::Again;
                 }
                 if self.is_decided() {
-                    self.stage = Stage::Telling(self.best, false);
+                    self.stage = Stage::Announcing(self.best, false);
                     return Next::Again;
                 }
-                self.stage = Stage::Usual;
-                self.rest = REST;
+                self.stage = Stage::Normal;
+                self.cooldown = REST;
                 Next::Unknown
             }
-            Stage::Telling(node, false) => {
-                self.stage = Stage::Telling(node, true);
+            Stage::Announcing(node, false) => {
+                self.stage = Stage::Announcing(node, true);
                 Next::Again
             }
-            Stage::Telling(_, true) => {
-                self.stage = Stage::Usual;
+            Stage::Announcing(_, true) => {
+                self.stage = Stage::Normal;
                 Next::Review
             }
         }
@@ -207,7 +207,7 @@ impl Trial {
         let [least, second] = [self.least, self.second].map(f64::from);
         let taken = f64::from(self.seen) - f64::from(self.seen_best);
         least > 0.0
-            && least < OF_ONE_MIND
+            && least < CONSISTENT
             && second > DECISIVE * least
             && taken > LEAST.max(DEVIATIONS * least)
     }
@@ -239,7 +239,7 @@ pub(crate) fn is_absurd(
     };
     let of_one_mind = |fit: Fit| {
         let ratio = f64::from(place.v) / fit.value(&place.terms);
-        fit.variance() < OF_ONE_MIND && is_apart(ratio, fit.variance(), (DEVIATIONS, 1e4))
+        fit.variance() < CONSISTENT && is_apart(ratio, fit.variance(), (DEVIATIONS, 1e4))
     };
     others.count() > ENOUGH
         && expected.is_some_and(known)
@@ -282,7 +282,7 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
     let heard_w = f64::from(UNIT_W) / v;
     others.count() > ENOUGH
         && others.measured() > 3.0
-        && fit.variance() < OF_ONE_MIND
+        && fit.variance() < CONSISTENT
         && v > 0.0
         && DEVIATIONS * fit.relative_variance(there) < 1.0
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
@@ -334,7 +334,7 @@ pub(super) fn judge_ends(
     relative_error: f32,
 ) -> EndsOff {
     let before = levels.off;
-    if mission.relays() < FEWEST_FOR_ENDS || !fit.is_of_one_mind() {
+    if mission.relays() < FEWEST_FOR_ENDS || !fit.is_consistent() {
         return before;
     }
     let distance_m = mission.config().distance_m;

@@ -139,7 +139,7 @@ mod tests {
 
     /// Frames of every length, split at any position.
     #[test]
-    fn it_is_the_published_one() {
+    fn the_hash_equals_the_published_one() {
         let mut state = 1_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -215,7 +215,7 @@ fn numbers_for_the_operator_come_once_a_second() {
         );
         assert!(values.iter().all(|value| *value == expected));
     }
-    assert!(vehicle.link.say("a line of a relay"));
+    assert!(vehicle.link.send_text("a line of a relay"));
     vehicle.run(100);
     assert!(vehicle.heard("a line of a relay"));
 }

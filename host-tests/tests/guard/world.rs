@@ -74,7 +74,7 @@ impl World {
 
     /// Returns the permitted shortfall of the separation, m: four position errors and f32 rounding.
     pub(crate) fn allowed_m(&self) -> f64 {
-        let rounding = f64::from(self.confines.fence.most_x_m) * f64::from(f32::EPSILON);
+        let rounding = f64::from(self.confines.geofence.most_x_m) * f64::from(f32::EPSILON);
         4.0 * f64::from(self.confines.hover_m) + 8.0 * rounding
     }
 
@@ -94,7 +94,7 @@ impl World {
         for letter in self.medium.arrived(now_s) {
             let drone = &mut self.drones[letter.to];
             if let Some(guard) = drone.guard.as_mut().filter(|_| drone.speaks && drone.flies) {
-                guard.hear(letter.side, node(letter.from), &letter.fence);
+                guard.handle_fence(letter.side, node(letter.from), &letter.fence);
                 let side = usize::from(letter.side == Side::Downstream);
                 // Only a message of the present association counts.
                 let told =
@@ -184,7 +184,7 @@ impl World {
         let least = below.iter().map(|(_, high)| *high).fold(before, f64::max);
         let least = (least + apart_m).max(0.0);
         let most = above.iter().map(|(low, _)| *low).fold(after, f64::min);
-        let most = (most - apart_m).min(f64::from(self.confines.fence.most_x_m));
+        let most = (most - apart_m).min(f64::from(self.confines.geofence.most_x_m));
         let to = least + share * (most - least);
         if least < most {
             let [stop, ..] = self.drones[k].stopped();

@@ -8,8 +8,8 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::message::{
-    AdjustStep, Answer, Claim, Decision, Heard, Hello, Message, Moved, OwnSeat, Poll, Proposal,
-    Pulse, Pulsed, Roster, Successor, Sweep, Token,
+    AdjustStep, Claim, Decision, Heard, Hello, Message, Moved, OwnSeat, Poll, Proposal, Pulse,
+    Pulsed, Roster, Successor, Sweep, SweepVerdict, Token,
 };
 use uav_relay::{
     Band, Interference, Interferer, Local, Placement, Profile, Sites, Upload, View, ViewId,
@@ -88,7 +88,7 @@ pub(crate) fn message(said: &Said) -> Message {
     let of = Of(&fields);
     match said.name() {
         "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(said.name(), &of)),
-        "Verdict" => Message::Verdict(Answer {
+        "Verdict" => Message::Verdict(SweepVerdict {
             number: of.word("number"),
             view_digest: of.word("view_digest"),
             verdict: Verdict {

@@ -15,7 +15,7 @@ mod view;
 pub use self::link::{Claim, Hello};
 pub use self::parts::MessageError;
 pub use self::round::{
-    AdjustStep, Answer, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, Token,
+    AdjustStep, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, SweepVerdict, Token,
 };
 pub use self::view::{Decision, Poll, Proposal, Pulse, Pulsed, Successor};
 
@@ -49,7 +49,7 @@ pub enum Message {
     /// Onward message: targets, and the sender's reach for each.
     Sweep(Sweep),
     /// Reply to a sweep: its verdict. It acknowledges the sweep of the same number.
-    Verdict(Answer),
+    Verdict(SweepVerdict),
     /// Reply to a repeated pass: the pass of this number has arrived, but has no result yet.
     Busy {
         /// Number of the pass.
@@ -241,7 +241,7 @@ impl Message {
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
                 Sweep::decode(tag, body).map(Self::Sweep)
             }
-            tag::VERDICT => Answer::decode(body).map(Self::Verdict),
+            tag::VERDICT => SweepVerdict::decode(body).map(Self::Verdict),
             tag::BUSY => Ok(Self::Busy {
                 number: read::<Word>(body)?.number(),
             }),

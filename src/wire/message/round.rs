@@ -128,7 +128,7 @@ fn checked(
 
 /// Verdict on a sweep; sent back.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Answer {
+pub struct SweepVerdict {
     /// Number of the sweep.
     pub number: u16,
     /// [`digest`](crate::wire::digest::digest) of the sender.
@@ -141,7 +141,7 @@ pub struct Answer {
     pub own: bool,
 }
 
-impl Answer {
+impl SweepVerdict {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
         let Verdict { commit, slacks } = &self.verdict;
