@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_named() {
+    fn parameters_out_of_range_are_named() {
         let new = Channel::new;
         assert_eq!(
             new(f64::NAN, 1.0, 2.0, AirGround::Los),

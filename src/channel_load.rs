@@ -212,13 +212,13 @@ mod tests {
     }
 
     #[test]
-    fn the_least_data_rates_are_those_that_were_found() {
+    fn the_least_data_rates_are_the_measured_ones() {
         let rates = [1, 2, 8, 9, 20, 50, 100].map(least);
         assert_eq!(rates, [0, 4_694, 32_854, 37_547, 89_174, 229_974, 464_640]);
     }
 
     #[test]
-    fn a_channel_as_slow_as_is_allowed_needs_the_usual_timing_and_one_half_as_fast_twice_that() {
+    fn half_the_least_data_rate_needs_twice_the_timing() {
         for in_range in [2, 9, 20, 1_000] {
             let load = ChannelLoad {
                 in_range,
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn where_many_share_the_channel_a_hop_takes_up_to_four_frames_time() {
+    fn many_relays_in_range_lengthen_a_hop_to_four_frames() {
         let latency = Duration::from_millis(3);
         let times = [1, 9, 10, 19, 100].map(|in_range| {
             let load = ChannelLoad {
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_that_is_asked_overflows() {
+    fn no_input_overflows() {
         let load = ChannelLoad {
             in_range: u16::MAX,
             overhead: u16::MAX,

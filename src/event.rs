@@ -109,9 +109,9 @@ pub enum Event {
     Adopted,
 }
 
-/// Events without a node that are polled first. Events with a node follow, then those of `LAST`.
-const FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
-const LAST: &[Event] = &[
+/// Events without a node that are polled first. Events with a node follow, then those of `POLLED_LAST`.
+const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
+const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,
     Event::LeaseLapsed,
     Event::NoQuorum,
@@ -138,7 +138,7 @@ const LAST: &[Event] = &[
 
 /// Kind of event that concerns one node on one side of this relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum About {
+pub(crate) enum NodeEvent {
     Lost,
     Back,
     NotHeard,
@@ -151,7 +151,7 @@ pub(crate) enum About {
     Sensor,
 }
 
-impl About {
+impl NodeEvent {
     const ALL: &[Self] = &[
         Self::Lost,
         Self::Back,
@@ -180,36 +180,36 @@ impl About {
 /// Raised events that the firmware has not polled yet, with the nodes that they concern.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
-    plain: u16,
-    /// Raised events that concern a node, upstream and downstream: bit i stands for `About::ALL[i]`.
-    about: [u8; 2],
+    events: u16,
+    /// Raised events that concern a node, upstream and downstream: bit i stands for `NodeEvent::ALL[i]`.
+    kinds: [u8; 2],
     nodes: [[u16; 8]; 2],
 }
 
 impl Pending {
     #[inline(never)] // a search, in every place where an event is raised
     fn bit(event: Event) -> u16 {
-        FIRST
+        POLLED_FIRST
             .iter()
-            .chain(LAST)
+            .chain(POLLED_LAST)
             .zip(0..16)
             .find(|(known, _)| **known == event)
             .map_or(0, |(_, bit)| 1 << bit)
     }
 
     pub(crate) fn raise(&mut self, event: Event) {
-        self.plain |= Self::bit(event);
+        self.events |= Self::bit(event);
     }
 
     /// Raises an event about node `node` at `side`; it replaces one of the same kind about another node.
-    pub(crate) fn raise_about(&mut self, about: About, side: Side, node: u16) {
+    pub(crate) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         let at = usize::from(side == Side::Downstream);
-        let (Some(bits), Some(nodes)) = (self.about.get_mut(at), self.nodes.get_mut(at)) else {
+        let (Some(bits), Some(nodes)) = (self.kinds.get_mut(at), self.nodes.get_mut(at)) else {
             return;
         };
-        let opposite = match about {
-            About::Lost => Some(About::Back),
-            About::Back => Some(About::Lost),
+        let opposite = match kind {
+            NodeEvent::Lost => Some(NodeEvent::Back),
+            NodeEvent::Back => Some(NodeEvent::Lost),
             _ => None,
         };
         // A loss and a return of the same node cancel; the later event remains.
@@ -218,31 +218,31 @@ impl Pending {
         {
             *bits &= !(1 << opposite as u8);
         }
-        *bits |= 1 << about as u8;
-        if let Some(place) = nodes.get_mut(about as usize) {
+        *bits |= 1 << kind as u8;
+        if let Some(place) = nodes.get_mut(kind as usize) {
             *place = node;
         }
     }
 
-    fn take_plain(&mut self, of: &[Event]) -> Option<Event> {
+    fn take_event(&mut self, of: &[Event]) -> Option<Event> {
         let event = of
             .iter()
             .copied()
-            .find(|&event| self.plain & Self::bit(event) != 0)?;
-        self.plain &= !Self::bit(event);
+            .find(|&event| self.events & Self::bit(event) != 0)?;
+        self.events &= !Self::bit(event);
         Some(event)
     }
 
-    fn take_about(&mut self) -> Option<Event> {
-        for &about in About::ALL {
+    fn take_node_event(&mut self) -> Option<Event> {
+        for &kind in NodeEvent::ALL {
             let sides = [Side::Upstream, Side::Downstream].into_iter();
-            let places = self.about.iter_mut().zip(&self.nodes);
+            let places = self.kinds.iter_mut().zip(&self.nodes);
             for (side, (bits, nodes)) in sides.zip(places) {
-                let bit = 1 << about as u8;
+                let bit = 1 << kind as u8;
                 if *bits & bit != 0 {
                     *bits &= !bit;
-                    let node = nodes.get(about as usize).copied().unwrap_or_default();
-                    return Some(about.event(side, node));
+                    let node = nodes.get(kind as usize).copied().unwrap_or_default();
+                    return Some(kind.event(side, node));
                 }
             }
         }
@@ -250,57 +250,57 @@ impl Pending {
     }
 
     pub(crate) fn take(&mut self) -> Option<Event> {
-        self.take_plain(&FIRST)
-            .or_else(|| self.take_about())
-            .or_else(|| self.take_plain(LAST))
+        self.take_event(&POLLED_FIRST)
+            .or_else(|| self.take_node_event())
+            .or_else(|| self.take_event(POLLED_LAST))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{About, Event, Pending, Side};
+    use super::{Event, NodeEvent, Pending, Side};
 
     fn all(pending: &mut Pending) -> heapless::Vec<Event, 24> {
         core::iter::from_fn(|| pending.take()).collect()
     }
 
     #[test]
-    fn an_event_names_its_node_and_nothing_is_lost_but_repetitions() {
+    fn only_repetitions_of_events_are_lost() {
         let mut pending = Pending::default();
         pending.raise(Event::Adopted);
         pending.raise(Event::SetpointChanged);
         for (side, node) in [(Side::Upstream, 3), (Side::Downstream, 5)] {
-            for &about in About::ALL {
-                pending.raise_about(about, side, node);
+            for &kind in NodeEvent::ALL {
+                pending.raise_node_event(kind, side, node);
             }
-            pending.raise_about(About::Lost, side, node - 1);
+            pending.raise_node_event(NodeEvent::Lost, side, node - 1);
         }
-        let told = all(&mut pending);
-        assert_eq!(told.len(), 2 + 2 * About::ALL.len());
+        let polled = all(&mut pending);
+        assert_eq!(polled.len(), 2 + 2 * NodeEvent::ALL.len());
         let lost = Event::NeighbourLost {
             side: Side::Upstream,
             node: 2,
         };
-        assert_eq!(told[..2], [Event::SetpointChanged, lost]);
-        assert!(told.contains(&Event::NotHeard { node: 5 }));
-        assert_eq!(told.last(), Some(&Event::Adopted));
+        assert_eq!(polled[..2], [Event::SetpointChanged, lost]);
+        assert!(polled.contains(&Event::NotHeard { node: 5 }));
+        assert_eq!(polled.last(), Some(&Event::Adopted));
         assert_eq!(pending.take(), None);
     }
 
     #[test]
-    fn of_a_loss_and_a_return_of_one_node_the_later_one_holds() {
+    fn a_loss_and_a_return_of_one_node_cancel() {
         let side = Side::Downstream;
         let (lost, back) = (
             |node| Event::NeighbourLost { side, node },
             |node| Event::NeighbourBack { side, node },
         );
         let mut pending = Pending::default();
-        pending.raise_about(About::Lost, side, 3);
-        pending.raise_about(About::Back, side, 3);
+        pending.raise_node_event(NodeEvent::Lost, side, 3);
+        pending.raise_node_event(NodeEvent::Back, side, 3);
         assert_eq!(all(&mut pending)[..], [back(3)]);
         // A return of another node does not cancel the loss.
-        pending.raise_about(About::Lost, side, 3);
-        pending.raise_about(About::Back, side, 4);
+        pending.raise_node_event(NodeEvent::Lost, side, 3);
+        pending.raise_node_event(NodeEvent::Back, side, 4);
         assert_eq!(all(&mut pending)[..], [lost(3), back(4)]);
     }
 }

@@ -111,7 +111,7 @@ pub enum LineError {
     Distance,
     /// The mission's sites, transmitter and receiver, are less than 10 m or more than 100 km apart.
     Sites,
-    /// The mission's altitudes exceed the relay's own geofence. See [`GuardConfig::fence`](crate::guard::config::GuardConfig).
+    /// The mission's altitudes exceed the relay's own geofence. See [`GuardConfig::geofence`](crate::guard::config::GuardConfig).
     Altitude,
     /// The mission's range of lateral offsets exceeds the relay's own geofence.
     Lateral,
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_point_on_earth_is_none() {
+    fn invalid_coordinates_give_none() {
         for (lat, lon, amsl) in [
             (90.1, 0.0, 0.0),
             (0.0, -180.1, 0.0),

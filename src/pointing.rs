@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn no_place_and_no_number_have_no_bearing() {
+    fn an_invalid_position_has_no_bearing() {
         let nowhere = [
             (0.0, 0.0, 0.0),
             (-0.0, 0.0, -0.0),
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_are_ahead_or_behind_and_the_interferer_is_aside_and_below() {
+    fn bearings_of_neighbours_and_of_the_interferer() {
         let mission = Mission::try_new(paper(1)).unwrap();
         let relay = Placement::on_line(350.0, 20.0);
         let receiver = Placement::on_line(1000.0, 0.0);

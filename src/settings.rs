@@ -401,7 +401,7 @@ mod tests {
     const RATES: [u32; 7] = [0, 300, 9_600, 57_600, 115_200, 250_000, 921_600];
 
     #[test]
-    fn a_preset_for_a_radio_has_the_timing_that_provisioning_asks_for() {
+    fn a_radio_preset_has_the_timing_that_provisioning_requires() {
         let usual = Settings::default();
         for baud in RATES {
             for in_range in [0, 1, 2, 5, 9, 10, 24, 25, 50, 100, 1_000] {

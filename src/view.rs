@@ -85,7 +85,7 @@ mod tests {
     use super::ViewId;
 
     #[test]
-    fn views_are_ordered_by_number_and_told_apart_by_who_proposed_them() {
+    fn views_are_ordered_by_number_then_by_proposer() {
         let first = ViewId::LOADED.next_by(1000).unwrap();
         let other = ViewId::LOADED.next_by(3).unwrap();
         let second = first.next_by(1).unwrap();

@@ -12,7 +12,7 @@ use uav_relay::asynch::{AsyncLink, AsyncPair, AsyncRelay, Clock};
 use uav_relay::serial::{Fault, Pair, SerialLink, SerialPort};
 use uav_relay::{Instant, MAX_FRAME, Mission, Phase, Relay, Settings};
 
-use super::counter::{instructions, relay, sends};
+use super::counter::{instructions, next_frame, relay};
 use super::missions::mission;
 
 /// Bit rate of the ports, bit/s.
@@ -90,9 +90,9 @@ impl Write for End<'_> {
     }
 }
 
-struct Still(Instant);
+struct FixedClock(Instant);
 
-impl Clock for Still {
+impl Clock for FixedClock {
     fn now(&self) -> Instant {
         self.0
     }
@@ -108,7 +108,7 @@ impl Clock for Still {
 }
 
 /// Returns relay 2 of 3, the first sweep message that relay 1 sends to it, its length, and the time.
-fn before() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
+fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
         predict: false,
@@ -120,13 +120,13 @@ fn before() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
         now = head.poll_timeout().unwrap_or(now);
         head.handle_timeout(now);
     }
-    let (frame, len) = sends(&mut head, now)?;
+    let (frame, len) = next_frame(&mut head, now)?;
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
 /// Measures the instructions for a sweep message through relay 2, by the blocking and the async runner.
 pub(crate) fn runners() {
-    let Some((mut middle, frame, len, now)) = before() else {
+    let Some((mut middle, frame, len, now)) = relay_and_sweep() else {
         return;
     };
     let (up, down) = (Memory::new(frame, len), Memory::new([0; MAX_FRAME], 0));
@@ -150,18 +150,18 @@ pub(crate) fn runners() {
     );
     let polled_size = size_of_val(&ports);
     hprintln!("polled_size {}", polled_size);
-    awaited();
+    async_runner();
 }
 
-fn awaited() {
-    let Some((mut middle, frame, len, now)) = before() else {
+fn async_runner() {
+    let Some((mut middle, frame, len, now)) = relay_and_sweep() else {
         return;
     };
     let (up, down) = (
         Memory::new([0; MAX_FRAME], 0),
         Memory::new([0; MAX_FRAME], 0),
     );
-    let time = Still(now);
+    let time = FixedClock(now);
     let relay = AsyncRelay::new(&mut middle);
     let mut ports = AsyncPair::new(
         AsyncLink::new(End(&up), End(&up), BAUD),

@@ -5,7 +5,7 @@ use cortex_m_semihosting::hprintln;
 use uav_relay::wire::message::MAX_BODY;
 use uav_relay::{Auth, Instant, Key, MAX_FRAME, Mission, Phase, Port, Relay, Settings};
 
-use super::counter::{instructions, relay, sends};
+use super::counter::{instructions, next_frame, relay};
 use super::missions::mission;
 
 pub(crate) const KEY: Key = Key::new([0xA5; 32]);
@@ -19,9 +19,9 @@ fn tag(body: usize) -> u32 {
 }
 
 /// Exchanges frames between two relays until neither has any to send.
-fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
+fn exchange_all(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     loop {
-        let (down, up) = (sends(upper, now), sends(lower, now));
+        let (down, up) = (next_frame(upper, now), next_frame(lower, now));
         if let Some((frame, len)) = down {
             lower.handle_bytes(now, Port::Upstream, frame.get(..len).unwrap_or_default());
         }
@@ -50,15 +50,15 @@ pub(crate) fn auth() {
     let mut tail = relay(3, settings, THREE);
     let start = Instant::ZERO;
     // The handshakes must end before the first sweep; those of the last relay go first.
-    settle(&mut middle, &mut tail, start);
-    settle(&mut head, &mut middle, start);
-    settle(&mut middle, &mut tail, start);
+    exchange_all(&mut middle, &mut tail, start);
+    exchange_all(&mut head, &mut middle, start);
+    exchange_all(&mut middle, &mut tail, start);
     let mut now = start;
     while head.phase() == Phase::Planning {
         now = head.poll_timeout().unwrap_or(now);
         head.handle_timeout(now);
     }
-    let Some((frame, len)) = sends(&mut head, now) else {
+    let Some((frame, len)) = next_frame(&mut head, now) else {
         return;
     };
     let bytes = frame.get(..len).unwrap_or_default();

@@ -30,7 +30,7 @@ pub(crate) fn relay(index: u16, settings: Settings, of: Mission) -> Relay {
 }
 
 /// Returns the next frame that `relay` sends, and its length; `None` if nothing is pending.
-pub(crate) fn sends(relay: &mut Relay, now: Instant) -> Option<([u8; MAX_FRAME], usize)> {
+pub(crate) fn next_frame(relay: &mut Relay, now: Instant) -> Option<([u8; MAX_FRAME], usize)> {
     let mut frame = [0; MAX_FRAME];
     let transmit = relay.poll_transmit(now, &mut frame)?;
     Some((frame, transmit.len))

@@ -14,13 +14,13 @@ mod counter;
 #[cfg(all(target_os = "none", feature = "async"))]
 mod flight;
 #[cfg(target_os = "none")]
+mod local_search;
+#[cfg(target_os = "none")]
 mod methods;
 #[cfg(target_os = "none")]
 mod missions;
 #[cfg(target_os = "none")]
 mod planning;
-#[cfg(target_os = "none")]
-mod shares;
 #[cfg(target_os = "none")]
 mod stack;
 #[cfg(target_os = "none")]
@@ -40,7 +40,7 @@ mod image {
     use stm32f4xx_hal as _;
     use uav_relay::Relay;
 
-    use super::{auth, counter, methods, planning, shares, stack, sweeps, upload};
+    use super::{auth, counter, local_search, methods, planning, stack, sweeps, upload};
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -57,7 +57,7 @@ mod image {
         sweeps::deframe();
         sweeps::sweep();
         sweeps::predict();
-        shares::shares();
+        local_search::local_search();
         methods::methods();
         planning::planning();
         planning::joint();

@@ -48,7 +48,7 @@ impl Flight {
 
     /// Runs the chain until all relays hold their positions, for at most `turns` rounds of timers. Returns true if
     /// they do.
-    fn settle(&mut self, turns: u32) -> bool {
+    fn run_until_holding(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {
             // In both directions, so that answers are delivered.
@@ -89,7 +89,7 @@ struct Flown {
 fn fly(mission: Mission, settings: Settings) -> Flown {
     let mut flight = Flight::new(mission, settings);
     Flown {
-        settled: u32::from(flight.settle(20_000)),
+        settled: u32::from(flight.run_until_holding(20_000)),
         most: flight.most,
         longest: flight.longest,
     }

@@ -32,7 +32,7 @@ pub(crate) fn planning() {
 /// Solves a chain of `relays` relays by the joint method, in several calls of the solver.
 ///
 /// Returns the total instructions, those of the most expensive call, and the number of calls.
-fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
+fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
     };
@@ -40,32 +40,32 @@ fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
         return (0, 0, 0);
     };
     let seat = Seat::common(&mission);
-    let (mut all, mut most, mut portions) = (0_u32, 0, 0);
+    let (mut total, mut longest_call, mut calls) = (0_u32, 0, 0);
     loop {
-        let mut over = false;
-        let cost = instructions(|| over = solver.step(&mission, |_| seat).is_ready());
-        all = all.saturating_add(cost);
-        most = most.max(cost);
-        portions += 1;
-        if over {
-            return (all, most, portions);
+        let mut is_finished = false;
+        let cost = instructions(|| is_finished = solver.step(&mission, |_| seat).is_ready());
+        total = total.saturating_add(cost);
+        longest_call = longest_call.max(cost);
+        calls += 1;
+        if is_finished {
+            return (total, longest_call, calls);
         }
     }
 }
 
 /// Measures the instructions of the joint method's solver alone, without messages between relays.
 pub(crate) fn joint() {
-    let (all, most, portions) = solved(&HIGH, 8);
-    hprintln!("solved_8 {}", all);
-    hprintln!("portion_8 {}", most);
-    hprintln!("portions_8 {}", portions);
-    let (all, most, portions) = solved(&HIGH, 50);
-    hprintln!("solved_50 {}", all);
-    hprintln!("portion_50 {}", most);
-    hprintln!("portions_50 {}", portions);
-    let (all, most, portions) = solved(&WIDE, 50);
-    hprintln!("solved_50_wide {}", all);
-    hprintln!("portion_50_wide {}", most);
-    hprintln!("portions_50_wide {}", portions);
+    let (total, longest_call, calls) = solve_instructions(&HIGH, 8);
+    hprintln!("solved_8 {}", total);
+    hprintln!("portion_8 {}", longest_call);
+    hprintln!("portions_8 {}", calls);
+    let (total, longest_call, calls) = solve_instructions(&HIGH, 50);
+    hprintln!("solved_50 {}", total);
+    hprintln!("portion_50 {}", longest_call);
+    hprintln!("portions_50 {}", calls);
+    let (total, longest_call, calls) = solve_instructions(&WIDE, 50);
+    hprintln!("solved_50_wide {}", total);
+    hprintln!("portion_50_wide {}", longest_call);
+    hprintln!("portions_50_wide {}", calls);
     hprintln!("size_of_solver {}", size_of::<Solver<100, 10>>());
 }

@@ -46,7 +46,7 @@ pub(crate) const PAINT: u32 = 0xC0FF_EE11;
 pub(crate) fn used_stack(work: impl FnOnce()) -> u32 {
     paint();
     work();
-    look()
+    unpainted_bytes()
 }
 
 /// Fills the stack that the next call will use with the pattern.
@@ -63,7 +63,7 @@ pub(crate) fn paint() {
 ///
 /// Its array lies where that of `paint` was, and is not written.
 #[inline(never)]
-pub(crate) fn look() -> u32 {
+pub(crate) fn unpainted_bytes() -> u32 {
     let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();
     let first = black_box(words.as_ptr().cast::<u32>());
     let untouched = (0..PAINTED)

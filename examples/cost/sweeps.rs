@@ -8,7 +8,7 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;
 use uav_relay::{Instant, MAX_FRAME, Mission, MissionConfig, Phase, Port, Settings};
 
-use super::counter::{instructions, relay, sends};
+use super::counter::{instructions, next_frame, relay};
 use super::missions::{INTERFERER, MISSION, mission};
 
 pub(crate) fn reach() {
@@ -82,7 +82,7 @@ pub(crate) fn sweep() {
     let (mut through, mut at_tail, mut back, mut next) = (0, 0, 0, 0);
     let mut longest = 0;
     while head.phase() == Phase::Waiting {
-        let Some((frame, len)) = sends(&mut head, now) else {
+        let Some((frame, len)) = next_frame(&mut head, now) else {
             break;
         };
         longest = longest.max(len);
@@ -96,7 +96,7 @@ pub(crate) fn sweep() {
         }));
         // The same frame through a clone, outside of the measurement.
         again.handle_bytes(now, Port::Upstream, bytes);
-        let Some((frame, len)) = sends(&mut again, now) else {
+        let Some((frame, len)) = next_frame(&mut again, now) else {
             break;
         };
         let bytes = frame.get(..len).unwrap_or_default();
@@ -145,7 +145,7 @@ pub(crate) fn deframe() {
         now = head.poll_timeout().unwrap_or(now);
         head.handle_timeout(now);
     }
-    let Some((frame, len)) = sends(&mut head, now) else {
+    let Some((frame, len)) = next_frame(&mut head, now) else {
         return;
     };
     let bytes = black_box(frame.get(..len).unwrap_or_default());

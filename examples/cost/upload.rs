@@ -4,7 +4,7 @@ use cortex_m_semihosting::hprintln;
 use uav_relay::{Auth, Ground, Instant, MAX_FRAME, Mission, Port, Settings, Side, Upload, Wiring};
 
 use super::auth::KEY;
-use super::counter::{instructions, relay, sends};
+use super::counter::{instructions, next_frame, relay};
 use super::missions::mission;
 
 /// Measures the instructions that relay 1 takes to accept a mission offered by a ground station. The offer is its own
@@ -38,9 +38,9 @@ pub(crate) fn upload() {
                 return;
             }
         }
-        let Some((said, len)) = sends(&mut relay, now) else {
+        let Some((frame, len)) = next_frame(&mut relay, now) else {
             return;
         };
-        ground.handle_bytes(said.get(..len).unwrap_or_default());
+        ground.handle_bytes(frame.get(..len).unwrap_or_default());
     }
 }

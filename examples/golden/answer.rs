@@ -3,7 +3,7 @@
 use uav_relay::optimiser::pass::Verdict;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
-use uav_relay::wire::message::{Answer, Message, MessageError};
+use uav_relay::wire::message::{Message, MessageError, SweepVerdict};
 
 /// First bytes that the golden firmware sends, once it can receive.
 pub const READY: &[u8] = b"ready\0";
@@ -50,7 +50,7 @@ impl Answerer {
         };
         say(&message);
         if let Message::Sweep(sweep) = message {
-            say(&Message::Verdict(Answer {
+            say(&Message::Verdict(SweepVerdict {
                 number: sweep.number,
                 view_digest: sweep.view_digest,
                 verdict: Verdict {

@@ -6,13 +6,15 @@ use std::process::ExitCode;
 use clap::Parser;
 use uav_relay_scenario::deployment::Deployment;
 
-use crate::config::{self, Beyond, Given};
+use crate::config::{self, FileOnlySettings, FileOptions};
 
 /// Parses the command line and the file named by `--config`. `section` adds the program's own section of that file.
 ///
 /// # Errors
 /// The exit status after `--help` or a mistake, which has been printed.
-pub fn read<T: Parser>(section: fn(&Deployment, &mut Given)) -> Result<(T, Beyond), ExitCode> {
+pub fn read<T: Parser>(
+    section: fn(&Deployment, &mut FileOptions),
+) -> Result<(T, FileOnlySettings), ExitCode> {
     let (words, beyond) = config::read::<T>(section).map_err(|line| refuse(&line))?;
     let options = T::try_parse_from(words).map_err(|error| {
         if !error.use_stderr() {

@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 1e-4;
 
 /// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
-pub struct Beyond {
+pub struct FileOnlySettings {
     /// Channel given by the file; `None` for the paper's channel.
     pub channel: Option<Channel>,
     /// Interference field given by the file, if any.
@@ -31,14 +31,15 @@ pub struct Beyond {
     pub overrides: Vec<Override>,
 }
 
-impl Beyond {
+impl FileOnlySettings {
     /// Rejects `--altitude` and `--uav-power` for a relay that has its own `[[relay]]` profile in the file. Relay
     /// `index` would ignore these options.
     ///
     /// # Errors
     /// One line that names the option and the file's table.
-    pub fn is_one_for_all(&self, index: u16) -> Result<(), String> {
-        let is_passed_over = |one: &&Override| one.is("--altitude") || one.is("--uav-power");
+    pub fn check_profile_options(&self, index: u16) -> Result<(), String> {
+        let is_passed_over =
+            |one: &&Override| one.has_name("--altitude") || one.has_name("--uav-power");
         self.overrides.iter().find(is_passed_over).map_or(Ok(()), |one| {
             Err(format!(
                 "{}: relay {index} has values of its own in a [[relay]] of --config; state it there",
@@ -54,27 +55,27 @@ pub struct Override {
     /// Option of the command line and its value, as one text.
     pub option: String,
     /// Value in the file that is overridden.
-    pub instead: String,
+    pub file_value: String,
     file: String,
 }
 
 impl Override {
     /// Returns true if the overriding option has this name.
     #[must_use]
-    pub fn is(&self, name: &str) -> bool {
+    pub fn has_name(&self, name: &str) -> bool {
         self.option.split(' ').next() == Some(name)
     }
 }
 
 /// Logs a line for each override, so that an ignored value of the file is noticed.
-pub fn tell(overrides: &[Override], log: &Log) {
+pub fn log_overrides(overrides: &[Override], log: &Log) {
     for one in overrides {
         let Override {
             option,
-            instead,
+            file_value: instead,
             file,
         } = one;
-        log.say(
+        log.event(
             Instant::ZERO,
             "override",
             json!({ "option": option, "instead_of": instead, "file": file }),
@@ -85,12 +86,12 @@ pub fn tell(overrides: &[Override], log: &Log) {
 
 /// Options given by the `--config` file: names and values; `None` for flags without a value.
 #[derive(Debug, Default)]
-pub struct Given {
+pub struct FileOptions {
     options: Vec<(&'static str, Option<OsString>)>,
     folder: PathBuf,
 }
 
-impl Given {
+impl FileOptions {
     /// Adds an option if the file has a value for it.
     pub fn value(&mut self, name: &'static str, value: Option<impl ToString>) {
         let value = value.map(|value| value.to_string().into());
@@ -120,13 +121,13 @@ impl Given {
 
     /// Refuses autopilot settings in the file when no autopilot is configured there or on the command line.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
-        let value_of = |name: &str| self.options.iter().find(|(option, _)| *option == name);
-        if value_of("--autopilot").is_some() || said(line, "--autopilot").is_some() {
+        let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
+        if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {
             return Ok(());
         }
-        let key = OF_AUTOPILOTS
+        let key = NEEDS_AUTOPILOT
             .iter()
-            .find_map(|(option, key)| Some((key, value_of(option)?.1.as_ref()?)));
+            .find_map(|(option, key)| Some((key, file_value(option)?.1.as_ref()?)));
         key.map_or(Ok(()), |(key, value)| {
             Err(format!(
                 "companion.{key} = {}: needs companion.autopilot, a tty or {FORM}; add that, or leave {key} out",
@@ -137,21 +138,21 @@ impl Given {
 
     /// Removes the file's options that the command line also gives or excludes. Returns the remaining options, and
     /// the removed ones with a different value as overrides.
-    fn less(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
+    fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {
-            let others = OTHERWISE
+            let others = EXCLUDES
                 .iter()
                 .filter(|(_, others)| others.contains(name))
                 .map(|(one, _)| *one);
-            let Some(said) = std::iter::once(*name)
+            let Some(overriding) = std::iter::once(*name)
                 .chain(others)
-                .find_map(|one| Some((one, said(line, one)?)))
+                .find_map(|one| Some((one, value_of(line, one)?)))
             else {
                 return true;
             };
             let value = value.as_ref().map(|value| value.to_string_lossy());
-            let (option, given) = said;
+            let (option, given) = overriding;
             let same = option == *name && is_same(&given, value.as_deref().unwrap_or_default());
             let instead = match value {
                 Some(value) if option == *name => value.into_owned(),
@@ -161,7 +162,7 @@ impl Given {
             if !same {
                 overrides.push(Override {
                     option: format!("{option} {given}"),
-                    instead,
+                    file_value: instead,
                     file: file.to_owned(),
                 });
             }
@@ -173,7 +174,7 @@ impl Given {
 
 /// Returns the command line's value for the option `name`; `None` without this option. The value is empty if nothing
 /// follows the option.
-fn said(line: &[OsString], name: &str) -> Option<String> {
+fn value_of(line: &[OsString], name: &str) -> Option<String> {
     let with_value = format!("{name}=");
     line.iter().enumerate().find_map(|(at, word)| {
         let word = word.to_string_lossy();
@@ -196,14 +197,14 @@ fn is_same(one: &str, other: &str) -> bool {
 }
 
 /// Options that need an autopilot, and the file's keys for them.
-const OF_AUTOPILOTS: [(&str, &str); 3] = [
+const NEEDS_AUTOPILOT: [(&str, &str); 3] = [
     ("--autopilot-baud", "autopilot_baud"),
     ("--autopilot-key-file", "autopilot_key_file"),
     ("--speed", "speed_m_s"),
 ];
 
 /// Command-line options, and the file's options that each of them excludes.
-const OTHERWISE: [(&str, &[&str]); 6] = [
+const EXCLUDES: [(&str, &[&str]); 6] = [
     ("--shared", &["--upstream", "--downstream"]),
     ("--upstream", &["--shared"]),
     ("--downstream", &["--shared"]),
@@ -228,25 +229,25 @@ const OTHERWISE: [(&str, &[&str]); 6] = [
 /// # Errors
 /// One line that says what is wrong with the file.
 pub fn read<T: Parser>(
-    section: fn(&Deployment, &mut Given),
-) -> Result<(Vec<OsString>, Beyond), String> {
+    section: fn(&Deployment, &mut FileOptions),
+) -> Result<(Vec<OsString>, FileOnlySettings), String> {
     let mut words = std::env::args_os();
     let program = words.next().unwrap_or_default();
     let line: Vec<OsString> = words.collect();
     let Some(file) = named(&line) else {
         return Ok((
             std::iter::once(program).chain(line).collect(),
-            Beyond::default(),
+            FileOnlySettings::default(),
         ));
     };
     let (scenario, deployment) =
         Deployment::load(&file).map_err(|error| format!("--config {error}"))?;
-    let mut given = Given {
+    let mut given = FileOptions {
         folder: file.parent().map(Path::to_owned).unwrap_or_default(),
-        ..Given::default()
+        ..FileOptions::default()
     };
     let has = T::command();
-    let beyond = flown(&scenario, &mut given)
+    let file_only = mission_options(&scenario, &mut given)
         .map_err(|error| format!("--config {}: {error}", file.display()))?;
     section(&deployment, &mut given);
     given.options.retain(|(name, _)| {
@@ -254,12 +255,12 @@ pub fn read<T: Parser>(
             .any(|arg| arg.get_long() == name.strip_prefix("--"))
     });
     let name = file.display().to_string();
-    let (given, mut overrides) = given.less(&line, &name);
-    if beyond.field.is_some() {
+    let (given, mut overrides) = given.without_overridden(&line, &name);
+    if file_only.field.is_some() {
         for option in ["--interferer", "--field"] {
-            overrides.extend(said(&line, option).map(|value| Override {
+            overrides.extend(value_of(&line, option).map(|value| Override {
                 option: format!("{option} {value}"),
-                instead: "[field]".to_owned(),
+                file_value: "[field]".to_owned(),
                 file: name.clone(),
             }));
         }
@@ -267,9 +268,9 @@ pub fn read<T: Parser>(
     given
         .has_autopilot(&line)
         .map_err(|error| format!("--config {name}: {error}"))?;
-    let beyond = Beyond {
+    let file_only = FileOnlySettings {
         overrides,
-        ..beyond
+        ..file_only
     };
     let words = given
         .options
@@ -277,7 +278,7 @@ pub fn read<T: Parser>(
         .flat_map(|(name, value)| std::iter::once(name.into()).chain(value));
     Ok((
         std::iter::once(program).chain(words).chain(line).collect(),
-        beyond,
+        file_only,
     ))
 }
 
@@ -292,7 +293,10 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
 }
 
 /// Adds the scenario's mission to `given` as options; returns the settings that have no option.
-fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
+fn mission_options(
+    scenario: &Scenario,
+    given: &mut FileOptions,
+) -> Result<FileOnlySettings, String> {
     // The mission is built for one relay, because the number of relays is in another section or on the command line.
     let (mission, profiles) =
         mission::mission(scenario, 1, TOLERANCE).map_err(|error| error.to_string())?;
@@ -338,11 +342,11 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
     let profiles = if scenario.relays.is_empty() {
         profiles
     } else {
-        let (_, all) = mission::mission(&unspaced(scenario), 1_000, TOLERANCE)
+        let (_, all) = mission::mission(&without_separation(scenario), 1_000, TOLERANCE)
             .map_err(|error| error.to_string())?;
         all
     };
-    Ok(Beyond {
+    Ok(FileOnlySettings {
         channel: Some(config.channel),
         field,
         profiles,
@@ -351,7 +355,7 @@ fn flown(scenario: &Scenario, given: &mut Given) -> Result<Beyond, String> {
 }
 
 /// Returns the scenario without a minimum separation, so that any number of relays fits.
-fn unspaced(scenario: &Scenario) -> Scenario {
+fn without_separation(scenario: &Scenario) -> Scenario {
     Scenario {
         min_separation_m: 0.0,
         ..scenario.clone()
@@ -359,7 +363,7 @@ fn unspaced(scenario: &Scenario) -> Scenario {
 }
 
 /// Adds the options of the file's `[network]` section, which every program reads.
-pub fn network(deployment: &Deployment, given: &mut Given) {
+pub fn network(deployment: &Deployment, given: &mut FileOptions) {
     let network = &deployment.network;
     given.value("--network", network.id);
     given.value("--of", network.relays);

@@ -46,20 +46,20 @@ const DAMAGED: u32 = 10;
 
 /// Detector of reasons for rejected frames. It has the counters at the last check, and the reasons already reported.
 #[derive(Debug, Default)]
-pub struct Refusals {
+pub struct RejectionReasons {
     last: Stats,
-    look_at: Instant,
-    told: [bool; 5],
+    check_at: Instant,
+    reported: [bool; 5],
 }
 
-impl Refusals {
+impl RejectionReasons {
     /// Returns a text for the next new reason of rejected frames; `None` if there is none. `signs` is true if this
     /// relay signs.
-    pub fn look(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
-        if now < self.look_at {
+    pub fn next_reason(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
+        if now < self.check_at {
             return None;
         }
-        self.look_at = now + EVERY;
+        self.check_at = now + EVERY;
         let last = core::mem::replace(&mut self.last, *stats);
         let more = |of: fn(&Stats) -> u32| of(stats).saturating_sub(of(&last));
         let whole = more(|stats| stats.received) + more(|stats| stats.handshakes);
@@ -101,6 +101,6 @@ impl Refusals {
         let new = |((is, count, why), told): ((bool, u32, &str), &mut bool)| {
             (is && !core::mem::replace(told, true)).then(|| format!("{count} frames {why}"))
         };
-        reasons.into_iter().zip(&mut self.told).find_map(new)
+        reasons.into_iter().zip(&mut self.reported).find_map(new)
     }
 }

@@ -52,7 +52,7 @@ impl InvalidLines {
         if self.0 == 1 {
             let text = String::from_utf8_lossy(line);
             let what = format_args!("{text:?} is not {expected}; further ones are only counted");
-            log.tell(now, event, what);
+            log.line(now, event, what);
         }
     }
 
@@ -70,14 +70,14 @@ const READS: usize = 16;
 pub struct Fifo {
     fd: OwnedFd,
     name: String,
-    begun: Begun,
+    partial_line: PartialLine,
 }
 
 /// Incomplete line, as received so far. It has at most one byte more than [`LONGEST`], which marks it as too long.
 #[derive(Debug, Default)]
-pub struct Begun(Vec<u8>);
+pub struct PartialLine(Vec<u8>);
 
-impl Begun {
+impl PartialLine {
     /// Appends received bytes, and passes each completed line to `line` without its line feed. Cuts a line to one
     /// byte more than [`LONGEST`].
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
@@ -109,7 +109,7 @@ impl Fifo {
         Ok(Self {
             fd,
             name,
-            begun: Begun::default(),
+            partial_line: PartialLine::default(),
         })
     }
 
@@ -130,7 +130,7 @@ impl Fifo {
                 _ => break,
             };
             let bytes = buffer.get(..count).unwrap_or_default();
-            self.begun.take(bytes, &mut line);
+            self.partial_line.take(bytes, &mut line);
         }
     }
 }

@@ -97,7 +97,7 @@ impl Log {
             file,
             path,
             torn: false,
-            told: 0,
+            reported_drops: 0,
             format: Arc::clone(&format),
             shared: Arc::clone(&shared),
         };
@@ -113,7 +113,7 @@ impl Log {
     }
 
     /// Logs an event at `now`: a short name, fields for programs, and a text for people.
-    pub fn say(&self, now: Instant, event: &str, fields: Value, text: impl fmt::Display) {
+    pub fn event(&self, now: Instant, event: &str, fields: Value, text: impl fmt::Display) {
         let line = self.format.line(now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
@@ -121,14 +121,14 @@ impl Log {
     }
 
     /// Logs an event without fields.
-    pub fn tell(&self, now: Instant, event: &str, text: impl fmt::Display) {
-        self.say(now, event, Value::Null, text);
+    pub fn line(&self, now: Instant, event: &str, text: impl fmt::Display) {
+        self.event(now, event, Value::Null, text);
     }
 
     /// Logs that frames are signed, with this epoch.
     pub fn signed(&self, epoch: u32) {
         let what = format_args!("frames are signed, epoch {epoch}");
-        self.say(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
+        self.event(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
     }
 
     /// Reopens the log file before the next line, for log rotation.
@@ -144,7 +144,7 @@ impl Log {
     /// Waits until all log lines are written, for at most the time `at_most`.
     pub fn flush(&self, at_most: Duration) {
         let end = Clock::now() + at_most;
-        let (done, heard) = sync_channel(1);
+        let (done, flushed) = sync_channel(1);
         while let Err(TrySendError::Full(_)) = self.orders.try_send(Order::Flush(done.clone())) {
             if Clock::now() >= end {
                 return;
@@ -152,7 +152,7 @@ impl Log {
             std::thread::sleep(Duration::from_millis(5));
         }
         let left = end.saturating_duration_since(Clock::now());
-        let heard = heard.recv_timeout(left);
+        let heard = flushed.recv_timeout(left);
         debug_assert!(heard != Err(RecvTimeoutError::Disconnected));
     }
 }
@@ -167,7 +167,7 @@ struct Writer {
     /// True if the last log line was written only in part.
     torn: bool,
     /// Number of dropped lines that have already been reported in the log.
-    told: u64,
+    reported_drops: u64,
     format: Arc<Format>,
     shared: Arc<Shared>,
 }
@@ -195,15 +195,15 @@ impl Writer {
         if self.torn {
             text.push('\n');
         }
-        if dropped > self.told {
-            let more = dropped - self.told;
+        if dropped > self.reported_drops {
+            let more = dropped - self.reported_drops;
             let fields = json!({ "dropped": dropped });
-            let said = format!("{more} lines dropped: the output was full or closed");
-            text += &self.format.line(now, "log", fields, &said);
+            let notice = format!("{more} lines dropped: the output was full or closed");
+            text += &self.format.line(now, "log", fields, &notice);
         }
         text += line;
         if self.put(text.as_bytes()) {
-            self.told = dropped;
+            self.reported_drops = dropped;
         } else {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }

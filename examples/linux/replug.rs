@@ -71,7 +71,7 @@ impl Replug {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
             let what = format_args!("{failure}; retried until it is back");
-            log.say(now, "port lost", self.fields(), what);
+            log.event(now, "port lost", self.fields(), what);
             self.tty = None;
             self.counts.times_gone = self.counts.times_gone.saturating_add(1);
             self.again_at = now + self.pause;
@@ -83,14 +83,14 @@ impl Replug {
             let what = format_args!(
                 "--capture cannot be written: {fault}; the capture ends, and everything else continues"
             );
-            log.say(now, "capture ended", fields, what);
+            log.event(now, "capture ended", fields, what);
         }
         if self.tty.is_none() && self.again_at <= now {
             self.pause = self.pause.times(2).min(LONGEST);
             self.again_at = now + self.pause;
             if let Ok(tty) = Tty::open(self.option, &self.path, self.baud) {
                 self.tty = Some(tty);
-                log.say(
+                log.event(
                     now,
                     "port back",
                     self.fields(),

@@ -91,12 +91,12 @@ impl Service {
         if std::mem::take(&mut self.hangup) {
             log.reopen();
             let what = format_args!("the log file was reopened; the {who} continues");
-            log.tell(time, "hang-up", what);
+            log.line(time, "hang-up", what);
         }
         if std::mem::take(&mut self.asks_status) {
             let status = answer(log, None);
             let text = status.to_string();
-            log.say(time, "status", status, text);
+            log.event(time, "status", status, text);
         }
         let socket = self.socket.as_mut();
         let (questions, again) = socket.map(|it| it.questions(time)).unwrap_or_default();

@@ -107,13 +107,13 @@ impl StoredFile {
         let (ended, mut end) = UnixStream::pair().map_err(named)?;
         ended.set_nonblocking(true).map_err(named)?;
         let (orders, taken) = sync_channel::<Vec<u8>>(1);
-        let (told, done) = sync_channel(1);
+        let (results, done) = sync_channel(1);
         let path = file.to_owned();
         let serve = move || {
             for bytes in taken {
                 let begun = Clock::now();
                 let result = replace(&path, &bytes);
-                if told.send((result, begun.elapsed())).is_err() {
+                if results.send((result, begun.elapsed())).is_err() {
                     return;
                 }
                 // It has room for this byte: the earlier one was read together with its result.
@@ -161,7 +161,7 @@ impl StoredFile {
         let mut bytes = [0; 8];
         let _ = (&self.ended).read(&mut bytes);
         if let Ok((result, took)) = self.done.try_recv() {
-            self.took(now, log, result, took);
+            self.on_written(now, log, result, took);
         }
         let is_due = !self.failing || self.again_at <= now;
         if is_due && (self.failing || self.tried != self.record) {
@@ -187,11 +187,11 @@ impl StoredFile {
         if self.writing.is_some()
             && let Ok((result, took)) = self.done.recv_timeout(LAST)
         {
-            self.took(now, log, result, took);
+            self.on_written(now, log, result, took);
         }
     }
 
-    fn took(&mut self, now: Instant, log: &Log, result: std::io::Result<()>, took: Span) {
+    fn on_written(&mut self, now: Instant, log: &Log, result: std::io::Result<()>, took: Span) {
         self.tried = self.writing.take();
         self.slowest = self.slowest.max(took);
         let was_failing = core::mem::replace(&mut self.failing, result.is_err());
@@ -212,7 +212,7 @@ impl StoredFile {
         };
         if self.failing != was_failing {
             let fields = json!({ "file": name, "failures": self.failures });
-            log.say(now, "file", fields, format_args!("{option} {name}: {text}"));
+            log.event(now, "file", fields, format_args!("{option} {name}: {text}"));
         }
     }
 

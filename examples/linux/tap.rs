@@ -17,9 +17,9 @@ use crate::log::Log;
 use crate::replug::Replug;
 
 /// Maximum number of reads and writes waiting to be captured; further ones are left out.
-const WAITING: usize = 1_024;
+const QUEUE: usize = 1_024;
 
-const MOST: u32 = 9_999;
+const MAX_CAPTURES: u32 = 9_999;
 
 /// Bytes that one call received or sent at port number `port`.
 struct Piece {
@@ -31,17 +31,17 @@ struct Piece {
 
 /// State of a capture, shared by the taps of all ports.
 #[derive(Debug, Default)]
-struct Fate {
+struct CaptureState {
     /// Error that ended the capture early.
     fault: OnceLock<String>,
-    is_told: AtomicBool,
+    is_reported: AtomicBool,
 }
 
 /// Tap of one port, which passes the port's traffic to the writer thread of the capture.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
-    fate: Arc<Fate>,
+    state: Arc<CaptureState>,
     sender: SyncSender<Piece>,
     left_out: u64,
     is_over: bool,
@@ -77,13 +77,13 @@ impl Tap {
     /// Returns the error that ended the capture. Further calls return `None`, also on other taps of that capture.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
-        let is_told = self.fate.is_told.swap(true, Ordering::Relaxed);
+        let was_reported = self.state.is_reported.swap(true, Ordering::Relaxed);
         let fault = self
-            .fate
+            .state
             .fault
             .get()
             .map_or("its writer thread has ended", |it| it);
-        (!is_told).then_some(fault)
+        (!was_reported).then_some(fault)
     }
 
     /// Returns the number of reads and writes left out of the capture, because its queue was full.
@@ -108,15 +108,15 @@ pub fn attach<'a>(
     let (file, path) = create(asked)?;
     let wrong = |error: io::Error| format!("--capture {}: {error}", path.display());
     let mut capture = Capture::new(BufWriter::new(file), program, "").map_err(wrong)?;
-    let (sender, receiver) = sync_channel(WAITING);
-    let fate = Arc::new(Fate::default());
+    let (sender, receiver) = sync_channel(QUEUE);
+    let state = Arc::new(CaptureState::default());
     let mut interfaces = Vec::new();
     for (port, tty) in ttys.enumerate() {
         let interface = capture.interface(&tty.to_string(), "").map_err(wrong)?;
         interfaces.push(interface);
         tty.tapped(Tap {
             port,
-            fate: Arc::clone(&fate),
+            state: Arc::clone(&state),
             sender: sender.clone(),
             left_out: 0,
             is_over: false,
@@ -126,13 +126,13 @@ pub fn attach<'a>(
     std::thread::spawn(move || {
         // The closed channel informs the taps.
         if let Err(error) = write(&mut capture, &interfaces, &receiver) {
-            _ = fate.fault.set(error.to_string());
+            _ = state.fault.set(error.to_string());
         }
     });
     if path != asked {
         let (name, asked) = (path.display().to_string(), asked.display());
         let what = format_args!("written to {name}, because {asked} holds an earlier capture");
-        log.say(Instant::ZERO, "capture", json!({ "file": name }), what);
+        log.event(Instant::ZERO, "capture", json!({ "file": name }), what);
     }
     Ok(())
 }
@@ -145,7 +145,7 @@ fn create(path: &Path) -> Result<(File, PathBuf), String> {
         let file = File::options().write(true).open(path).map_err(named)?;
         return Ok((file, path.to_owned()));
     }
-    for number in 1..=MOST {
+    for number in 1..=MAX_CAPTURES {
         let path = numbered(path, number);
         match File::options().write(true).create_new(true).open(&path) {
             Ok(file) => return Ok((file, path)),
@@ -154,7 +154,7 @@ fn create(path: &Path) -> Result<(File, PathBuf), String> {
         }
     }
     Err(format!(
-        "--capture {}: {MOST} captures of this name already exist: move them away",
+        "--capture {}: {MAX_CAPTURES} captures of this name already exist: move them away",
         path.display()
     ))
 }

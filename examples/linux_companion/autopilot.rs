@@ -20,9 +20,9 @@ use uav_relay::{Band, Event, Instant, Placement, Relay, Side, Sites};
 
 use crate::datagrams::Datagrams;
 use crate::lost;
-use crate::off_line::{Off, OffLineMonitor};
+use crate::off_line::{OffLineMonitor, OffLineReport};
 use crate::relay::seed;
-use crate::unanswered::{Answer, AnswerMonitor};
+use crate::unanswered::{AnswerMonitor, Received};
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 use uav_relay_scenario::endpoint::Endpoint;
@@ -36,12 +36,12 @@ const EVENT: &str = "autopilot";
 const LINK: u8 = 0;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) enum Where {
+pub(crate) enum AutopilotPort {
     Tty(PathBuf, u32),
     Udp(Endpoint),
 }
 
-impl fmt::Display for Where {
+impl fmt::Display for AutopilotPort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Tty(path, _) => write!(f, "--autopilot {}", path.display()),
@@ -61,7 +61,7 @@ impl fmt::Debug for SigningKey {
 
 #[derive(Clone, Debug)]
 pub(crate) struct AutopilotPlan {
-    pub(crate) place: Where,
+    pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
     /// Side of the neighbour that the antenna points to.
@@ -83,7 +83,7 @@ pub(crate) struct Companion {
     waiting: Vec<u8>,
     state: Option<&'static str>,
     answers: AnswerMonitor,
-    astray: OffLineMonitor,
+    off_line: OffLineMonitor,
     /// Numbers of lost relays that the operator has cleared over MAVLink, because they have landed. Not yet
     /// collected.
     cleared: Vec<u16>,
@@ -92,7 +92,7 @@ pub(crate) struct Companion {
 impl Companion {
     /// Opens the autopilot's port. This must succeed at the start, because a wrong name is a mistake.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
-        let port = port(&plan.place)?;
+        let port = port(&plan.port)?;
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
         let mut link = Autopilot::new(axis, plan.pace, now);
         link.set_seed(seed());
@@ -107,19 +107,19 @@ impl Companion {
             waiting: Vec::new(),
             state: None,
             answers: AnswerMonitor::new(now),
-            astray: OffLineMonitor::default(),
+            off_line: OffLineMonitor::default(),
             cleared: Vec::new(),
         })
     }
 
     /// Logs the autopilot's port, the drone's speed limit, and signing.
     pub(crate) fn started(&self, log: &Log) {
-        let (place, pace) = (&self.plan.place, self.plan.pace);
+        let (place, pace) = (&self.plan.port, self.plan.pace);
         let from = match place {
-            Where::Tty(..) => String::new(),
-            Where::Udp(endpoint) => format!(" from local port {}", endpoint.local),
+            AutopilotPort::Tty(..) => String::new(),
+            AutopilotPort::Udp(endpoint) => format!(" from local port {}", endpoint.local),
         };
-        log.tell(
+        log.line(
             Instant::ZERO,
             EVENT,
             format_args!(
@@ -129,7 +129,7 @@ impl Companion {
         );
         if self.plan.key.is_some() {
             let what = "frames to the autopilot are signed; frames that are not signed with the same key are ignored";
-            log.tell(Instant::ZERO, EVENT, what);
+            log.line(Instant::ZERO, EVENT, what);
         }
     }
 
@@ -137,7 +137,7 @@ impl Companion {
         let refused = self.link.refused();
         if refused > 0 {
             let what = format_args!("{refused} frames rejected because of their signatures");
-            log.tell(now, EVENT, what);
+            log.line(now, EVENT, what);
         }
     }
 
@@ -152,17 +152,17 @@ impl Companion {
             "flown": self.link.is_flown(),
             "frames_refused": self.link.refused(),
             "unanswered": self.answers.missing().map(|missing| self.unanswered(missing)),
-            "position": self.astray.status(),
+            "position": self.off_line.status(),
         })
     }
 
     /// Returns the drone's position relative to the line; `None` if it is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
-        self.astray.place(now)
+        self.off_line.place(now)
     }
 
     /// Exchanges bytes with the autopilot and data with the relay, and logs what has happened.
-    pub(crate) fn drive(&mut self, now: Instant, log: &Log, relay: &mut Relay) {
+    pub(crate) fn exchange(&mut self, now: Instant, log: &Log, relay: &mut Relay) {
         if let Port::Tty(tty) = &mut self.port {
             tty.tend(now, log);
         }
@@ -172,7 +172,7 @@ impl Companion {
             self.link.handle_bytes(now, bytes);
         }
         if let (_, Some(position)) = self.link.exchange(relay, now) {
-            self.astray.handle_place(now, position.place);
+            self.off_line.handle_place(now, position.place);
         }
         while let Some(frame) = self.link.poll_transmit(now) {
             self.send(&frame);
@@ -182,8 +182,8 @@ impl Companion {
         while let Some(event) = self.link.poll_event() {
             match event {
                 AutopilotEvent::OffLine(off_line) => {
-                    if let Some(off) = self.astray.is_off_line(sites, off_line) {
-                        self.tell_off(now, log, off);
+                    if let Some(off) = self.off_line.line_report(sites, off_line) {
+                        self.report_off_line(now, log, off);
                     }
                     continue;
                 }
@@ -191,10 +191,10 @@ impl Companion {
                 AutopilotEvent::LostCleared { relays, .. } => self.cleared.extend(numbers(relays)),
                 _ => {}
             }
-            said(now, log, event);
+            log_event(now, log, event);
         }
-        self.tell_unanswered(now, log);
-        self.tell_astray(now, log, sites, relay.mission().config().lateral);
+        self.log_unanswered(now, log);
+        self.check_fence(now, log, sites, relay.mission().config().lateral);
     }
 
     /// Returns and removes the numbers of lost relays that the operator has cleared over MAVLink.
@@ -204,37 +204,39 @@ impl Companion {
 
     /// Reports a drone far from the line between transmitter and receiver, if a report is due. It goes to the log,
     /// and may go to the operator.
-    fn tell_astray(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
+    fn check_fence(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
             State::Standby | State::Engaged | State::Blind => true,
         };
         let off_line = self.link.off_line(now);
-        let off = self.astray.look(now, sites, lateral, off_line, is_in_air);
+        let off = self
+            .off_line
+            .check(now, sites, lateral, off_line, is_in_air);
         if let Some(off) = off {
-            self.tell_off(now, log, off);
+            self.report_off_line(now, log, off);
         }
     }
 
-    fn tell_off(&mut self, now: Instant, log: &Log, off: Off) {
-        log.say(now, EVENT, off.fields(), off);
+    fn report_off_line(&mut self, now: Instant, log: &Log, off: OffLineReport) {
+        log.event(now, EVENT, off.fields(), off);
         if let Some(text) = off.for_operator() {
-            self.link.say(&text);
+            self.link.send_text(&text);
         }
     }
 
     /// Logs an autopilot that has not answered since the start, once for each kind of fault.
-    fn tell_unanswered(&mut self, now: Instant, log: &Log) {
-        let heard = self.heard();
-        if let Some(missing) = self.answers.look(now, heard) {
+    fn log_unanswered(&mut self, now: Instant, log: &Log) {
+        let received = self.received_kind();
+        if let Some(missing) = self.answers.check(now, received) {
             self.state = Some(word(State::Silent));
             let fields = json!({ "state": self.state });
-            log.say(now, EVENT, fields, self.unanswered(missing));
+            log.event(now, EVENT, fields, self.unanswered(missing));
         }
     }
 
     /// Returns the most specific kind of data received so far; `None` once the autopilot is found.
-    fn heard(&self) -> Option<Answer> {
+    fn received_kind(&self) -> Option<Received> {
         // A rejected signature is logged separately.
         if self.link.state() != State::Silent || self.link.refused() > 0 {
             return None;
@@ -244,44 +246,44 @@ impl Companion {
             Port::Udp(datagrams) => datagrams.bytes_in(),
         };
         Some(match (bytes, self.link.counters().frames) {
-            (0, _) => Answer::Nothing,
-            (_, 0) => Answer::Noise,
-            _ => Answer::Others,
+            (0, _) => Received::Nothing,
+            (_, 0) => Received::Noise,
+            _ => Received::Others,
         })
     }
 
     /// Returns the log line for a missing autopilot: the port, and what to check.
-    fn unanswered(&self, answer: Answer) -> String {
+    fn unanswered(&self, answer: Received) -> String {
         match (answer, &self.port) {
-            (Answer::Nothing, Port::Udp(datagrams)) => {
+            (Received::Nothing, Port::Udp(datagrams)) => {
                 format!("no answer at {}", datagrams.silence())
             }
-            (Answer::Nothing, Port::Tty(tty)) => format!(
+            (Received::Nothing, Port::Tty(tty)) => format!(
                 "no answer at {}, {} bit/s: is the autopilot on, is its TX wired to this RX and its RX to this TX, and is that its baud rate?",
                 tty.path().display(),
                 tty.baud()
             ),
-            (Answer::Noise, port) => format!(
+            (Received::Noise, port) => format!(
                 "the bytes received at {} are not MAVLink 2: {}, and is its protocol there MAVLink 2?",
-                self.plan.place,
+                self.plan.port,
                 match port {
                     Port::Udp(_) => "is that the autopilot's port".to_owned(),
                     Port::Tty(tty) => format!("is {} bit/s the autopilot's baud rate", tty.baud()),
                 }
             ),
-            (Answer::Others, _) => format!(
+            (Received::Others, _) => format!(
                 "no frame received at {} is from a PX4 or an ArduCopter: is that the port of the autopilot itself (component 1)?",
-                self.plan.place
+                self.plan.port
             ),
         }
     }
 
     /// Shows an event of the relay on the operator's ground station.
-    pub(crate) fn tell(&mut self, event: Event) {
+    pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);
     }
 
-    /// Returns the time by which [`drive`](Self::drive) must be called again.
+    /// Returns the time by which [`exchange`](Self::exchange) must be called again.
     pub(crate) fn wake(&self, now: Instant) -> Instant {
         let link = self.link.poll_timeout(now);
         let again = match &self.port {
@@ -334,7 +336,7 @@ impl Companion {
     }
 }
 
-fn said(now: Instant, log: &Log, event: AutopilotEvent) {
+fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
     let text = match event {
         AutopilotEvent::Found(Kind::Px4) => "found a PX4".to_owned(),
         AutopilotEvent::Found(Kind::ArduCopter) => "found an ArduCopter".to_owned(),
@@ -353,27 +355,27 @@ fn said(now: Instant, log: &Log, event: AutopilotEvent) {
                 State::Engaged => "setpoint control engaged",
                 State::Blind => "no position; keeps the last target",
             };
-            return log.say(now, EVENT, json!({ "state": word(state) }), what);
+            return log.event(now, EVENT, json!({ "state": word(state) }), what);
         }
         AutopilotEvent::Released(release) => {
             let (cause, mode) = (cause(release.cause), mode(release.mode));
             format!("released: {cause}; the mode is {mode}")
         }
-        AutopilotEvent::Waits(reason) => format!("cannot be engaged: {}", waits(reason)),
+        AutopilotEvent::Waits(reason) => format!("cannot be engaged: {}", wait_reason(reason)),
         AutopilotEvent::Ready => "ready: its pilot may choose OFFBOARD or GUIDED".to_owned(),
         AutopilotEvent::LostCleared { side, relays, from } => {
             let text = lost::cleared(numbers(relays), side);
-            return commanded(now, log, Ok(text), relays, from);
+            return log_command(now, log, Ok(text), relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
             let text = "the command must name all lost relays of one side, and no others";
-            return commanded(now, log, Err(text.to_owned()), relays, from);
+            return log_command(now, log, Err(text.to_owned()), relays, from);
         }
         AutopilotEvent::FenceBreached => "fence breached".to_owned(),
         AutopilotEvent::Mistrusted(why) => mistrusted(why).to_owned(),
         other => format!("{other:?}"),
     };
-    log.tell(now, EVENT, text);
+    log.line(now, EVENT, text);
 }
 
 fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
@@ -381,7 +383,7 @@ fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
 }
 
 /// Logs an operator's MAVLink command, its sender and its result.
-fn commanded(
+fn log_command(
     now: Instant,
     log: &Log,
     done: Result<String, String>,
@@ -417,7 +419,7 @@ const fn mode(mode: FlightMode) -> &'static str {
     }
 }
 
-const fn waits(reason: WaitReason) -> &'static str {
+const fn wait_reason(reason: WaitReason) -> &'static str {
     match reason {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
         WaitReason::Link => "messages from the autopilot arrive late",
@@ -468,10 +470,10 @@ fn stamp() -> Stamp {
     Stamp::of_unix_micros(u64::try_from(micros).unwrap_or(u64::MAX))
 }
 
-fn port(place: &Where) -> Result<Port, String> {
+fn port(place: &AutopilotPort) -> Result<Port, String> {
     match place {
-        Where::Tty(path, baud) => Replug::open("--autopilot", path, *baud).map(Port::Tty),
-        Where::Udp(endpoint) => Datagrams::open(endpoint)
+        AutopilotPort::Tty(path, baud) => Replug::open("--autopilot", path, *baud).map(Port::Tty),
+        AutopilotPort::Udp(endpoint) => Datagrams::open(endpoint)
             .map(Port::Udp)
             .map_err(|error| format!("{place}: {error}")),
     }

@@ -55,10 +55,10 @@ impl HoldReasonLog {
             let whom = node.map_or_else(|| "its neighbour".to_owned(), &name);
             let fields = json!({ "node": node, "reason": reason.map(word) });
             let text = match reason {
-                Some(reason) => format!("holds its position: {}", said(reason, &whom)),
+                Some(reason) => format!("holds its position: {}", describe(reason, &whom)),
                 None => format!("no longer waits for {whom}"),
             };
-            log.say(now, "waits", fields, text);
+            log.event(now, "waits", fields, text);
         }
         self.logged = reasons;
         None
@@ -77,7 +77,7 @@ pub(crate) const fn word(reason: HoldReason) -> &'static str {
     }
 }
 
-fn said(reason: HoldReason, whom: &str) -> String {
+fn describe(reason: HoldReason, whom: &str) -> String {
     match reason {
         HoldReason::Unheard => {
             format!("{whom} is not engaged, or has not reported its position yet")

@@ -30,7 +30,7 @@ impl Lost {
         }
     }
 
-    pub(crate) fn event(&mut self, event: Event) {
+    pub(crate) fn handle_event(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { node, .. } if (1..=self.relays).contains(&node) => {
                 self.nodes.insert(node);
@@ -99,7 +99,7 @@ impl Lost {
     }
 
     /// Forgets lost relays that the operator has cleared over MAVLink.
-    pub(crate) fn are_cleared(&mut self, named: &[u16]) {
+    pub(crate) fn remove_cleared(&mut self, named: &[u16]) {
         self.nodes.retain(|node| !named.contains(node));
     }
 
@@ -140,7 +140,7 @@ pub(crate) fn log_command(
     let (Ok(text) | Err(text)) = done;
     let fields = json!({ "command": command, "by": by });
     let line = format_args!("{text} (`{command}` by {by})");
-    log.say(now, event, fields, line);
+    log.event(now, event, fields, line);
     json!({ "done": is_done, "text": text })
 }
 
@@ -170,13 +170,13 @@ mod tests {
     use uav_relay::{Event, Side};
 
     #[test]
-    fn a_relay_is_lost_until_it_is_heard_again() {
+    fn a_relay_is_lost_until_it_is_received_again() {
         let mut lost = Lost::new(2, 4);
         let side = Side::Downstream;
         for node in [3, 4, 5] {
-            lost.event(Event::NeighbourLost { side, node });
+            lost.handle_event(Event::NeighbourLost { side, node });
         }
-        lost.event(Event::NeighbourBack { side, node: 3 });
+        lost.handle_event(Event::NeighbourBack { side, node: 3 });
         assert_eq!(
             lost.nodes().iter().collect::<Vec<_>>(),
             [&4],

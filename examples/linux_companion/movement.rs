@@ -53,17 +53,17 @@ impl Movement {
     }
 
     /// Handles a changed setpoint of `relay`; returns the line to log, if any.
-    pub(crate) fn changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
+    pub(crate) fn setpoint_changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
         if self.is_sparse {
             return self.next(now, relay.setpoint(), relay.agreed_place());
         }
         let setpoint = relay.setpoint()?;
-        self.log(setpoint);
+        self.set_logged(setpoint);
         Some(Step::Setpoint(setpoint))
     }
 
     /// Returns the line to log at `now` for a drone at `drone`, if any, and the time of the next check.
-    pub(crate) fn look(
+    pub(crate) fn poll(
         &mut self,
         now: Instant,
         relay: &Relay,
@@ -98,7 +98,7 @@ impl Movement {
             return None;
         };
         if self.logged.is_none_or(|it| apart_m(it, place) > STEP_M) {
-            self.log(place);
+            self.set_logged(place);
             return Some(Step::Setpoint(place));
         }
         let is_end = setpoint == agreed || now.since(self.changed_at) >= SETTLES;
@@ -112,7 +112,7 @@ impl Movement {
         None
     }
 
-    fn log(&mut self, place: Placement) {
+    fn set_logged(&mut self, place: Placement) {
         self.logged = Some(place);
         (self.is_moving, self.is_on_its_way) = (true, true);
         self.near_since = None;
@@ -145,12 +145,12 @@ impl Step {
     /// Writes this setpoint or arrival to the log. A setpoint has `x_m` metres from the transmitter toward the
     /// receiver, `y_m` to the right of that line seen from above, and `altitude_m` above the ground; each number also
     /// as the bits of its f32.
-    pub(crate) fn tell(self, now: Instant, log: &Log) {
+    pub(crate) fn log(self, now: Instant, log: &Log) {
         match self {
             Self::Setpoint(place) => {
                 let [x, y, altitude] = [place.x_m, place.y_m, place.altitude_m]
                     .map(|number| format!("{number:.3} (0x{:08x})", number.to_bits()));
-                log.say(
+                log.event(
                     now,
                     "setpoint",
                     at(place),
@@ -165,7 +165,7 @@ impl Step {
                 } = place;
                 let fields =
                     json!({ "x_m": x_m, "y_m": y_m, "altitude_m": altitude_m, "off_m": off_m });
-                log.say(
+                log.event(
                     now,
                     "arrived",
                     fields,

@@ -31,7 +31,7 @@ enum Kind {
 
 /// Report of a drone that is far from its line or outside its geofence.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Off {
+pub(crate) struct OffLineReport {
     kind: Kind,
     away_m: f64,
     outside_m: f64,
@@ -45,8 +45,8 @@ pub(crate) struct OffLineMonitor {
     newest: Option<(Instant, Placement)>,
     lines: Option<Lines>,
     away_m: Option<f64>,
-    off: Option<Off>,
-    fence_told_at: Option<Instant>,
+    report: Option<OffLineReport>,
+    reported_at: Option<Instant>,
 }
 
 impl OffLineMonitor {
@@ -60,20 +60,20 @@ impl OffLineMonitor {
     }
 
     /// Returns the report for a drone that the autopilot link has found far off the line between `sites`.
-    pub(crate) fn is_off_line(&mut self, sites: Sites, off_line: OffLine) -> Option<Off> {
+    pub(crate) fn line_report(&mut self, sites: Sites, off_line: OffLine) -> Option<OffLineReport> {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
     /// Returns the report of a drone outside its geofence, if one is due. Compares `off_line`, else the newest
     /// position, with the line between `sites` and the mission's `lateral` range.
-    pub(crate) fn look(
+    pub(crate) fn check(
         &mut self,
         now: Instant,
         sites: Sites,
         lateral: Band,
         off_line: Option<OffLine>,
         is_in_air: bool,
-    ) -> Option<Off> {
+    ) -> Option<OffLineReport> {
         let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
         let lines = self.lines(sites)?;
         let (away_m, off) = match (off_line, fresh) {
@@ -86,14 +86,14 @@ impl OffLineMonitor {
             }
             (None, None) => (None, None),
         };
-        (self.away_m, self.off) = (away_m, off);
+        (self.away_m, self.report) = (away_m, off);
         let off = off.filter(|off| off.kind == Kind::Fence)?;
         // No report on the ground: a drone may wait anywhere, and is flown to its line from beside it.
-        let is_due = self.fence_told_at.is_none_or(|at| now.since(at) >= AGAIN);
+        let is_due = self.reported_at.is_none_or(|at| now.since(at) >= AGAIN);
         if !is_in_air || !is_due {
             return None;
         }
-        self.fence_told_at = Some(now);
+        self.reported_at = Some(now);
         Some(off)
     }
 
@@ -108,11 +108,11 @@ impl OffLineMonitor {
     pub(crate) fn status(&self) -> Value {
         json!({
             "from_line_m": self.away_m,
-            "outside": self.off.map(|off| match off.kind {
+            "outside": self.report.map(|off| match off.kind {
                 Kind::Line => "line",
                 Kind::Fence => "geofence",
             }),
-            "sites_look_swapped": self.off.is_some_and(|off| off.is_swapped),
+            "sites_look_swapped": self.report.is_some_and(|off| off.is_swapped),
         })
     }
 }
@@ -121,7 +121,7 @@ impl OffLineMonitor {
 #[derive(Debug)]
 struct Lines {
     sites: Sites,
-    is: Axis,
+    axis: Axis,
     swapped: Option<Axis>,
 }
 
@@ -129,15 +129,15 @@ impl Lines {
     fn between(sites: Sites) -> Option<Self> {
         Some(Self {
             sites,
-            is: Axis::between(sites).ok()?,
+            axis: Axis::between(sites).ok()?,
             swapped: Axis::try_new(swapped(sites.tx), swapped(sites.rx)).ok(),
         })
     }
 
-    fn off_line(&self, OffLine { at, away_m }: OffLine) -> Off {
+    fn off_line(&self, OffLine { at, away_m }: OffLine) -> OffLineReport {
         let away_m = f64::from(away_m);
         let swapped = self.swapped.as_ref().and_then(|axis| axis.away_m(at));
-        Off {
+        OffLineReport {
             kind: Kind::Line,
             away_m,
             outside_m: away_m,
@@ -147,21 +147,21 @@ impl Lines {
 
     /// Returns the horizontal distance from a position to the line between the sites, m.
     fn away_m(&self, place: Placement) -> f64 {
-        let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
+        let along_m = beyond(place.x_m.into(), 0.0, self.axis.distance_m());
         along_m.hypot(place.y_m.into())
     }
 
     /// Returns a report if a drone at `place` is outside the geofence with the mission's `lateral` range. `None`
     /// inside, or up to [`FENCE_M`] outside.
-    fn off_fence(&self, place: Placement, lateral: Band) -> Option<Off> {
-        let along_m = beyond(place.x_m.into(), 0.0, self.is.distance_m());
+    fn off_fence(&self, place: Placement, lateral: Band) -> Option<OffLineReport> {
+        let along_m = beyond(place.x_m.into(), 0.0, self.axis.distance_m());
         let aside_m = beyond(
             place.y_m.into(),
             lateral.least_m.into(),
             lateral.most_m.into(),
         );
         let outside_m = along_m.hypot(aside_m);
-        (outside_m > FENCE_M).then_some(Off {
+        (outside_m > FENCE_M).then_some(OffLineReport {
             kind: Kind::Fence,
             away_m: self.away_m(place),
             outside_m,
@@ -175,11 +175,15 @@ fn beyond(value: f64, least: f64, most: f64) -> f64 {
     (least - value).max(value - most).max(0.0)
 }
 
-impl Off {
+impl OffLineReport {
     /// Returns the text for the operator's ground station, at most 50 bytes. `None` for reports that are only logged.
     pub(crate) fn for_operator(&self) -> Option<String> {
-        (self.kind == Kind::Line)
-            .then(|| format!("relay: the drone is {} from its line", Far(self.away_m)))
+        (self.kind == Kind::Line).then(|| {
+            format!(
+                "relay: the drone is {} from its line",
+                RoundedDistance(self.away_m)
+            )
+        })
     }
 
     pub(crate) fn fields(&self) -> Value {
@@ -187,9 +191,9 @@ impl Off {
     }
 }
 
-impl fmt::Display for Off {
+impl fmt::Display for OffLineReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let away = Far(self.away_m);
+        let away = RoundedDistance(self.away_m);
         write!(
             f,
             "the drone is {away} from the line between transmitter and receiver"
@@ -203,7 +207,7 @@ impl fmt::Display for Off {
                 write!(
                     f,
                     ", {} outside the mission's geofence",
-                    Far(self.outside_m)
+                    RoundedDistance(self.outside_m)
                 )
             }
         }
@@ -211,9 +215,9 @@ impl fmt::Display for Off {
 }
 
 /// Distance, m, displayed as m or km and rounded for people.
-struct Far(f64);
+struct RoundedDistance(f64);
 
-impl fmt::Display for Far {
+impl fmt::Display for RoundedDistance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let km = self.0 / 1e3;
         match km {
@@ -231,27 +235,27 @@ impl fmt::Display for Far {
 
 #[cfg(test)]
 mod tests {
-    use super::{Far, Kind, Lines, Off, OffLine};
+    use super::{Kind, Lines, OffLine, OffLineReport, RoundedDistance};
     use uav_relay::{Band, Geodetic, Sites};
 
     fn site(lat_deg: f64, lon_deg: f64) -> Geodetic {
         Geodetic::from_degrees(lat_deg, lon_deg, 420.0).expect("on earth")
     }
 
-    fn off(tx: Geodetic, rx: Geodetic, drone: Geodetic) -> Option<Off> {
+    fn off(tx: Geodetic, rx: Geodetic, drone: Geodetic) -> Option<OffLineReport> {
         let lateral = Band {
             least_m: -50.0,
             most_m: 0.0,
         };
         let lines = Lines::between(Sites { tx, rx })?;
-        let Some(place) = lines.is.place(drone) else {
-            return Some(lines.off_line(OffLine::new(drone, &lines.is)?));
+        let Some(place) = lines.axis.place(drone) else {
+            return Some(lines.off_line(OffLine::new(drone, &lines.axis)?));
         };
         lines.off_fence(place, lateral)
     }
 
     #[test]
-    fn a_distance_is_written_as_people_do() {
+    fn a_distance_is_rounded_to_two_digits_or_km() {
         for (m, text) in [
             (0.4, "0 m"),
             (312.4, "312 m"),
@@ -264,12 +268,12 @@ mod tests {
             (5_012_345.0, "5 012 km"),
             (20_003_900.0, "20 004 km"),
         ] {
-            assert_eq!(Far(m).to_string(), text);
+            assert_eq!(RoundedDistance(m).to_string(), text);
         }
     }
 
     #[test]
-    fn swapped_sites_are_asked_about_and_others_are_not() {
+    fn only_swapped_sites_are_reported_as_swapped() {
         let drone = site(47.405, 8.545);
         let swapped = off(site(8.54, 47.40), site(8.55, 47.41), drone).expect("off");
         assert!(swapped.kind == Kind::Line && swapped.is_swapped);
@@ -293,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn the_geofence_has_room_around_it() {
+    fn nothing_is_reported_up_to_100_m_outside_the_geofence() {
         let (tx, rx) = (site(47.40, 8.54), site(47.40, 8.55));
         // The line points east, so its left side is north: 50 m in the mission and 100 m of tolerance. 0.01 degrees of latitude
         // are 1112 m.

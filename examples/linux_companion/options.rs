@@ -13,9 +13,9 @@ use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::endpoint::{Endpoint, FORM};
 use uav_relay_scenario::key;
 
-use crate::autopilot::{AutopilotPlan, SigningKey, Where};
+use crate::autopilot::{AutopilotPlan, AutopilotPort, SigningKey};
 use uav_relay_linux::command::{self, named, number, whole};
-use uav_relay_linux::config::{self, Beyond, Given, Override};
+use uav_relay_linux::config::{self, FileOnlySettings, FileOptions, Override};
 use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{self, Method, MissionOptions};
 use uav_relay_linux::site::SiteOptions;
@@ -198,7 +198,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
 }
 
 /// Adds the options of the file's sections `[network]` and `[companion]`.
-fn section(deployment: &Deployment, given: &mut Given) {
+fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.companion;
     given.value("--index", own.index);
@@ -220,7 +220,7 @@ fn section(deployment: &Deployment, given: &mut Given) {
     given.path("--capture", own.capture.as_ref());
 }
 
-fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
+fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
     let Options { index, of, .. } = options;
     if index > of {
         return Err(format!(
@@ -237,14 +237,14 @@ fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
     let wiring = wiring(&options)?;
     let load = match wiring {
         Wiring::Pair => ChannelLoad::of_radios(1),
-        Wiring::Shared => carried(&options)?,
+        Wiring::Shared => channel_load(&options)?,
     };
-    let mission = mission(&options, &beyond)?;
-    let mut profiles = beyond.profiles.iter();
+    let mission = mission(&options, &file_only)?;
+    let mut profiles = file_only.profiles.iter();
     let own = profiles.find(|(of, _)| *of == index);
     let profile = own.map_or(mission.config().common, |(_, profile)| *profile);
     if own.is_some() {
-        beyond.is_one_for_all(index)?;
+        file_only.check_profile_options(index)?;
     }
     let guard = GuardConfig {
         hover_m: options.position_error,
@@ -274,7 +274,7 @@ fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
         settings,
         key: key.transpose()?.map(SigningKey),
         autopilot: autopilot(&options)?,
-        overrides: beyond.overrides,
+        overrides: file_only.overrides,
         options,
     })
 }
@@ -285,14 +285,14 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
         return Ok(None);
     };
     let place = match Endpoint::parse(name) {
-        Some(Ok(endpoint)) => Where::Udp(endpoint),
+        Some(Ok(endpoint)) => AutopilotPort::Udp(endpoint),
         Some(Err(error)) => return Err(format!("--autopilot {name}: {error}; must be {FORM}")),
-        None => Where::Tty(PathBuf::from(name), options.autopilot_baud),
+        None => AutopilotPort::Tty(PathBuf::from(name), options.autopilot_baud),
     };
     let key = options.autopilot_key_file.as_deref();
     let key = key.map(|file| key::load("--autopilot-key-file", file));
     Ok(Some(AutopilotPlan {
-        place,
+        port: place,
         sites,
         pace: Pace::of_speed(options.speed),
         antenna: options.antenna.map(|antenna| match antenna {
@@ -304,7 +304,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
 }
 
 /// Returns the load of the shared radio channel, and checks that the channel can carry all relays.
-fn carried(options: &Options) -> Result<ChannelLoad, String> {
+fn channel_load(options: &Options) -> Result<ChannelLoad, String> {
     let load = ChannelLoad::of_radios(options.of);
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
         .map_err(|full| {
@@ -340,9 +340,9 @@ fn wiring(options: &Options) -> Result<Wiring, String> {
     Ok(Wiring::Pair)
 }
 
-fn mission(options: &Options, beyond: &Beyond) -> Result<Mission, String> {
+fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, String> {
     let given = &options.mission;
-    let field = options.field.map(Interference::Field).or(beyond.field);
+    let field = options.field.map(Interference::Field).or(file_only.field);
     let interference = given.interference(field);
     if interference == Interference::Unknown && !options.listen.listen {
         return Err("--interferer unknown: must be P,X,Y without --listen".to_owned());
@@ -354,7 +354,7 @@ fn mission(options: &Options, beyond: &Beyond) -> Result<Mission, String> {
             method.as_ref().map_or("", |method| method.get_name())
         ));
     }
-    let config = given.config(options.of, interference, beyond.channel)?;
+    let config = given.config(options.of, interference, file_only.channel)?;
     mission::mission(config, "--")
 }
 

@@ -33,22 +33,22 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the drone's newest position received since the last call. Passes measurements to `heard` and logs the
+    /// Returns the drone's newest position received since the last call. Passes measurements to `on_sample` and logs the
     /// first invalid line. Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
         log: &Log,
-        heard: &mut impl FnMut(Sample),
+        on_sample: &mut impl FnMut(Sample),
     ) -> Option<Placement> {
         let mut newest = None;
         let Self {
             fifo, listens, bad, ..
         } = self;
-        fifo.read(|line| match news(line) {
+        fifo.read(|line| match parse_line(line) {
             Some((place, sample)) if *listens || sample.is_none() => {
                 newest = place.or(newest);
-                sample.into_iter().for_each(&mut *heard);
+                sample.into_iter().for_each(&mut *on_sample);
             }
             _ => {
                 let power = format!(" [POWER] or receiver POWER, {POWER}");
@@ -67,14 +67,14 @@ impl Positions {
         fresh.map(|(_, place)| place)
     }
 
-    pub(crate) const fn bad(&self) -> u64 {
+    pub(crate) const fn invalid_lines(&self) -> u64 {
         self.bad.count()
     }
 
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
-        let bad = self.bad();
+        let bad = self.invalid_lines();
         if bad > 0 {
-            log.tell(now, "position", format_args!("{bad} invalid lines"));
+            log.line(now, "position", format_args!("{bad} invalid lines"));
         }
     }
 }
@@ -84,15 +84,15 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
         let what = format_args!("setpoints keep drones apart while they move, by {fifo}");
-        log.tell(now, "guarded", what);
+        log.line(now, "guarded", what);
     } else {
         let what = "no --positions: drones are not kept apart while they move";
-        log.tell(now, "unguarded", what);
+        log.line(now, "unguarded", what);
     }
 }
 
 /// Parses a line: a position with or without a measured power, or the word `receiver` and a power.
-fn news(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
+fn parse_line(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
     let words = lines::words(text)?;
     let number = |word: &str| word.parse::<f32>().ok().filter(|number| number.is_finite());
     if let ["receiver", power @ ..] = words.as_slice() {

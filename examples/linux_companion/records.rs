@@ -52,7 +52,7 @@ pub(crate) fn resume_views(
 ///
 /// An unusable file is logged and ignored.
 pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, log: &Log) -> bool {
-    let resumed = held(file, mission).and_then(|upload| match upload {
+    let resumed = load_upload(file, mission).and_then(|upload| match upload {
         Some(upload) => match relay.resume(&upload) {
             Ok(()) => Ok(true),
             Err(error) => Err(format!("{UPLOADS}: {error}")),
@@ -60,12 +60,12 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
         None => Ok(false),
     });
     resumed.unwrap_or_else(|why| {
-        log.tell(Instant::ZERO, "file", format_args!("{why}; not used"));
+        log.line(Instant::ZERO, "file", format_args!("{why}; not used"));
         false
     })
 }
 
-fn held(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
+fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
     let named = |error: &str| format!("{UPLOADS} {}: {error}", file.display());
     let Some(bytes) = load(UPLOADS, file)? else {
         return Ok(None);

@@ -14,7 +14,7 @@ use crate::ports::Ports;
 use crate::positions::Positions;
 use crate::report::Report;
 use crate::{positions, records, status};
-use uav_relay_linux::counters::Refusals;
+use uav_relay_linux::counters::RejectionReasons;
 use uav_relay_linux::log::Source;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::{StoredFile, next_epoch};
@@ -30,8 +30,8 @@ struct Flight {
     /// File with the relay's votes. The next field is the file with the newest uploaded mission.
     views: Option<StoredFile>,
     uploads: Option<StoredFile>,
-    refusals: Refusals,
-    waits: HoldReasonLog,
+    rejections: RejectionReasons,
+    hold_reasons: HoldReasonLog,
     lost: Lost,
     signs: bool,
 }
@@ -98,7 +98,7 @@ impl Flight {
         let uploads = file.map(records::uploads).transpose()?;
         let views = options.view_file.as_deref();
         let views = views.map(|file| records::resume_views(file, &mut relay, now));
-        let (mut views, stands_by) = views.transpose()?.unzip();
+        let (mut views, has_votes) = views.transpose()?.unzip();
         // Last of the steps that may fail, so that repeated failing starts leave no files.
         if let Some(asked) = &options.capture {
             tap::attach(&log, env!("CARGO_BIN_NAME"), asked, ports.ttys())?;
@@ -107,12 +107,12 @@ impl Flight {
             log.clone(),
             plan.identity,
             &plan.mission,
-            plan.settings.guard.map(|guard| guard.fence),
+            plan.settings.guard.map(|guard| guard.geofence),
             plan.autopilot.is_some(),
         );
         report.started(&ports.names(), options.baud);
-        config::tell(&plan.overrides, &log);
-        report.signs(auth.map(|auth| auth.epoch));
+        config::log_overrides(&plan.overrides, &log);
+        report.signing(auth.map(|auth| auth.epoch));
         match &autopilot {
             Some(autopilot) => autopilot.started(&log),
             None => positions::started(&log, positions.as_ref()),
@@ -120,8 +120,8 @@ impl Flight {
         if resumed {
             report.resumed(&relay);
         }
-        if stands_by == Some(true) {
-            report.stands_by();
+        if has_votes == Some(true) {
+            report.votes_restored();
         } else if let Some(views) = &mut views {
             // Written at once, so that a failure of the disk is reported before flight.
             views.store(&relay.view_record().to_bytes());
@@ -135,8 +135,8 @@ impl Flight {
             autopilot,
             views,
             uploads,
-            refusals: Refusals::default(),
-            waits: HoldReasonLog::default(),
+            rejections: RejectionReasons::default(),
+            hold_reasons: HoldReasonLog::default(),
             lost: Lost::new(plan.identity.index, plan.mission.relays()),
             signs: auth.is_some(),
         })
@@ -149,15 +149,15 @@ impl Flight {
         let log = &service.log;
         let mut drone = None;
         if let Some(positions) = &mut self.positions {
-            let mut heard = |sample| relay.handle_sample(time, sample);
-            if let Some(place) = positions.newest(time, log, &mut heard) {
+            let mut on_sample = |sample| relay.handle_sample(time, sample);
+            if let Some(place) = positions.newest(time, log, &mut on_sample) {
                 relay.handle_position(time, place, time);
             }
             drone = positions.place(time);
         }
         if let Some(autopilot) = &mut self.autopilot {
-            autopilot.drive(time, log, relay);
-            self.lost.are_cleared(&autopilot.take_cleared());
+            autopilot.exchange(time, log, relay);
+            self.lost.remove_cleared(&autopilot.take_cleared());
             drone = autopilot.place(time);
         }
         let reopen = self.ports.tend(time, log);
@@ -175,27 +175,27 @@ impl Flight {
                 records::store_upload(uploads, upload);
             }
             if let Some(autopilot) = &mut self.autopilot {
-                autopilot.tell(event);
+                autopilot.handle_event(event);
             }
-            self.lost.event(event);
+            self.lost.handle_event(event);
             self.report.event(time, event, relay);
         }
-        let moves = self.report.look(time, relay, drone);
+        let moves = self.report.log_movement(time, relay, drone);
         let uploads = self.uploads.as_mut();
         let uploads = uploads.and_then(|file| file.tend(time, log));
-        if let Some(why) = self.refusals.look(time, relay.stats(), self.signs) {
-            log.tell(time, "rejected", why);
+        if let Some(why) = self.rejections.next_reason(time, relay.stats(), self.signs) {
+            log.line(time, "rejected", why);
         }
         let name = |node| self.report.name(node);
-        let waits = self.waits.tend(time, log, relay, name);
+        let waits = self.hold_reasons.tend(time, log, relay, name);
         let again = self.autopilot.as_ref().map(|it| it.wake(service.now()));
-        let alive = self.tell(time);
+        let alive = self.serve_status(time);
         let wakes = [wake, again, reopen, alive, waits, moves, retry, uploads];
         self.sleep(wakes.into_iter().flatten().min())
     }
 
     /// Handles signals and status requests; returns the time by which the next call is due.
-    fn tell(&mut self, time: Instant) -> Option<Instant> {
+    fn serve_status(&mut self, time: Instant) -> Option<Instant> {
         let Self {
             service,
             relay,
@@ -217,7 +217,7 @@ impl Flight {
                 "relay": status::of_relay(relay, index, lost, |node| report.name(node)),
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
-                "positions_refused": self.positions.as_ref().map(Positions::bad),
+                "positions_refused": self.positions.as_ref().map(Positions::invalid_lines),
                 "view_file_writes": views.map_or(0, StoredFile::writes),
                 "view_file_slowest_ms": views.map_or(0.0, StoredFile::slowest_ms),
                 "view_file_failures": views.map_or(0, StoredFile::failures),

@@ -65,7 +65,7 @@ impl Report {
         } else {
             ttys.join(", ")
         };
-        self.log.say(
+        self.log.event(
             Instant::ZERO,
             "started",
             json!({
@@ -79,10 +79,10 @@ impl Report {
     }
 
     /// Logs the signing epoch, or that frames are not signed.
-    pub(crate) fn signs(&self, epoch: Option<u32>) {
+    pub(crate) fn signing(&self, epoch: Option<u32>) {
         match epoch {
             Some(epoch) => self.log.signed(epoch),
-            None => self.log.tell(
+            None => self.log.line(
                 Instant::ZERO,
                 "unsigned",
                 "no --key-file: frames are not signed, and anybody in range can send frames",
@@ -93,7 +93,7 @@ impl Report {
     /// Logs that the relay flies a mission uploaded before this start.
     pub(crate) fn resumed(&self, relay: &Relay) {
         let version = relay.version();
-        self.log.say(
+        self.log.event(
             Instant::ZERO,
             "resumed",
             json!({ "version": version }),
@@ -102,8 +102,8 @@ impl Report {
     }
 
     /// Logs that the relay's votes on the chain's membership were restored from an earlier start.
-    pub(crate) fn stands_by(&self) {
-        self.log.tell(
+    pub(crate) fn votes_restored(&self) {
+        self.log.line(
             Instant::ZERO,
             "restored",
             "this relay's earlier votes on views were read from --view-file; remove that file before another flight",
@@ -111,11 +111,11 @@ impl Report {
     }
 
     pub(crate) fn event(&mut self, now: Instant, event: Event, relay: &Relay) {
-        let tell = |word: &str, text: &str| self.log.tell(now, word, text);
+        let tell = |word: &str, text: &str| self.log.line(now, word, text);
         match event {
             Event::SetpointChanged => {
-                if let Some(step) = self.movement.changed(now, relay) {
-                    step.tell(now, &self.log);
+                if let Some(step) = self.movement.setpoint_changed(now, relay) {
+                    step.log(now, &self.log);
                 }
             }
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
@@ -124,7 +124,7 @@ impl Report {
                 "no target SIR can be met; all relays keep their positions",
             ),
             Event::Adopted => self.adopted(now, relay),
-            Event::ViewAccepted => self.reformed(now, relay),
+            Event::ViewAccepted => self.view_accepted(now, relay),
             Event::NewEstimate => self.log_estimate(now, relay.interference_estimate()),
             Event::LeaseLapsed => tell(
                 "lease expired",
@@ -137,7 +137,7 @@ impl Report {
             Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {
                 let version = relay.upload().map_or(0, Upload::version);
-                self.log.say(
+                self.log.event(
                     now,
                     "uploaded",
                     json!({ "version": version }),
@@ -148,20 +148,20 @@ impl Report {
                 "interferer unclear",
                 "the measurements do not fit one interferer on the ground, or are too few; the last estimate is kept",
             ),
-            other => self.of_a_node(now, other, relay),
+            other => self.node_event(now, other, relay),
         }
     }
 
     /// Logs a setpoint or the arrival of a drone at `drone`, if due; returns the time of the next check.
-    pub(crate) fn look(
+    pub(crate) fn log_movement(
         &mut self,
         now: Instant,
         relay: &Relay,
         drone: Option<Placement>,
     ) -> Option<Instant> {
-        let (step, again) = self.movement.look(now, relay, drone);
+        let (step, again) = self.movement.poll(now, relay, drone);
         if let Some(step) = step {
-            step.tell(now, &self.log);
+            step.log(now, &self.log);
         }
         again
     }
@@ -173,14 +173,14 @@ impl Report {
             (LineError::Altitude, Some(of)) => [of.least_altitude_m, of.most_altitude_m],
             (LineError::Lateral, Some(of)) => [of.least_y_m, of.most_y_m],
             (LineError::Length, Some(of)) => [of.least_x_m, of.most_x_m],
-            _ => return self.log.tell(now, EVENT, why),
+            _ => return self.log.line(now, EVENT, why),
         };
         let what = format_args!("{why}, {} to {} m", range_m[0], range_m[1]);
         self.log
-            .say(now, EVENT, json!({ "range_m": range_m }), what);
+            .event(now, EVENT, json!({ "range_m": range_m }), what);
     }
 
-    fn of_a_node(&self, now: Instant, event: Event, relay: &Relay) {
+    fn node_event(&self, now: Instant, event: Event, relay: &Relay) {
         let (node, side) = match event {
             Event::NeighbourLost { side, node } | Event::NeighbourBack { side, node } => {
                 (node, Some(side))
@@ -191,12 +191,12 @@ impl Report {
             | Event::EpochWentBack { node }
             | Event::DuplicateIndex { node }
             | Event::SensorOff { node } => (node, None),
-            other => return self.log.tell(now, "event", format_args!("{other:?}")),
+            other => return self.log.line(now, "event", format_args!("{other:?}")),
         };
         let name = self.name(node);
         let stream = side.map_or("", stream);
         let fields = json!({ "node": node, "name": name, "side": side.map(|_| stream) });
-        let say = |word: &str, text: fmt::Arguments<'_>| self.log.say(now, word, fields, text);
+        let say = |word: &str, text: fmt::Arguments<'_>| self.log.event(now, word, fields, text);
         match event {
             Event::NeighbourLost { .. } => say(
                 "lost",
@@ -215,7 +215,7 @@ impl Report {
                 "mismatch",
                 format_args!(
                     "{name} has another mission than this relay, which has 0x{:04x}; load the same mission into both",
-                    self.flown(relay)
+                    self.mission_digest(relay)
                 ),
             ),
             Event::KeyMismatch { .. } => say(
@@ -250,7 +250,7 @@ impl Report {
     }
 
     pub(crate) fn stopped(&self, now: Instant, stats: &Stats) {
-        self.log.say(
+        self.log.event(
             now,
             "stopped",
             counted(stats),
@@ -280,7 +280,7 @@ impl Report {
     }
 
     /// Returns the digest of the mission that the relay flies, which is the loaded or an uploaded one.
-    fn flown(&self, relay: &Relay) -> u16 {
+    fn mission_digest(&self, relay: &Relay) -> u16 {
         match relay.upload() {
             Some(upload) if relay.version() == upload.version() => upload.id().digest,
             _ => self.digest,
@@ -294,14 +294,14 @@ impl Report {
         let sites = relay.sites();
         let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
         let what = format_args!("the chain flies version {version} of the mission{sites}");
-        self.log.say(now, "adopted", fields, what);
+        self.log.event(now, "adopted", fields, what);
     }
 
-    fn reformed(&self, now: Instant, relay: &Relay) {
+    fn view_accepted(&self, now: Instant, relay: &Relay) {
         // The number of a drone never changes; its place in the chain does when a relay before it is lost.
         let (place, relays) = (relay.index(), relay.mission().relays());
         let view = relay.view().number();
-        self.log.say(
+        self.log.event(
             now,
             "view accepted",
             json!({ "place": place, "relays": relays, "view": view }),
@@ -314,16 +314,16 @@ impl Report {
         let fields = json!({ "target_sir": target, "target_sir_db": db });
         if target > 0.0 {
             let text = format_args!("target SIR {:.6}, {db:.3} dB", Exact(target));
-            self.log.say(now, "converged", fields, text);
+            self.log.event(now, "converged", fields, text);
         } else {
             let text = "the relays spread along the line to measure the interferer";
-            self.log.say(now, "converged", fields, text);
+            self.log.event(now, "converged", fields, text);
         }
     }
 
     fn log_estimate(&self, now: Instant, numbered: NumberedEstimate) {
         match numbered.estimate {
-            InterferenceEstimate::Source { source, receiver_w } => self.log.say(
+            InterferenceEstimate::Source { source, receiver_w } => self.log.event(
                 now,
                 "estimate",
                 json!({
@@ -344,11 +344,11 @@ impl Report {
                 };
                 let what =
                     format_args!("interference unknown; the relays spread {spread} to measure it");
-                self.log.tell(now, "estimate", what);
+                self.log.line(now, "estimate", what);
             }
             InterferenceEstimate::Mission => {
                 let what = "the chain uses the interferer of the mission";
-                self.log.tell(now, "estimate", what);
+                self.log.line(now, "estimate", what);
             }
         }
     }

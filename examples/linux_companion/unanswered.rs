@@ -3,11 +3,11 @@
 use uav_relay::{Duration, Instant};
 
 /// Time that an autopilot has to answer before it is reported. It sends a HEARTBEAT every second.
-const PATIENCE: Duration = Duration::from_millis(3_000);
+const ANSWER_TIMEOUT: Duration = Duration::from_millis(3_000);
 
 /// Kind of the data received from the autopilot's port since the start; the most specific kind counts.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(crate) enum Answer {
+pub(crate) enum Received {
     /// No byte has been received from the autopilot's port.
     Nothing,
     /// Bytes were received, but no intact MAVLink 2 frame.
@@ -20,23 +20,23 @@ pub(crate) enum Answer {
 pub(crate) struct AnswerMonitor {
     /// Kind of the data received so far (the most specific), and the time of its first receipt. `None` once the
     /// autopilot is found.
-    newest: Option<(Answer, Instant)>,
-    told: Option<Answer>,
+    newest: Option<(Received, Instant)>,
+    reported: Option<Received>,
 }
 
 impl AnswerMonitor {
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
-            newest: Some((Answer::Nothing, now)),
-            told: None,
+            newest: Some((Received::Nothing, now)),
+            reported: None,
         }
     }
 
     /// Handles the most specific kind of data received so far. `None` means that the autopilot was found. Returns a
     /// fault to report, once for each kind.
-    pub(crate) fn look(&mut self, now: Instant, heard: Option<Answer>) -> Option<Answer> {
+    pub(crate) fn check(&mut self, now: Instant, received: Option<Received>) -> Option<Received> {
         let (answer, since) = self.newest?;
-        let Some(heard) = heard else {
+        let Some(heard) = received else {
             self.newest = None;
             return None;
         };
@@ -44,20 +44,20 @@ impl AnswerMonitor {
             self.newest = Some((heard, now));
             return None;
         }
-        if self.told >= Some(answer) || now.since(since) < PATIENCE {
+        if self.reported >= Some(answer) || now.since(since) < ANSWER_TIMEOUT {
             return None;
         }
-        self.told = Some(answer);
-        self.told
+        self.reported = Some(answer);
+        self.reported
     }
 
     /// Returns the fault that was reported, while no autopilot is found.
-    pub(crate) fn missing(&self) -> Option<Answer> {
-        self.newest.and(self.told)
+    pub(crate) fn missing(&self) -> Option<Received> {
+        self.newest.and(self.reported)
     }
 
     pub(crate) fn wake(&self) -> Option<Instant> {
         let (answer, since) = self.newest?;
-        (self.told < Some(answer)).then(|| since + PATIENCE)
+        (self.reported < Some(answer)).then(|| since + ANSWER_TIMEOUT)
     }
 }

@@ -8,17 +8,17 @@ use uav_relay_linux::site::degrees;
 use crate::forecast::Move;
 use crate::new::Basis;
 
-pub(crate) fn tell(log: &Log, now: Instant, before: &Basis, after: &Basis) {
+pub(crate) fn log_changes(log: &Log, now: Instant, before: &Basis, after: &Basis) {
     let pairs = values(before).into_iter().zip(values(after));
     let mut is_same = true;
     for ((name, old), (_, new)) in pairs.filter(|((_, old), (_, new))| old != new) {
         is_same = false;
         let fields = json!({ "value": name, "old": old, "new": new });
         let what = format_args!("{name}: {old} -> {new}");
-        log.say(now, "change", fields, what);
+        log.event(now, "change", fields, what);
     }
     if is_same {
-        log.tell(now, "change", "none");
+        log.line(now, "change", "none");
     }
 }
 
@@ -61,10 +61,10 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     ]
 }
 
-pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
+pub(crate) fn log_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
     let Some(moves) = moves else {
         let what = "the moves of the relays are unknown in advance: the relays measure the interference, or no positions fit the new mission";
-        log.tell(now, "move", what);
+        log.line(now, "move", what);
         return;
     };
     let place = |at: Placement| json!({ "x_m": at.x_m, "y_m": at.y_m, "h_m": at.altitude_m });
@@ -84,6 +84,6 @@ pub(crate) fn tell_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
         };
         let (from, to) = (at(before), at(after));
         let what = format_args!("relay {index} moves {metres:.1} m, from {from} to {to}");
-        log.say(now, "move", fields, what);
+        log.event(now, "move", fields, what);
     }
 }

@@ -13,7 +13,7 @@ use uav_relay::{
 /// Time that a frame takes from one simulated relay to the next, µs.
 const TURN_US: u64 = 1_000;
 
-const PATIENCE: Duration = Duration::from_secs(10);
+const TIME_LIMIT: Duration = Duration::from_secs(10);
 
 /// Mission loaded into the relays, with all that a forecast of their positions needs.
 #[derive(Clone, Debug)]
@@ -136,7 +136,7 @@ pub(crate) fn moves(
     if is_measured(config.interference) || is_measured(new.config().interference) {
         return None;
     }
-    let end = Clock::now() + PATIENCE;
+    let end = Clock::now() + TIME_LIMIT;
     let mut chain = Chain::flying(loaded, flown)?;
     let from = chain.positions(flown.map_or(0, Upload::version), end)?;
     let to = if flown.is_some_and(|flown| flown.id() == new.id()) {

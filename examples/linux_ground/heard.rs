@@ -8,7 +8,7 @@ use uav_relay_linux::log::Log;
 use crate::report;
 
 /// Time without an answer after which a relay is lost. A lost handshake is repeated with the next measurement.
-const PATIENCE: Duration = Duration::from_millis(5_000);
+const LOST_AFTER: Duration = Duration::from_millis(5_000);
 
 /// State of a relay that has answered before.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -19,29 +19,29 @@ enum State {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Hearing(BTreeMap<u16, State>);
+pub(crate) struct NearbyRelays(BTreeMap<u16, State>);
 
-impl Hearing {
+impl NearbyRelays {
     /// Updates and logs which nearby relays answer this station. Returns the time of the next check, if any.
-    pub(crate) fn look(&mut self, now: Instant, ground: &Ground, log: &Log) -> Option<Instant> {
-        for (node, answers) in ground.near() {
+    pub(crate) fn update(&mut self, now: Instant, ground: &Ground, log: &Log) -> Option<Instant> {
+        for (node, answers) in ground.relays_in_reach() {
             let before = self.0.get(&node).copied();
             let state = match (before, answers) {
                 (None, false) => continue,
                 (_, true) => State::Heard,
                 (Some(State::Heard), false) => State::Silent(now),
-                (Some(State::Silent(since)), false) if since + PATIENCE <= now => State::Lost,
+                (Some(State::Silent(since)), false) if since + LOST_AFTER <= now => State::Lost,
                 (Some(other), false) => other,
             };
             self.0.insert(node, state);
             match (before, state) {
-                (None | Some(State::Lost), State::Heard) => report::heard(log, now, node, true),
-                (Some(State::Silent(_)), State::Lost) => report::heard(log, now, node, false),
+                (None | Some(State::Lost), State::Heard) => report::received(log, now, node, true),
+                (Some(State::Silent(_)), State::Lost) => report::received(log, now, node, false),
                 _ => {}
             }
         }
         let ends = self.0.values().filter_map(|state| match state {
-            State::Silent(since) => Some(*since + PATIENCE),
+            State::Silent(since) => Some(*since + LOST_AFTER),
             _ => None,
         });
         ends.min()

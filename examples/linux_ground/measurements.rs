@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use uav_relay::{Duration, Instant, Side};
-use uav_relay_linux::lines::{self, Begun, Fifo, InvalidLines, POWER};
+use uav_relay_linux::lines::{self, Fifo, InvalidLines, POWER, PartialLine};
 use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--measurements";
@@ -97,7 +97,7 @@ impl Measurements {
         if !self.is_silent && silent_at.is_some_and(|at| at <= now) {
             self.is_silent = true;
             let (name, seconds) = (&self.name, SILENCE.as_micros() / 1_000_000);
-            log.tell(
+            log.line(
                 now,
                 "measurement",
                 format_args!("none from {name} for {seconds} s"),
@@ -126,10 +126,10 @@ impl Measurements {
                     };
                     // The last line of a datagram needs no line feed.
                     let text = buffer.get(..count).unwrap_or_default();
-                    let mut begun = Begun::default();
-                    begun.take(text, &mut line);
+                    let mut partial_line = PartialLine::default();
+                    partial_line.take(text, &mut line);
                     if !text.ends_with(b"\n") {
-                        begun.take(b"\n", &mut line);
+                        partial_line.take(b"\n", &mut line);
                     }
                 }
             }
@@ -150,7 +150,7 @@ impl Measurements {
         if is_first || std::mem::take(&mut self.is_silent) {
             let fields = json!({ "power_w": power_w });
             let name = &self.name;
-            log.say(
+            log.event(
                 now,
                 "measurement",
                 fields,
@@ -214,7 +214,7 @@ impl Watched {
         file.take(TAIL).read_to_end(&mut tail).ok()?;
         let mut last = None;
         // A line without a line feed is still being written.
-        Begun::default().take(&tail, |line| last = Some(line.to_owned()));
+        PartialLine::default().take(&tail, |line| last = Some(line.to_owned()));
         last
     }
 }

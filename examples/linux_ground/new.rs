@@ -151,7 +151,7 @@ impl NewOptions {
         let named = |error: &dyn fmt::Display| format!("--new-site-{name}: {error}");
         let axis = Axis::between(sites).map_err(|error| named(&error))?;
         let before = Axis::between(line).map_err(|error| named(&error))?;
-        near(&before, &axis, sites).map_err(|line| named(&line))?;
+        check_distance(&before, &axis, sites).map_err(|line| named(&line))?;
         let (turn, most) = (before.turn_rad(&axis).to_degrees(), most_turn_deg(config));
         if turn > most {
             return Err(named(&format_args!(
@@ -201,7 +201,7 @@ impl NewOptions {
 }
 
 /// Returns an error if the new line is far from the present one. The drones would have no position along it.
-fn near(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
+fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     let away_m = |tx, rx| {
         let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));
         ends[0].min(ends[1])

@@ -8,7 +8,7 @@ use clap::{ArgAction, CommandFactory as _, Parser, ValueEnum};
 use uav_relay::UploadError;
 use uav_relay::{Duration, Side, Sites, Wiring};
 use uav_relay_linux::command::{self, whole};
-use uav_relay_linux::config::{self, Beyond, Given, Override};
+use uav_relay_linux::config::{self, FileOnlySettings, FileOptions, Override};
 use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{Method, MissionOptions, mission};
 use uav_relay_linux::site::SiteOptions;
@@ -159,7 +159,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
 }
 
 /// Adds the options of the file's sections `[network]` and `[ground]`.
-fn section(deployment: &Deployment, given: &mut Given) {
+fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.ground;
     given.path("--tty", own.tty.as_ref());
@@ -175,11 +175,11 @@ fn section(deployment: &Deployment, given: &mut Given) {
     given.path("--capture", own.capture.as_ref());
 }
 
-fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
-    let interference = options.loaded.interference(beyond.field);
+fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
+    let interference = options.loaded.interference(file_only.field);
     let base = options
         .loaded
-        .config(options.of, interference, beyond.channel)?;
+        .config(options.of, interference, file_only.channel)?;
     let loaded = mission(base, "--")?;
     let sited = options.sites.of(options.loaded.distance)?;
     let key = key::load("--key-file", &options.key_file)?;
@@ -197,7 +197,7 @@ fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
         loaded: Loaded {
             mission: loaded,
             method: options.method.into(),
-            profiles: beyond.profiles,
+            profiles: file_only.profiles,
         },
         sited,
         end: match options.end {
@@ -205,7 +205,7 @@ fn plan(options: Options, beyond: Beyond) -> Result<Plan, String> {
             End::Rx => Side::Downstream,
         },
         key,
-        overrides: beyond.overrides,
+        overrides: file_only.overrides,
         options,
     })
 }

@@ -22,7 +22,7 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
     );
     let (base, baud) = (plan.loaded.mission.digest(), plan.options.baud);
     let tty = plan.options.tty.display();
-    log.say(
+    log.event(
         Instant::ZERO,
         "started",
         json!({
@@ -44,14 +44,14 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             let sites = upload.sites();
             let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
             let what = format_args!("version {version}, mission 0x{digest:04x}{sites}");
-            log.tell(now, "offering", what);
+            log.line(now, "offering", what);
         }
-        Progress::Stored { by } => log.tell(
+        Progress::Stored { by } => log.line(
             now,
             "stored",
             format_args!("relay {by} has stored version {version}; polling until the chain flies it"),
         ),
-        Progress::Adopted { by } => log.say(
+        Progress::Adopted { by } => log.event(
             now,
             "adopted",
             json!({ "version": version, "flown_by": 1, "relays": all }),
@@ -59,7 +59,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
                 "relay {by} flies version {version}, as the first of {all} relays; polling it until the others do, too"
             ),
         ),
-        Progress::Flown { by, view, relays } => log.say(
+        Progress::Flown { by, view, relays } => log.event(
             now,
             "flown",
             json!({ "version": version, "flown_by": relays, "relays": all }),
@@ -100,21 +100,21 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
         (_, true) => format!("relay {by} flies version {version}"),
         (_, false) => format!("relay {by} has stored version {version}, but does not fly it yet"),
     };
-    log.say(now, "current", fields, what);
+    log.event(now, "current", fields, what);
 }
 
 /// Returns the error text for an upload that relay `by` refused. It names the value that most likely caused it.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
     let who = format!("--version {version}: relay {by}, or a relay beyond it, rejects the upload");
-    match Outside::of(plan, upload) {
-        Some(Outside { what, .. }) => format!("{who}: {what}"),
+    match FenceViolation::of(plan, upload) {
+        Some(FenceViolation { what, .. }) => format!("{who}: {what}"),
         None => format!("{who}: the log of the rejecting relay gives the reason"),
     }
 }
 
 /// Value of an uploaded mission that exceeds the relays' geofence.
-pub(crate) struct Outside {
+pub(crate) struct FenceViolation {
     /// Text for the operator: the value and the permitted range.
     what: String,
     name: &'static str,
@@ -123,14 +123,14 @@ pub(crate) struct Outside {
     range_m: [f32; 2],
 }
 
-impl Outside {
+impl FenceViolation {
     /// Returns the first value of `upload` that exceeds the geofence, if any. The relays are assumed to have the
     /// default geofence, that of the loaded mission.
     pub(crate) fn of(plan: &Plan, upload: &Upload) -> Option<Self> {
         let (loaded, new) = (plan.loaded.mission.config(), upload.config());
         let fence = |config: &MissionConfig| {
             let mission = Mission::try_new(*config).ok()?;
-            Some(GuardConfig::of(&mission, config.common).fence)
+            Some(GuardConfig::of(&mission, config.common).geofence)
         };
         let (own, asked) = (fence(loaded)?, fence(new)?);
         let leaves = |is: [f32; 2], of: [f32; 2]| is[0] < of[0] || is[1] > of[1];
@@ -205,7 +205,7 @@ impl Outside {
 }
 
 /// Returns the error text for an upload that exceeds its time limit, with the most likely cause.
-pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
+pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &Ground) -> String {
     let seconds = plan.options.timeout;
     let state = match progress {
         Progress::Stored { by } => {
@@ -217,11 +217,11 @@ pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Groun
         // The ground has only asked so far.
         Progress::Idle => format!(
             "no relay has reported the mission that it flies: {}",
-            why(plan, ground.stats())
+            likely_reason(plan, ground.stats())
         ),
         _ => format!(
             "no relay is known to have stored version {version}: {}",
-            why(plan, ground.stats())
+            likely_reason(plan, ground.stats())
         ),
     };
     let refused = ground.refused();
@@ -229,7 +229,7 @@ pub(crate) fn late(plan: &Plan, version: u16, progress: Progress, ground: &Groun
 }
 
 /// Returns the most likely reason, by the frame counters, why no relay has answered as needed.
-fn why(plan: &Plan, stats: &Stats) -> String {
+fn likely_reason(plan: &Plan, stats: &Stats) -> String {
     let faults = [
         (
             stats.mission,
@@ -291,20 +291,20 @@ fn why(plan: &Plan, stats: &Stats) -> String {
     }
 }
 
-pub(crate) fn heard(log: &Log, now: Instant, node: u16, is_heard: bool) {
+pub(crate) fn received(log: &Log, now: Instant, node: u16, is_heard: bool) {
     let (event, what) = if is_heard {
         ("back", "and this station receive each other")
     } else {
         ("lost", "does not reply")
     };
     let text = format_args!("relay {node} {what}");
-    log.say(now, event, json!({ "node": node }), text);
+    log.event(now, event, json!({ "node": node }), text);
 }
 
 /// Logs the frame counters when a station that ran with `--stand` stops.
 pub(crate) fn stopped(log: &Log, now: Instant, end: Side, ground: &Ground) {
     let stats = ground.stats();
-    log.say(
+    log.event(
         now,
         "stopped",
         counted(stats),

@@ -7,18 +7,18 @@ use serde_json::{Value, json};
 use uav_relay::MAX_FRAME;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::{Auth, Ground, Instant, Key, Progress, Upload};
-use uav_relay_linux::counters::{Refusals, counted};
+use uav_relay_linux::counters::{RejectionReasons, counted};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::replug::Replug;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::next_epoch;
 use uav_relay_linux::{config, tap};
 
-use crate::heard::Hearing;
+use crate::heard::NearbyRelays;
 use crate::measurements::{Measurements, name};
 use crate::options::Plan;
 use crate::report;
-use crate::uploading::{Fault, Over, Uploading};
+use crate::uploading::{Fault, Outcome, Uploading};
 
 const READS: usize = 64;
 
@@ -30,8 +30,8 @@ struct Station<'a> {
     /// Bytes of a frame that the tty has not accepted yet.
     outgoing: Vec<u8>,
     measurements: Option<Measurements>,
-    hearing: Hearing,
-    refusals: Refusals,
+    hearing: NearbyRelays,
+    rejections: RejectionReasons,
     uploading: Option<Uploading>,
     /// True once the operator's answer can be read from standard input, while a confirmation is awaited.
     is_answered: bool,
@@ -44,13 +44,13 @@ struct Station<'a> {
 pub(crate) fn stand(plan: &Plan) -> Result<(), Fault> {
     let mut station = Station::begin(plan)?;
     station.service.ready();
-    let over = loop {
+    let outcome = loop {
         if let Some(over) = station.turn() {
             break over;
         }
     };
     station.service.end();
-    over
+    outcome
 }
 
 impl<'a> Station<'a> {
@@ -72,7 +72,7 @@ impl<'a> Station<'a> {
             epoch: next_epoch(&options.epoch_file)?,
         };
         report::started(&service.log, plan, auth.epoch);
-        config::tell(&plan.overrides, &service.log);
+        config::log_overrides(&plan.overrides, &service.log);
         if let Some(asked) = &options.capture {
             let tty = std::iter::once(&mut tty);
             tap::attach(&service.log, env!("CARGO_BIN_NAME"), asked, tty)?;
@@ -89,30 +89,30 @@ impl<'a> Station<'a> {
             tty,
             outgoing: Vec::new(),
             measurements,
-            hearing: Hearing::default(),
-            refusals: Refusals::default(),
+            hearing: NearbyRelays::default(),
+            rejections: RejectionReasons::default(),
             uploading,
             is_answered: false,
         })
     }
 
-    fn turn(&mut self) -> Over {
+    fn turn(&mut self) -> Outcome {
         let time = self.service.now();
         let log = &self.service.log;
         self.tty.tend(time, log);
         self.exchange(time);
         let log = &self.service.log;
-        let silent = self.hearing.look(time, &self.ground, log);
-        if let Some(why) = self.refusals.look(time, self.ground.stats(), true) {
-            log.tell(time, "rejected", why);
+        let silent = self.hearing.update(time, &self.ground, log);
+        if let Some(why) = self.rejections.next_reason(time, self.ground.stats(), true) {
+            log.line(time, "rejected", why);
         }
-        let over = self.uploading(time);
-        if over.is_some() {
-            return over;
+        let outcome = self.uploading(time);
+        if outcome.is_some() {
+            return outcome;
         }
         // An upload's next stage begins with a frame.
         self.send();
-        let alive = self.tell(time);
+        let alive = self.serve_status(time);
         let measured = self.measurements.as_ref().and_then(Measurements::wake);
         let late = self.uploading.as_ref().and_then(Uploading::wake);
         let others = [silent, alive, measured, late, self.tty.wake()];
@@ -162,7 +162,7 @@ impl<'a> Station<'a> {
     }
 
     /// Advances the upload; returns its result if the program must end with it.
-    fn uploading(&mut self, time: Instant) -> Over {
+    fn uploading(&mut self, time: Instant) -> Outcome {
         let Self {
             plan,
             ground,
@@ -171,23 +171,23 @@ impl<'a> Station<'a> {
             ..
         } = self;
         let uploading = uploading.as_mut()?;
-        let over = if std::mem::take(&mut self.is_answered) {
+        let outcome = if std::mem::take(&mut self.is_answered) {
             uploading.answer(time, plan, ground, &answered())
         } else {
             None
         };
-        let over = over.or_else(|| uploading.turn(time, &service.log, plan, ground))?;
+        let outcome = outcome.or_else(|| uploading.turn(time, &service.log, plan, ground))?;
         if !plan.options.stand {
-            return Some(over);
+            return Some(outcome);
         }
-        if let Err(fault) = over {
-            service.log.tell(time, "not flown", fault.line);
+        if let Err(fault) = outcome {
+            service.log.line(time, "not flown", fault.line);
         }
         None
     }
 
     /// Handles signals and status requests; returns the time by which the next call is due.
-    fn tell(&mut self, time: Instant) -> Option<Instant> {
+    fn serve_status(&mut self, time: Instant) -> Option<Instant> {
         let Self {
             service,
             plan,
@@ -224,7 +224,7 @@ impl<'a> Station<'a> {
     }
 
     /// Sleeps until input or a timer needs work. Returns the program's result after a signal to end.
-    fn sleep(&mut self, wake: Option<Instant>) -> Over {
+    fn sleep(&mut self, wake: Option<Instant>) -> Outcome {
         let measured = self.measurements.as_ref().and_then(Measurements::fd);
         let mut others: Vec<_> = measured.into_iter().map(|fd| (fd, PollFlags::IN)).collect();
         let stdin = std::io::stdin();

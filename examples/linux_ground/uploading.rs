@@ -18,10 +18,10 @@ use crate::change;
 use crate::forecast::moves;
 use crate::new::Basis;
 use crate::options::Plan;
-use crate::report::{self, Outside};
+use crate::report::{self, FenceViolation};
 
 /// Maximum time that a relay may take to send the values of its mission.
-const VALUES: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
+const VALUES_TIMEOUT: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
 
 #[derive(Debug)]
 pub(crate) struct Fault {
@@ -36,16 +36,16 @@ impl From<String> for Fault {
 }
 
 /// Result of an upload or of the program; `None` while it goes on.
-pub(crate) type Over = Option<Result<(), Fault>>;
+pub(crate) type Outcome = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     /// Waiting for a relay to report the flown mission. The time is when a relay first reported it without its
     /// values.
-    Asking(Option<Instant>),
+    Querying(Option<Instant>),
     Confirming,
     Uploading,
-    Over,
+    Ended,
 }
 
 #[derive(Debug)]
@@ -62,10 +62,10 @@ pub(crate) struct Uploading {
 impl Uploading {
     /// Starts an upload by asking the chain for the mission that it flies.
     pub(crate) fn begin(now: Instant, plan: &Plan, version: u16, ground: &mut Ground) -> Self {
-        ground.ask_flown(now);
+        ground.request_flown(now);
         Self {
             version,
-            stage: Stage::Asking(None),
+            stage: Stage::Querying(None),
             upload: None,
             progress: Progress::Idle,
             late_at: Some(now + plan.timeout()),
@@ -74,7 +74,7 @@ impl Uploading {
 
     pub(crate) fn wake(&self) -> Option<Instant> {
         let values = match self.stage {
-            Stage::Asking(since) => since.map(|since| since + VALUES),
+            Stage::Querying(since) => since.map(|since| since + VALUES_TIMEOUT),
             _ => None,
         };
         self.late_at.into_iter().chain(values).min()
@@ -95,16 +95,16 @@ impl Uploading {
         plan: &Plan,
         ground: &mut Ground,
         line: &str,
-    ) -> Over {
+    ) -> Outcome {
         let (Stage::Confirming, Some(upload)) = (self.stage, self.upload) else {
             return None;
         };
         if matches!(line.trim(), "y" | "Y" | "yes") {
             return self.start(now, plan, ground, upload);
         }
-        self.stage = Stage::Over;
+        self.stage = Stage::Ended;
         let version = self.version;
-        over(format!(
+        failed(format!(
             "--version {version}: not confirmed, nothing was uploaded"
         ))
     }
@@ -116,49 +116,49 @@ impl Uploading {
         log: &Log,
         plan: &Plan,
         ground: &mut Ground,
-    ) -> Over {
-        let over = match (self.stage, self.upload) {
-            (Stage::Asking(since), _) => self.asked(now, log, plan, ground, since),
+    ) -> Outcome {
+        let outcome = match (self.stage, self.upload) {
+            (Stage::Querying(since), _) => self.await_mission(now, log, plan, ground, since),
             (Stage::Uploading, Some(upload)) => self.follow(now, log, plan, &upload, ground),
             _ => None,
         };
-        if over.is_some() {
-            self.stage = Stage::Over;
+        if outcome.is_some() {
+            self.stage = Stage::Ended;
             self.late_at = None;
         }
-        over
+        outcome
     }
 
-    fn asked(
+    fn await_mission(
         &mut self,
         now: Instant,
         log: &Log,
         plan: &Plan,
         ground: &mut Ground,
         since: Option<Instant>,
-    ) -> Over {
+    ) -> Outcome {
         let version = self.version;
         if let Some(flown) = ground.flown().copied() {
             if flown.is_known() {
                 return self.decide(now, log, plan, ground, flown);
             }
             let since = since.unwrap_or(now);
-            self.stage = Stage::Asking(Some(since));
-            if since + VALUES <= now {
+            self.stage = Stage::Querying(Some(since));
+            if since + VALUES_TIMEOUT <= now {
                 if flown.version >= version {
-                    return over(report::outdated(version, flown.version));
+                    return failed(report::outdated(version, flown.version));
                 }
                 if plan.options.from_loaded {
                     return self.decide(now, log, plan, ground, flown);
                 }
-                return over(format!(
+                return failed(format!(
                     "--version {version}: relay {} holds version {} and does not send its values, as an older firmware does not; give --from-loaded, and state all that is to stay as it is flown",
                     flown.by, flown.version
                 ));
             }
         }
         self.late_at.filter(|at| *at <= now)?;
-        over(report::late(plan, version, Progress::Idle, ground))
+        failed(report::timed_out(plan, version, Progress::Idle, ground))
     }
 
     /// Builds the upload from the flown mission, shows its changes, and starts it or asks for confirmation.
@@ -169,11 +169,11 @@ impl Uploading {
         plan: &Plan,
         ground: &mut Ground,
         flown: FlownMission,
-    ) -> Over {
+    ) -> Outcome {
         let (version, options) = (self.version, &plan.options);
         report::flown(log, now, &flown);
         if flown.version > version {
-            return over(report::outdated(version, flown.version));
+            return failed(report::outdated(version, flown.version));
         }
         let loaded = Basis::loaded(&plan.loaded.mission, plan.sited);
         let before = match flown.upload {
@@ -187,22 +187,22 @@ impl Uploading {
             Err(line) => return Some(Err(Fault { line, status: 2 })),
         };
         if flown.version == version && flown.upload.is_none_or(|it| it.id() != upload.id()) {
-            return over(report::outdated(version, flown.version));
+            return failed(report::outdated(version, flown.version));
         }
         let after = Basis::flown(upload, plan.sited);
-        change::tell(log, now, &before, &after);
+        change::log_changes(log, now, &before, &after);
         let lines = [before.line, after.line];
         let moves = moves(&plan.loaded, flown.upload.as_ref(), &upload, lines);
-        change::tell_moves(log, now, moves.as_deref());
-        if let Some(outside) = Outside::of(plan, &upload)
+        change::log_moves(log, now, moves.as_deref());
+        if let Some(outside) = FenceViolation::of(plan, &upload)
             && !options.no_fence
         {
             let outside = outside.line(moves.as_deref());
-            return over(format!("--version {version}: {outside}"));
+            return failed(format!("--version {version}: {outside}"));
         }
         if options.dry_run {
             let what = format_args!("version {version} was not uploaded");
-            log.tell(now, "dry run", what);
+            log.line(now, "dry run", what);
             return Some(Ok(()));
         }
         if options.yes {
@@ -218,9 +218,9 @@ impl Uploading {
         None
     }
 
-    fn start(&mut self, now: Instant, plan: &Plan, ground: &mut Ground, upload: Upload) -> Over {
+    fn start(&mut self, now: Instant, plan: &Plan, ground: &mut Ground, upload: Upload) -> Outcome {
         if let Err(error) = ground.upload(now, upload) {
-            return over(error.to_string());
+            return failed(error.to_string());
         }
         (self.stage, self.upload) = (Stage::Uploading, Some(upload));
         self.late_at = Some(now + plan.timeout());
@@ -235,7 +235,7 @@ impl Uploading {
         plan: &Plan,
         upload: &Upload,
         ground: &Ground,
-    ) -> Over {
+    ) -> Outcome {
         let progress = ground.progress();
         let is_new = std::mem::replace(&mut self.progress, progress) != progress;
         if is_new {
@@ -247,15 +247,15 @@ impl Uploading {
             Progress::Refused { by } => report::refused(plan, upload, by),
             _ => {
                 self.late_at.filter(|at| *at <= now)?;
-                report::late(plan, upload.version(), progress, ground)
+                report::timed_out(plan, upload.version(), progress, ground)
             }
         };
-        over(fault)
+        failed(fault)
     }
 }
 
 /// Returns the result of an upload that has failed for the reason `line`.
 #[expect(clippy::unnecessary_wraps, reason = "as the stages return it")]
-fn over(line: String) -> Over {
+fn failed(line: String) -> Outcome {
     Some(Err(line.into()))
 }

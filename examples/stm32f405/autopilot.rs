@@ -92,7 +92,7 @@ impl Autopilot {
         sign(&mut autopilot.link, now).ok()?;
         if chip::was_hung() {
             // The empty queue has room for the line.
-            let _ = autopilot.link.say("relay: restarted by its watchdog");
+            let _ = autopilot.link.send_text("relay: restarted by its watchdog");
         }
         Some(autopilot)
     }
@@ -122,7 +122,7 @@ impl Autopilot {
     }
 
     /// Shows an event of the relay on the ground station of the autopilot's operator.
-    pub(crate) fn tell(&mut self, event: Event) {
+    pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);
     }
 

@@ -73,10 +73,10 @@ fn fly(
     let mut ports = AsyncPair::new(link(&upstream), link(&downstream));
     let store = |record: &uav_relay::ViewRecord| views.store(record);
     let runs = ports.run(&relay, &time, store);
-    executor::run(pin!(select(runs, tell(&relay))), &time, || {
+    executor::run(pin!(select(runs, log_events(&relay))), &time, || {
         let now = uav_relay::asynch::Clock::now(&time);
         relay.look(|relay| chip::end_turn(relay, now));
-        if log::asked() {
+        if log::counters_requested() {
             relay.look(log::counters);
             for port in [uav_relay::Port::Upstream, uav_relay::Port::Downstream] {
                 log::link_counters(&relay.stats(port));
@@ -87,14 +87,14 @@ fn fly(
 
 /// Logs the relay's events, and stores uploaded missions.
 #[cfg(target_os = "none")]
-async fn tell(relay: &uav_relay::asynch::AsyncRelay<'_>) -> core::convert::Infallible {
+async fn log_events(relay: &uav_relay::asynch::AsyncRelay<'_>) -> core::convert::Infallible {
     loop {
         let event = relay.next_event().await;
         relay.look(|relay| {
             log::event(event, relay);
             #[cfg(feature = "upload")]
             if event == uav_relay::Event::Uploaded {
-                firmware::persistent::keep_upload(relay);
+                firmware::persistent::store_upload(relay);
             }
         });
     }

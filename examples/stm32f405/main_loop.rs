@@ -65,14 +65,14 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
                 "put there on purpose"
             );
             if let Some(autopilot) = &mut drone.autopilot {
-                autopilot.tell(event);
+                autopilot.handle_event(event);
             }
             #[cfg(feature = "upload")]
             if event == Event::Uploaded {
-                persistent::keep_upload(relay);
+                persistent::store_upload(relay);
             }
         }
-        if log::asked() {
+        if log::counters_requested() {
             log::counters(relay);
             links.log_counters();
         }

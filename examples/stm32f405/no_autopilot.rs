@@ -37,7 +37,7 @@ impl Autopilot {
         match *self {}
     }
 
-    pub(crate) const fn tell(&mut self, _: Event) {
+    pub(crate) const fn handle_event(&mut self, _: Event) {
         match *self {}
     }
 

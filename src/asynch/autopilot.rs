@@ -11,8 +11,8 @@ use embassy_futures::yield_now;
 use embedded_io_async::{Read, Write};
 
 use super::link::Clock;
-use super::link::watched;
-use super::relay::{AsyncRelay, keep, wake};
+use super::link::track_pending;
+use super::relay::{AsyncRelay, store_waker, wake};
 use crate::event::Event;
 use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 use crate::serial::READ_LIMIT;
@@ -31,9 +31,9 @@ const PAUSE: Duration = Duration::from_millis(10);
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
     /// Signal to exchange data with the relay: raised after received bytes and after events of the relay.
-    news: Signal,
+    exchange_signal: Signal,
     /// Signal to the sending future: a frame for the autopilot may be pending.
-    speech: Signal,
+    send_signal: Signal,
     /// Waker of the task in `next_event`, which waits for an event of the autopilot link.
     listener: Cell<Option<Waker>>,
 }
@@ -51,8 +51,8 @@ impl AsyncAutopilot {
     pub const fn new(link: Autopilot) -> Self {
         Self {
             link: RefCell::new(link),
-            news: Signal::new(),
-            speech: Signal::new(),
+            exchange_signal: Signal::new(),
+            send_signal: Signal::new(),
             listener: Cell::new(None),
         }
     }
@@ -66,7 +66,7 @@ impl AsyncAutopilot {
         if let Ok(mut link) = self.link.try_borrow_mut() {
             link.handle_event(event);
         }
-        self.news.raise();
+        self.exchange_signal.raise();
     }
 
     /// Completes with the next event for the firmware. One task waits for it at a time; a second one replaces the first. Safe to
@@ -77,7 +77,7 @@ impl AsyncAutopilot {
         poll_fn(|cx| {
             let event = self.lend(Autopilot::poll_event).flatten();
             if event.is_none() {
-                keep(&self.listener, cx);
+                store_waker(&self.listener, cx);
             }
             event.map_or(Poll::Pending, Poll::Ready)
         })
@@ -101,24 +101,24 @@ impl AsyncAutopilot {
         rx: &mut impl Read,
         tx: &mut impl Write,
     ) -> Infallible {
-        let hears = self.hear(clock, rx);
-        let drives = self.drive(relay, clock);
-        let says = self.say(clock, tx);
-        match select3(hears, drives, says).await {
+        let receives = self.receive(clock, rx);
+        let exchanges = self.exchange(relay, clock);
+        let sends = self.send(clock, tx);
+        match select3(receives, exchanges, sends).await {
             Either3::First(never) | Either3::Second(never) | Either3::Third(never) => never,
         }
     }
 
     /// Passes bytes received from the autopilot's port to the link, forever.
-    async fn hear(&self, clock: &impl Clock, rx: &mut impl Read) -> Infallible {
+    async fn receive(&self, clock: &impl Clock, rx: &mut impl Read) -> Infallible {
         let mut buffer = [0; READ_LIMIT];
         loop {
-            let (read, waited) = watched(rx.read(&mut buffer)).await;
+            let (read, waited) = track_pending(rx.read(&mut buffer)).await;
             match read {
                 Ok(count @ 1..) => {
                     let bytes = buffer.get(..count).unwrap_or_default();
                     self.lend(|link| link.handle_bytes(clock.now(), bytes));
-                    self.news.raise();
+                    self.exchange_signal.raise();
                     if !waited {
                         yield_now().await;
                     }
@@ -130,34 +130,34 @@ impl AsyncAutopilot {
     }
 
     /// Exchanges positions, control state and setpoints between the link and the relay, forever.
-    async fn drive(&self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
+    async fn exchange(&self, relay: &AsyncRelay<'_>, clock: &impl Clock) -> Infallible {
         loop {
-            self.news.settle();
+            self.exchange_signal.clear();
             let now = clock.now();
             let exchanged = self.lend(|link| relay.lend(|relay| link.exchange(relay, now)));
-            if exchanged.flatten().is_some_and(|(is_news, _)| is_news) {
-                relay.poke();
+            if exchanged.flatten().is_some_and(|(changed, _)| changed) {
+                relay.notify_runner();
             }
             wake(&self.listener);
-            self.speech.raise();
+            self.send_signal.raise();
             // The frames sent now are no longer due.
             yield_now().await;
             let due = self.lend(|link| link.poll_timeout(now)).unwrap_or(now);
             let due = due.max(now + PAUSE);
-            select(self.news.raised(), clock.sleep_until(due)).await;
+            select(self.exchange_signal.raised(), clock.sleep_until(due)).await;
         }
     }
 
     /// Sends the link's pending frames to the autopilot's port, forever.
-    async fn say(&self, clock: &impl Clock, tx: &mut impl Write) -> Infallible {
+    async fn send(&self, clock: &impl Clock, tx: &mut impl Write) -> Infallible {
         loop {
-            self.speech.settle();
+            self.send_signal.clear();
             while let Some(frame) = self.lend(|link| link.poll_transmit(clock.now())).flatten() {
                 if write(tx, &frame).await.is_none() {
                     clock.sleep_until(clock.now() + PAUSE).await;
                 }
             }
-            self.speech.raised().await;
+            self.send_signal.raised().await;
         }
     }
 
@@ -180,31 +180,31 @@ async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
 /// Signal that one future raises and another one waits for.
 struct Signal {
     is_raised: Cell<bool>,
-    waits: Cell<Option<Waker>>,
+    waker: Cell<Option<Waker>>,
 }
 
 impl Signal {
     const fn new() -> Self {
         Self {
             is_raised: Cell::new(false),
-            waits: Cell::new(None),
+            waker: Cell::new(None),
         }
     }
 
     fn raise(&self) {
         self.is_raised.set(true);
-        wake(&self.waits);
+        wake(&self.waker);
     }
 
     /// Clears the signal. The caller then handles everything for which the signal was raised before.
-    fn settle(&self) {
+    fn clear(&self) {
         self.is_raised.set(false);
     }
 
     /// Completes once the signal is raised.
     fn raised(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
-            keep(&self.waits, cx);
+            store_waker(&self.waker, cx);
             if self.is_raised.get() {
                 Poll::Ready(())
             } else {

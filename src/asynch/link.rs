@@ -23,7 +23,7 @@ const PAUSE: u32 = 128;
 /// Time for which the driver-enable pin stays high after the last byte should have left, in byte times.
 ///
 /// One byte time for a byte that the port may still be sending, one for the tolerance of its clock.
-const HOLD: u32 = 2;
+const PIN_HOLD: u32 = 2;
 
 /// Delimiter that ends every frame. Sent alone, it ends a frame that was cut short.
 const DELIMITER: [u8; 1] = [0];
@@ -37,7 +37,7 @@ const DELIMITER: [u8; 1] = [0];
 pub struct AsyncLink<R, W, D = NoPin> {
     rx: R,
     tx: Sender<W, D>,
-    waiting: RefCell<Frames>,
+    queue: RefCell<Frames>,
 }
 
 /// Sending half of a link.
@@ -75,7 +75,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
                 quiet_at: Instant::ZERO,
                 cut: false,
             },
-            waiting: RefCell::new(Frames::new()),
+            queue: RefCell::new(Frames::new()),
         }
     }
 
@@ -90,7 +90,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         impl Future<Output = Infallible> + 'l,
         &'l RefCell<Frames>,
     ) {
-        let waiting = &self.waiting;
+        let waiting = &self.queue;
         let pause = self.tx.byte_time.times(PAUSE);
         let receives = receive(&mut self.rx, port, relay, clock, pause);
         let sends = self.tx.run(port, waiting, relay, clock, pause);
@@ -115,13 +115,13 @@ async fn receive<R: Read>(
 ) -> Infallible {
     let mut buffer = [0; READ_LIMIT];
     loop {
-        let (read, waited) = watched(rx.read(&mut buffer)).await;
+        let (read, waited) = track_pending(rx.read(&mut buffer)).await;
         // There is no `await` between reading bytes and passing them to the relay.
         match read {
             Ok(count @ 1..) => {
                 let bytes = buffer.get(..count).unwrap_or_default();
                 relay.lend(|relay| relay.handle_bytes(clock.now(), port, bytes));
-                relay.poke();
+                relay.notify_runner();
                 if !waited {
                     yield_now().await;
                 }
@@ -207,7 +207,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
             if self.tx.flush().await.is_err() {
                 relay.count(port, |stats| bump(&mut stats.write));
             }
-            let left_at = self.quiet_at.max(clock.now()) + self.byte_time.times(HOLD);
+            let left_at = self.quiet_at.max(clock.now()) + self.byte_time.times(PIN_HOLD);
             clock.sleep_until(left_at).await;
         }
     }
@@ -255,7 +255,7 @@ fn next<'f>(
             len => {
                 if was_full {
                     // The relay may have more frames to send.
-                    relay.poke();
+                    relay.notify_runner();
                 }
                 Poll::Ready(len)
             }
@@ -265,7 +265,7 @@ fn next<'f>(
 
 /// Awaits `future`; returns its output, and true if the future was pending at least once. With false, the caller must
 /// yield to the executor, because a port that is always ready would block the other tasks.
-pub(super) async fn watched<F: Future>(future: F) -> (F::Output, bool) {
+pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;
     let output = poll_fn(|cx| {
@@ -278,11 +278,11 @@ pub(super) async fn watched<F: Future>(future: F) -> (F::Output, bool) {
 }
 
 /// Capacity of a frame queue: two frames of full length, besides the frame that the port is sending.
-const ROOM: usize = 2 * MAX_FRAME;
+const CAPACITY: usize = 2 * MAX_FRAME;
 
 /// Queued frames in sending order, each with its delimiter.
 #[derive(Debug)]
-pub(super) struct Frames(Deque<u8, ROOM>);
+pub(super) struct Frames(Deque<u8, CAPACITY>);
 
 impl Frames {
     pub(super) const fn new() -> Self {
@@ -295,12 +295,12 @@ impl Frames {
 
     /// Returns true if one more frame of any length fits into the queue.
     pub(super) fn has_room(&self) -> bool {
-        ROOM.saturating_sub(self.0.len()) >= MAX_FRAME
+        CAPACITY.saturating_sub(self.0.len()) >= MAX_FRAME
     }
 
     /// Queues a complete frame for sending; returns false if the queue has no room for the frame.
     pub(super) fn push(&mut self, frame: &[u8]) -> bool {
-        let fits = frame.len() <= ROOM.saturating_sub(self.0.len());
+        let fits = frame.len() <= CAPACITY.saturating_sub(self.0.len());
         if fits {
             for &byte in frame {
                 // The capacity was checked above.
@@ -353,7 +353,7 @@ mod tests {
     use super::{Frames, MAX_FRAME};
 
     #[test]
-    fn frames_come_out_whole_and_in_order_and_what_does_not_fit_stays_out() {
+    fn the_queue_keeps_frames_whole_and_in_order() {
         let mut frames = Frames::new();
         let mut longest = [7; MAX_FRAME];
         longest[MAX_FRAME - 1] = 0;

@@ -131,7 +131,7 @@ use crate::serial::NoPin;
 use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
-use link::watched;
+use link::track_pending;
 
 /// Ports of a relay with two links, one to each neighbour; full duplex unless a link has a pin.
 #[derive(Debug)]
@@ -173,12 +173,12 @@ where
         clock: &impl Clock,
         mut store: impl FnMut(&ViewRecord) -> bool,
     ) -> Infallible {
-        let (hears_up, says_up, up) = self.upstream.ends(Port::Upstream, relay, clock);
-        let (hears_down, says_down, down) = self.downstream.ends(Port::Downstream, relay, clock);
+        let (rx_up, tx_up, up) = self.upstream.ends(Port::Upstream, relay, clock);
+        let (rx_down, tx_down, down) = self.downstream.ends(Port::Downstream, relay, clock);
         let queues = [(Port::Upstream, up), (Port::Downstream, down)];
-        let drives = drive(relay, &queues, clock, &mut store);
+        let runs = run_relay(relay, &queues, clock, &mut store);
         // The order matters: bytes read go into this turn of the relay, and its frames are written at once.
-        match select5(hears_up, hears_down, drives, says_up, says_down).await {
+        match select5(rx_up, rx_down, runs, tx_up, tx_down).await {
             Either5::First(never)
             | Either5::Second(never)
             | Either5::Third(never)
@@ -214,10 +214,10 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
         clock: &impl Clock,
         mut store: impl FnMut(&ViewRecord) -> bool,
     ) -> Infallible {
-        let (hears, says, waiting) = self.channel.ends(Port::Shared, relay, clock);
-        let queues = [(Port::Shared, waiting)];
-        let drives = drive(relay, &queues, clock, &mut store);
-        match select3(hears, drives, says).await {
+        let (receives, sends, queue) = self.channel.ends(Port::Shared, relay, clock);
+        let queues = [(Port::Shared, queue)];
+        let runs = run_relay(relay, &queues, clock, &mut store);
+        match select3(receives, runs, sends).await {
             Either3::First(never) | Either3::Second(never) | Either3::Third(never) => never,
         }
     }
@@ -229,24 +229,24 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
 }
 
 /// Handles the relay's timers and queues its frames, forever.
-async fn drive(
+async fn run_relay(
     relay: &AsyncRelay<'_>,
     queues: &[(Port, &RefCell<Frames>)],
     clock: &impl Clock,
     store: &mut dyn FnMut(&ViewRecord) -> bool,
 ) -> Infallible {
     loop {
-        relay.settle();
+        relay.mark_handled();
         let now = clock.now();
         let wake = relay.lend(|of| turn(of, now, relay, queues, store));
-        relay.tell();
+        relay.notify_listener();
         let waited = match wake.flatten() {
             Some(wake) => {
-                watched(select(relay.changes(), clock.sleep_until(wake)))
+                track_pending(select(relay.changed(), clock.sleep_until(wake)))
                     .await
                     .1
             }
-            None => watched(relay.changes()).await.1,
+            None => track_pending(relay.changed()).await.1,
         };
         if !waited {
             yield_now().await;

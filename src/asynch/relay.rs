@@ -51,7 +51,7 @@ impl<'a> AsyncRelay<'a> {
     /// already has the relay. Takes constant time beside that of `work`.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
-        self.poke();
+        self.notify_runner();
         done
     }
 
@@ -66,7 +66,7 @@ impl<'a> AsyncRelay<'a> {
         poll_fn(|cx| {
             let event = self.lend(Relay::poll_event).flatten();
             if event.is_none() {
-                keep(&self.listener, cx);
+                store_waker(&self.listener, cx);
             }
             event.map_or(Poll::Pending, Poll::Ready)
         })
@@ -83,25 +83,25 @@ impl<'a> AsyncRelay<'a> {
     }
 
     /// Notes new input and wakes the task that runs the relay's ports.
-    pub(super) fn poke(&self) {
+    pub(super) fn notify_runner(&self) {
         self.changed.set(true);
         wake(&self.runner);
     }
 
     /// Wakes the firmware task that waits for the relay's next event.
-    pub(super) fn tell(&self) {
+    pub(super) fn notify_listener(&self) {
         wake(&self.listener);
     }
 
     /// Marks all inputs of the relay so far as handled.
-    pub(super) fn settle(&self) {
+    pub(super) fn mark_handled(&self) {
         self.changed.set(false);
     }
 
     /// Completes once the relay has input that the ports' task has not handled, at once if there is some.
-    pub(super) fn changes(&self) -> impl Future<Output = ()> + '_ {
+    pub(super) fn changed(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
-            keep(&self.runner, cx);
+            store_waker(&self.runner, cx);
             if self.changed.get() {
                 Poll::Ready(())
             } else {
@@ -139,7 +139,7 @@ const ZERO: SerialStats = SerialStats {
 };
 
 /// Stores the waker of the current task, unless that is already stored.
-pub(super) fn keep(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
+pub(super) fn store_waker(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
     let kept = place.take().filter(|waker| waker.will_wake(cx.waker()));
     place.set(Some(kept.unwrap_or_else(|| cx.waker().clone())));
 }

@@ -543,7 +543,7 @@ mod tests {
         Geodetic::from_degrees(lat_deg, lon_deg, amsl_m).expect("on earth")
     }
 
-    fn near(a: f32, b: f64, within: f64) {
+    fn assert_near(a: f32, b: f64, within: f64) {
         assert!((f64::from(a) - b).abs() <= within, "{a} is not {b}");
     }
 
@@ -554,9 +554,9 @@ mod tests {
         let d = axis.distance_m();
         for (site, x) in [(tx, 0.0), (rx, d)] {
             let place = axis.place(site).expect("near");
-            near(place.x_m, x, 1e-4);
-            near(place.y_m, 0.0, 1e-4);
-            near(place.altitude_m, 0.0, 1e-3);
+            assert_near(place.x_m, x, 1e-4);
+            assert_near(place.y_m, 0.0, 1e-4);
+            assert_near(place.altitude_m, 0.0, 1e-3);
         }
     }
 
@@ -565,7 +565,7 @@ mod tests {
         // Eastward line: the right side is south.
         let axis = Axis::try_new(site(47.4, 8.54, 0.0), site(47.4, 8.55, 0.0)).expect("a line");
         let south = axis.place(site(47.399, 8.545, 0.0)).expect("near");
-        near(south.y_m, 111.2, 0.1);
+        assert_near(south.y_m, 111.2, 0.1);
         let point = axis.point(Placement {
             y_m: 100.0,
             ..Placement::on_line(300.0, 20.0)
@@ -593,14 +593,14 @@ mod tests {
         let (tx, rx) = (site(89.99, 0.0, 0.0), site(89.99, 180.0, 0.0));
         let axis = Axis::try_new(tx, rx).expect("a line");
         let pole = axis.place(site(90.0, 12.0, 5.0)).expect("near");
-        near(pole.x_m, axis.distance_m() / 2.0, 1e-3);
-        near(pole.y_m, 0.0, 1e-3);
+        assert_near(pole.x_m, axis.distance_m() / 2.0, 1e-3);
+        assert_near(pole.y_m, 0.0, 1e-3);
         let back = axis.point(pole).expect("near");
         assert!(back.lat_e7 >= 899_999_999, "{back:?}");
     }
 
     #[test]
-    fn what_is_wrong_with_a_pair_of_sites_is_said() {
+    fn invalid_pairs_of_sites_are_named() {
         let here = site(47.4, 8.54, 0.0);
         let off = Geodetic {
             lat_e7: 900_000_001,
@@ -656,7 +656,7 @@ mod tests {
         // Eastward in the middle; the meridians converge by 0.866 degrees from one end to the other.
         for (x, degrees) in [(0.0, 89.567), (d / 2.0, 90.0), (d, 90.433)] {
             let azimuth = axis.azimuth_rad(x).to_degrees();
-            near(azimuth, degrees, 2e-3);
+            assert_near(azimuth, degrees, 2e-3);
         }
     }
 
@@ -665,13 +665,13 @@ mod tests {
         // Line toward the south-east that climbs 100 m.
         let axis = Axis::try_new(site(0.01, 10.0, 0.0), site(0.0, 10.01, 100.0)).expect("a line");
         let [north, east, down] = axis.to_ned(800.0, [10.0, 0.0, 1.0]);
-        near(north, -7.05, 0.05);
-        near(east, 7.09, 0.05);
-        near(down, -1.0 - 10.0 * 100.0 / axis.distance_m(), 1e-3);
+        assert_near(north, -7.05, 0.05);
+        assert_near(east, 7.09, 0.05);
+        assert_near(down, -1.0 - 10.0 * 100.0 / axis.distance_m(), 1e-3);
         let [north, east, down] = axis.to_ned(800.0, [0.0, 10.0, 0.0]);
-        near(north, -7.09, 0.05);
-        near(east, -7.05, 0.05);
-        near(down, 0.0, 1e-6);
+        assert_near(north, -7.09, 0.05);
+        assert_near(east, -7.05, 0.05);
+        assert_near(down, 0.0, 1e-6);
     }
 
     #[test]

@@ -30,10 +30,10 @@ use crate::wire::upload::{Upload, UploadError};
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a question that a relay has not answered.
-const PATIENCE: Duration = Duration::from_millis(1_000);
+const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
 /// Number of unanswered questions to one relay before the next relay is polled.
-const QUESTIONS: u8 = 3;
+const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
 ///
@@ -75,26 +75,26 @@ pub struct Ground {
     end: Side,
     node: u16,
     /// Number of relays that the station can reach: one over a wire, up to four over a shared channel.
-    within: u16,
+    reach: u16,
     upload: Option<Upload>,
     progress: Progress,
     /// Number of the last question to the relays which mission they fly; 0 before the first.
-    question: u16,
+    query_number: u16,
     flown: Option<FlownMission>,
     /// Distance of the polled relay, in relays along the chain: 1 for the nearest.
     distance: u16,
     unanswered: u8,
     /// Mission that the polled relay holds, once it has reported it.
-    holds: Option<MissionId>,
+    relay_mission: Option<MissionId>,
     /// True after a question to the polled relay: its next hello is the answer.
-    asked: bool,
+    query_sent: bool,
     /// Number of the relay's hello that the pending offer of the mission answers; `None` without one.
     offer_number: Option<u16>,
     due: bool,
-    again: Option<Instant>,
+    repeat_at: Option<Instant>,
     /// Clock that never runs backwards. Every upload and every question starts it again.
     clock: MonotonicClock,
-    levels: Levels,
+    reports: PendingReports,
     deframer: Deframer,
     endpoint: Endpoint,
     stats: Stats,
@@ -120,20 +120,20 @@ impl Ground {
             base: digest(base),
             end,
             node,
-            within: reach.min(all),
+            reach: reach.min(all),
             upload: None,
             progress: Progress::Idle,
-            question: 0,
+            query_number: 0,
             flown: None,
             distance: 1,
             unanswered: 0,
-            holds: None,
-            asked: false,
+            relay_mission: None,
+            query_sent: false,
             offer_number: None,
             due: false,
-            again: None,
+            repeat_at: None,
             clock: MonotonicClock::new(Instant::ZERO),
-            levels: Levels::NONE,
+            reports: PendingReports::NONE,
             deframer: Deframer::new(),
             endpoint,
             stats: Stats::default(),
@@ -144,18 +144,18 @@ impl Ground {
     ///
     /// The polled relay also sends the upload that it holds, so that the ground station learns what earlier uploads
     /// have changed.
-    pub fn ask_flown(&mut self, now: Instant) {
+    pub fn request_flown(&mut self, now: Instant) {
         self.upload = None;
         self.progress = Progress::Idle;
         self.flown = None;
-        self.question = match self.question.wrapping_add(1) {
+        self.query_number = match self.query_number.wrapping_add(1) {
             0 => 1,
             number => number,
         };
         self.start(now);
     }
 
-    /// Returns the mission of the polled relay, once it has answered [`Ground::ask_flown`].
+    /// Returns the mission of the polled relay, once it has answered [`Ground::request_flown`].
     pub const fn flown(&self) -> Option<&FlownMission> {
         self.flown.as_ref()
     }
@@ -176,12 +176,12 @@ impl Ground {
 
     /// Schedules the first hello of an upload or a question, for the relay that is polled at present.
     fn start(&mut self, now: Instant) {
-        self.holds = None;
+        self.relay_mission = None;
         self.offer_number = None;
         self.unanswered = 0;
         self.due = true;
         self.clock = MonotonicClock::new(now);
-        self.again = Some(now + PATIENCE);
+        self.repeat_at = Some(now + REPEAT_AFTER);
     }
 
     /// Reports the interference measured here to the relays nearby. Returns false if outside 1e-30 to 1e6 W.
@@ -196,8 +196,8 @@ impl Ground {
         if !is_level(power_w) {
             return false;
         }
-        if self.levels.measured(power_w, self.within) {
-            for distance in 1..=self.within {
+        if self.reports.record(power_w, self.reach) {
+            for distance in 1..=self.reach {
                 self.endpoint.greet(self.at(distance));
             }
         }
@@ -230,8 +230,8 @@ impl Ground {
     /// verified.
     ///
     /// After a restart or a new handshake a relay is unverified until it answers. Work: four relays at most.
-    pub fn near(&self) -> impl Iterator<Item = (u16, bool)> {
-        let nodes = (1..=self.within).map(|distance| self.at(distance));
+    pub fn relays_in_reach(&self) -> impl Iterator<Item = (u16, bool)> {
+        let nodes = (1..=self.reach).map(|distance| self.at(distance));
         nodes.map(|node| (node, self.endpoint.knows(node)))
     }
 
@@ -245,7 +245,7 @@ impl Ground {
                 let distance = header.sender.abs_diff(self.node);
                 if header.destination != self.node {
                     bump(&mut self.stats.overheard);
-                } else if (1..=self.within).contains(&distance) {
+                } else if (1..=self.reach).contains(&distance) {
                     let now = self.clock.now();
                     match self.endpoint.check(now, &frame, &mut self.stats) {
                         Some(Checked::Fresh { .. }) => {
@@ -253,8 +253,8 @@ impl Ground {
                             self.handle_message(header.sender, distance, message.as_ref().ok());
                         }
                         Some(Checked::Handshake { first: true }) => {
-                            self.due |= self.is_under_way() || self.is_asking();
-                            self.levels.owe(distance);
+                            self.due |= self.is_under_way() || self.is_querying();
+                            self.reports.schedule(distance);
                         }
                         _ => {}
                     }
@@ -269,14 +269,14 @@ impl Ground {
     fn handle_message(&mut self, sender: u16, distance: u16, message: Option<&Message>) {
         let counter = match message {
             Some(Message::Hello(hello)) if hello.mission == self.base => {
-                self.answered(sender, distance, *hello);
+                self.on_hello(sender, distance, *hello);
                 &mut self.stats.received
             }
             Some(Message::Hello(_)) => &mut self.stats.mission,
             Some(Message::Offer {
                 upload,
                 offer_number,
-            }) if self.is_answer(upload, *offer_number) => {
+            }) if self.answers_query(upload, *offer_number) => {
                 self.on_upload(sender, *upload);
                 &mut self.stats.received
             }
@@ -286,17 +286,17 @@ impl Ground {
     }
 
     /// Returns true while the question which mission the chain flies is unanswered.
-    const fn is_asking(&self) -> bool {
+    const fn is_querying(&self) -> bool {
         self.upload.is_none()
-            && self.question != 0
+            && self.query_number != 0
             && !matches!(&self.flown, Some(flown) if flown.is_known())
     }
 
     /// Returns true if `upload` answers the question which mission the chain flies.
     ///
     /// `answer` is the number of the offer that contains it, which echoes the number of the question.
-    fn is_answer(&self, upload: &Upload, answer: u16) -> bool {
-        self.is_asking() && answer == self.question && upload.base() == self.base
+    fn answers_query(&self, upload: &Upload, answer: u16) -> bool {
+        self.is_querying() && answer == self.query_number && upload.base() == self.base
     }
 
     /// Records the upload that relay `by` has sent in answer to the question which mission it flies.
@@ -309,12 +309,12 @@ impl Ground {
             upload: Some(upload),
         });
         self.due = false;
-        self.again = None;
+        self.repeat_at = None;
     }
 
     /// Handles a hello of relay `by` that answers the question which mission it flies. If the relay holds an upload,
     /// it sends that in its next message.
-    fn answered_question(&mut self, by: u16, distance: u16, hello: Hello) {
+    fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
         // A refused mission need not be the one that the relay holds: the upload that follows shows which it holds.
@@ -329,15 +329,15 @@ impl Ground {
         };
         if flown.is_known() {
             self.due = false;
-            self.again = None;
+            self.repeat_at = None;
         }
         self.flown = Some(flown);
     }
 
     /// Handles a hello of relay `by`, which reports the mission that it holds.
-    fn answered(&mut self, by: u16, distance: u16, hello: Hello) {
-        if self.is_asking() {
-            return self.answered_question(by, distance, hello);
+    fn on_hello(&mut self, by: u16, distance: u16, hello: Hello) {
+        if self.is_querying() {
+            return self.on_query_reply(by, distance, hello);
         }
         let Some(upload) = &self.upload else { return };
         let mission_id = upload.id();
@@ -353,7 +353,7 @@ impl Ground {
         } else {
             hello.latest_mission
         };
-        self.holds = Some(holds);
+        self.relay_mission = Some(holds);
         let progress = if is_refused {
             Progress::Refused { by }
         } else if holds > mission_id {
@@ -363,7 +363,7 @@ impl Ground {
         } else if holds < mission_id {
             // A relay also answers an offer with a hello. Only an answer to a question causes an offer, otherwise the exchange
             // would not end.
-            if core::mem::take(&mut self.asked) {
+            if core::mem::take(&mut self.query_sent) {
                 self.offer_number = Some(hello.offer_number);
                 self.due = true;
             }
@@ -385,7 +385,7 @@ impl Ground {
         }
         if !self.is_under_way() {
             self.due = false;
-            self.again = None;
+            self.repeat_at = None;
         }
     }
 
@@ -396,15 +396,15 @@ impl Ground {
     /// Schedules the next question, to the same relay or the next one, if it is due. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
-        if self.again.is_none_or(|again| again > now) {
+        if self.repeat_at.is_none_or(|again| again > now) {
             return;
         }
         self.unanswered = self.unanswered.saturating_add(1);
-        if self.unanswered >= QUESTIONS {
+        if self.unanswered >= QUERIES_PER_RELAY {
             self.unanswered = 0;
-            self.holds = None;
+            self.relay_mission = None;
             self.offer_number = None;
-            self.distance = if self.distance < self.within {
+            self.distance = if self.distance < self.reach {
                 self.distance + 1
             } else {
                 1
@@ -413,7 +413,7 @@ impl Ground {
             self.endpoint.greet(self.to());
         }
         self.due = true;
-        self.again = Some(now + PATIENCE);
+        self.repeat_at = Some(now + REPEAT_AFTER);
     }
 
     fn to(&self) -> u16 {
@@ -430,7 +430,7 @@ impl Ground {
 
     /// Returns the latest time of the next [`Ground::handle_timeout`] call. `None` once there is nothing left to do.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        Some(self.clock.external(self.again?))
+        Some(self.clock.external(self.repeat_at?))
     }
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
@@ -447,7 +447,7 @@ impl Ground {
             return handshake;
         }
         if !core::mem::take(&mut self.due) {
-            return self.next_level(frame);
+            return self.next_report(frame);
         }
         let to = self.to();
         let loaded = MissionId {
@@ -455,7 +455,7 @@ impl Ground {
             digest: self.base,
         };
         let id = self.upload.map_or(loaded, |upload| upload.id());
-        let older = self.holds.is_some_and(|holds| holds < id);
+        let older = self.relay_mission.is_some_and(|holds| holds < id);
         let offer_number = self
             .offer_number
             .filter(|_| older && self.endpoint.knows(to));
@@ -466,8 +466,8 @@ impl Ground {
                 offer_number,
             }
         } else {
-            let asks = self.upload.is_none();
-            self.asked = true;
+            let is_query = self.upload.is_none();
+            self.query_sent = true;
             Message::Hello(Hello {
                 mission: self.base,
                 latest_view: ViewId::LOADED,
@@ -482,15 +482,15 @@ impl Ground {
                 active: false,
                 active_in_view: false,
                 refused: false,
-                offer_number: if asks { self.question } else { 0 },
+                offer_number: if is_query { self.query_number } else { 0 },
             })
         };
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
     /// Writes the interference report to the next relay, or a handshake if that relay could not read it.
-    fn next_level(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
-        let (distance, power_w) = self.levels.take(self.within)?;
+    fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
+        let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {
             mission: self.base,
             power_w,
@@ -573,45 +573,45 @@ pub enum Progress {
 
 /// Number of interference reports after which the station repeats its handshake. A relay that has restarted can read
 /// reports only after a handshake.
-const LEVELS_A_GREETING: u8 = 16;
+const REPORTS_PER_HANDSHAKE: u8 = 16;
 
 /// Last interference that the station measured, and the relays to which its report is pending.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Levels {
+pub(super) struct PendingReports {
     /// Last measured interference, W; 0 before the first.
     power_w: f32,
     /// Relays to which the report is pending: bit d - 1 for the relay at distance d.
-    untold: u8,
-    measured: u8,
+    pending: u8,
+    measurements: u8,
 }
 
-impl Levels {
+impl PendingReports {
     /// State before the first measurement: no report is pending.
     pub(super) const NONE: Self = Self {
         power_w: 0.0,
-        untold: 0,
-        measured: 0,
+        pending: 0,
+        measurements: 0,
     };
 
-    /// Records a measurement, W, for the relays at distances 1 to `within`. Returns true if a handshake to them is due first.
-    pub(super) fn measured(&mut self, power_w: f32, within: u16) -> bool {
+    /// Records a measurement, W, for the relays at distances 1 to `reach`. Returns true if a handshake to them is due first.
+    pub(super) fn record(&mut self, power_w: f32, reach: u16) -> bool {
         self.power_w = power_w;
-        self.untold = (1..=within).fold(0, |all, distance| all | bit(distance));
-        self.measured = (self.measured + 1) % LEVELS_A_GREETING;
-        self.measured == 0
+        self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));
+        self.measurements = (self.measurements + 1) % REPORTS_PER_HANDSHAKE;
+        self.measurements == 0
     }
 
     /// Schedules the last report again for the relay at `distance`, which may have restarted and lost it.
-    pub(super) fn owe(&mut self, distance: u16) {
+    pub(super) fn schedule(&mut self, distance: u16) {
         if self.power_w > 0.0 {
-            self.untold |= bit(distance);
+            self.pending |= bit(distance);
         }
     }
 
-    /// Returns the distance of the next relay to send the report to, at most `within`, and the power, W.
-    pub(super) fn take(&mut self, within: u16) -> Option<(u16, f32)> {
-        let distance = (1..=within).find(|distance| self.untold & bit(*distance) != 0)?;
-        self.untold &= !bit(distance);
+    /// Returns the distance of the next relay to send the report to, at most `reach`, and the power, W.
+    pub(super) fn poll(&mut self, reach: u16) -> Option<(u16, f32)> {
+        let distance = (1..=reach).find(|distance| self.pending & bit(*distance) != 0)?;
+        self.pending &= !bit(distance);
         Some((distance, self.power_w))
     }
 }

@@ -6,7 +6,7 @@
 //! association cannot count in a later one.
 //! [`Fence`] is the message of an association.
 
-use crate::guard::config::{GuardConfig, is_place};
+use crate::guard::config::{GuardConfig, is_coordinate};
 use crate::guard::own::Own;
 use crate::place::{CrossSection, Placement};
 use crate::side::Side;
@@ -14,7 +14,7 @@ use crate::time::Jitter;
 
 /// Number of consecutive messages of another association (session) that prove a restart. Fewer of them may be late
 /// messages of an earlier association.
-const STRAYS: u8 = 3;
+const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
@@ -26,8 +26,8 @@ const SEEN_REMINDERS: u8 = 15;
 /// its setpoints. The notice is repeated until the neighbour starts a new association.
 #[derive(Clone, Copy, Debug)]
 struct LeaveNotice {
-    own: u16,
-    heard: u16,
+    own_number: u16,
+    peer_number: u16,
     due: bool,
 }
 
@@ -41,15 +41,15 @@ pub(super) struct Association {
     /// Node number of the neighbour, 0 for none.
     pub(super) node: u16,
     /// Random number by which this relay identifies the association (session) with the neighbour.
-    pub(super) own: u16,
+    pub(super) own_number: u16,
     /// Number by which the neighbour identifies the association with this relay; 0 until it is known.
-    pub(super) heard: u16,
+    pub(super) peer_number: u16,
     /// Number of consecutive messages that belong to another association (session) of the neighbour.
-    strays: u8,
+    foreign_messages: u8,
     /// True if a message to the neighbour is pending.
     pub(super) due: bool,
     /// True while the neighbour requests an open chain: all relays the separation apart along x.
-    pub(super) opens: bool,
+    pub(super) open_requested: bool,
     /// True while the messages to the neighbour request an open chain.
     open_sent: bool,
     /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without one.
@@ -58,7 +58,7 @@ pub(super) struct Association {
     halt_sent: bool,
     /// Number of the association that the neighbour has left, 0 for none. A neighbour that has left one is absent:
     /// its drone does not follow setpoints.
-    absent: u16,
+    left_number: u16,
     /// Pending notice to the neighbour that this relay has left an association with it.
     leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, in any association, m; NaN before the first.
@@ -72,15 +72,15 @@ impl Association {
     pub(super) const fn new(node: u16, jitter: &mut Jitter) -> Self {
         Self {
             node,
-            own: jitter.number(),
-            heard: 0,
-            strays: 0,
+            own_number: jitter.number(),
+            peer_number: 0,
+            foreign_messages: 0,
             due: true,
-            opens: false,
+            open_requested: false,
             open_sent: false,
             halt_reminders_left: 0,
             halt_sent: false,
-            absent: 0,
+            left_number: 0,
             leave_notice: None,
             seen_m: f32::NAN,
             seen_reminders_left: 0,
@@ -121,7 +121,7 @@ impl Association {
 
     /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The distance must be
     /// larger than the errors of both reports.
-    pub(super) fn is_passed(&self, own: &Own, side: Side) -> bool {
+    pub(super) fn is_on_wrong_side(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
@@ -132,36 +132,36 @@ impl Association {
     }
 
     pub(super) const fn is_absent(&self) -> bool {
-        self.absent != 0
+        self.left_number != 0
     }
 
     /// Marks the neighbour as absent: it has left the association with that number, and may be anywhere.
     pub(super) const fn mark_absent(&mut self, association: u16) {
-        self.absent = association;
+        self.left_number = association;
     }
 
     /// Accepts the number that the neighbour gave to the association. An absent neighbour counts as back.
     pub(super) const fn pair(&mut self, association: u16) {
-        self.heard = association;
-        self.absent = 0;
+        self.peer_number = association;
+        self.left_number = 0;
     }
 
     /// Returns true if a message states that the neighbour has left this association. The echoed number is not used again, so a
     /// repetition of the message belongs to an earlier association.
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
-        fence.has_flag(Fence::LEFT) && fence.echo == self.own
+        fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
 
     /// Returns a new association in place of this one, which this relay has left. It includes a leave notice if the
     /// neighbour's number is known, because the neighbour then relies on the old association.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
-            own: self.own,
-            heard: self.heard,
+            own_number: self.own_number,
+            peer_number: self.peer_number,
             due: true,
         };
         Self {
-            leave_notice: if self.heard == 0 {
+            leave_notice: if self.peer_number == 0 {
                 self.leave_notice
             } else {
                 Some(left)
@@ -182,20 +182,20 @@ impl Association {
     /// leave notice is then sent again, until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
-            let left = fence.association == leave_notice.heard;
-            let is_new = fence.echo == 0 || fence.echo == self.own;
+            let left = fence.association == leave_notice.peer_number;
+            let is_new = fence.echo == 0 || fence.echo == self.own_number;
             if left && fence.has_flag(Fence::LEFT) || !left && is_new {
                 self.leave_notice = None;
             } else {
                 // The neighbour still relies on that association, or on an earlier one.
-                leave_notice.heard = fence.association;
+                leave_notice.peer_number = fence.association;
                 leave_notice.due = true;
             }
             if left || !is_new {
                 return true;
             }
         }
-        fence.association == self.absent
+        fence.association == self.left_number
     }
 
     /// Schedules a pending leave notice again; returns true if there is one.
@@ -211,14 +211,14 @@ impl Association {
         let leave_notice = self.leave_notice.as_mut()?;
         core::mem::take(&mut leave_notice.due).then(|| Fence {
             flags: Fence::LEFT,
-            ..Fence::without_place(leave_notice.own, leave_notice.heard)
+            ..Fence::without_position(leave_notice.own_number, leave_notice.peer_number)
         })
     }
 
     pub(super) const fn is_current(&mut self, association: u16, echo: u16) -> bool {
-        let known = association == self.heard && echo == self.own;
+        let known = association == self.peer_number && echo == self.own_number;
         if known {
-            self.strays = 0;
+            self.foreign_messages = 0;
         }
         known
     }
@@ -226,16 +226,16 @@ impl Association {
     /// Returns a message of this association. Number, x and step of its fence are 0, for the caller to fill in.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
-            association: self.own,
-            echo: self.heard,
+            association: self.own_number,
+            echo: self.peer_number,
             number: 0,
             x_m: 0.0,
             target_m: own.target_m(),
             across: own.cross_section(),
             apart_m: 0.0,
-            flags: u8::from(own.still) * Fence::ARRIVED
+            flags: u8::from(own.arrived) * Fence::ARRIVED
                 + u8::from(self.open_sent) * Fence::REQUESTS_OPENING
-                + u8::from(self.opens) * Fence::OPENING_RECEIVED
+                + u8::from(self.open_requested) * Fence::OPENING_RECEIVED
                 + u8::from(self.halt_sent) * Fence::HALTS,
         }
     }
@@ -243,7 +243,7 @@ impl Association {
     /// Stores the neighbour's request for an open chain, or its end, from a message of this association. A reply is
     /// due if the neighbour has not received the last request of this relay.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
-        self.opens = fence.has_flag(Fence::REQUESTS_OPENING);
+        self.open_requested = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
@@ -297,15 +297,15 @@ impl Association {
             x_m: place.x_m,
             across: place.cross_section(),
             flags: Fence::LEFT | Fence::UNPLACED | (u8::from(self.halt_sent) * Fence::HALTS),
-            ..Fence::without_place(self.own, 0)
+            ..Fence::without_position(self.own_number, 0)
         })
     }
 
     /// Counts a consecutive message of another association. Returns true once there are too many of them to be late
     /// ones.
     pub(super) const fn count_foreign(&mut self) -> bool {
-        self.strays = self.strays.saturating_add(1);
-        self.strays >= STRAYS
+        self.foreign_messages = self.foreign_messages.saturating_add(1);
+        self.foreign_messages >= MAX_FOREIGN_MESSAGES
     }
 }
 
@@ -341,7 +341,7 @@ impl KeepOut {
     /// Adds the lost relay `node` with the limit `limit_m` of this relay's x, m. Of two lost relays the nearer node
     /// is kept, and the tighter limit; `side` determines both.
     #[inline(never)] // called from both sides
-    pub(super) fn raise(&mut self, side: Side, node: u16, limit_m: f32) {
+    pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32) {
         let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
         self.lost = Some(match side {
             Side::Upstream => (nearest.max(node), tightest_m.max(limit_m)),
@@ -366,7 +366,7 @@ impl KeepOut {
     /// Stores the position of a neighbour that reports that its drone is not flown to setpoints. Such a message with
     /// the number of the current association is late, and ignored.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
-        let is_late = fence.association == association.heard;
+        let is_late = fence.association == association.peer_number;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
             self.unflown = Some((association.node, fence.across.at(fence.x_m)));
         }
@@ -471,7 +471,7 @@ impl KeepOut {
     }
 
     /// Marks that a lost relay may be on the wrong side of this one along x.
-    pub(super) const fn disorder(&mut self) {
+    pub(super) const fn mark_disordered(&mut self) {
         self.disordered = true;
     }
 
@@ -486,7 +486,7 @@ impl KeepOut {
 
     /// Adds the obstacle for relays at `side` that were never heard. They may hover anywhere beyond `limit_m`, until
     /// any of them has sent a message.
-    pub(super) fn expect(&mut self, side: Side, limit_m: f32, separation_m: f32) {
+    pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),
             Side::Downstream => (u16::MAX, limit_m - separation_m),
@@ -547,7 +547,7 @@ impl Fence {
     /// setpoints, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
-    pub(super) const fn without_place(association: u16, echo: u16) -> Self {
+    pub(super) const fn without_position(association: u16, echo: u16) -> Self {
         Self {
             association,
             echo,
@@ -569,7 +569,7 @@ impl Fence {
         let CrossSection { y_m, altitude_m } = self.across;
         let places = [self.x_m, self.target_m, y_m, altitude_m];
         self.association != 0
-            && places.into_iter().all(is_place)
+            && places.into_iter().all(is_coordinate)
             && (0.0..=1e5).contains(&self.apart_m)
             && self.flags < 2 * Self::UNPLACED
     }

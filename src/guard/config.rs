@@ -44,7 +44,7 @@ impl Geofence {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
     /// Geofence that no setpoint leaves.
-    pub fence: Geofence,
+    pub geofence: Geofence,
     /// Minimum distance between relays, m: 0 to 1e5; the same on all relays.
     pub separation_m: f32,
     /// Number of relays of the mission, 1 to 1000; the same on all relays.
@@ -82,7 +82,7 @@ impl GuardConfig {
     pub fn of(mission: &Mission, profile: Profile) -> Self {
         let config = mission.config();
         Self {
-            fence: Geofence {
+            geofence: Geofence {
                 least_x_m: 0.0,
                 most_x_m: config.distance_m,
                 least_y_m: config.lateral.least_m,
@@ -100,7 +100,7 @@ impl GuardConfig {
     /// Returns the configuration with a geofence enlarged for relays that leave the line without a quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
-            let fence = &mut self.fence;
+            let fence = &mut self.geofence;
             fence.least_y_m += y_m.min(0.0);
             fence.most_y_m += y_m.max(0.0);
             fence.most_altitude_m += up_m;
@@ -110,15 +110,15 @@ impl GuardConfig {
 
     /// Returns true if every number is within its range.
     pub fn is_valid(&self) -> bool {
-        let fence = &self.fence;
-        is_place(fence.least_x_m)
-            && is_place(fence.most_x_m)
+        let fence = &self.geofence;
+        is_coordinate(fence.least_x_m)
+            && is_coordinate(fence.most_x_m)
             && fence.least_x_m <= fence.most_x_m
-            && is_place(fence.least_y_m)
-            && is_place(fence.most_y_m)
+            && is_coordinate(fence.least_y_m)
+            && is_coordinate(fence.most_y_m)
             && fence.least_y_m <= fence.most_y_m
-            && is_place(fence.least_altitude_m)
-            && is_place(fence.most_altitude_m)
+            && is_coordinate(fence.least_altitude_m)
+            && is_coordinate(fence.most_altitude_m)
             && fence.least_altitude_m <= fence.most_altitude_m
             && (0.0..=1e5).contains(&self.separation_m)
             && (1..=MAX_RELAYS).contains(&self.relays)
@@ -127,8 +127,8 @@ impl GuardConfig {
 
     /// Returns the position in the geofence that is nearest to `place`.
     #[inline(never)] // called from several places
-    pub(super) fn cut(&self, place: Placement) -> Placement {
-        let fence = &self.fence;
+    pub(super) fn clamp(&self, place: Placement) -> Placement {
+        let fence = &self.geofence;
         Placement {
             x_m: place.x_m.max(fence.least_x_m).min(fence.most_x_m),
             y_m: place.y_m.max(fence.least_y_m).min(fence.most_y_m),
@@ -140,8 +140,8 @@ impl GuardConfig {
     }
 
     /// Returns the position nearest to `place` that is no farther outside the geofence than `before`.
-    pub(super) fn cut_toward(&self, place: Placement, before: Placement) -> Placement {
-        let fence = &self.fence;
+    pub(super) fn clamp_toward(&self, place: Placement, before: Placement) -> Placement {
+        let fence = &self.geofence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
             is.max(least.min(before)).min(most.max(before))
         };
@@ -160,7 +160,7 @@ impl GuardConfig {
     /// Returns true if a relay may start at `place`: within 5 km of the geofence in each coordinate. Farther away the
     /// coordinates would be rounded too much.
     pub(super) fn may_begin_at(&self, place: Placement) -> bool {
-        let (near, box_place) = (BEGIN_WITHIN_M, self.cut(place));
+        let (near, box_place) = (BEGIN_WITHIN_M, self.clamp(place));
         (place.x_m - box_place.x_m).abs() <= near
             && (place.y_m - box_place.y_m).abs() <= near
             && (place.altitude_m - box_place.altitude_m).abs() <= near
@@ -171,14 +171,14 @@ impl GuardConfig {
     /// In an open chain the order is kept, and the goals are the separation apart if the mission's relays fit into
     /// the geofence so.
     #[inline(never)] // called from several places
-    pub(super) fn open_place(&self, node: u16, x_m: f32) -> f32 {
-        let least_m = self.fence.least_x_m;
-        let span_m = self.fence.most_x_m - least_m;
+    pub(super) fn open_chain_x(&self, node: u16, x_m: f32) -> f32 {
+        let least_m = self.geofence.least_x_m;
+        let span_m = self.geofence.most_x_m - least_m;
         let step_m = self.separation_m + self.rounding();
         let taken_m = f32::from(self.relays.saturating_sub(1)) * step_m;
         let left = (span_m - taken_m).max(0.0) / span_m.max(f32::MIN_POSITIVE);
         let before = f32::from(node.saturating_sub(1)) * step_m;
-        (least_m + before + left * (x_m - least_m)).min(self.fence.most_x_m)
+        (least_m + before + left * (x_m - least_m)).min(self.geofence.most_x_m)
     }
 
     /// Returns the minimum distance along x, m, at which two relays are the separation apart in space. `one` and
@@ -190,7 +190,8 @@ impl GuardConfig {
 
     /// Returns the maximum rounding error of a position in the geofence, m: four steps of an f32.
     pub(super) fn rounding(&self) -> f32 {
-        4.0 * f32::EPSILON * self.fence.most_x_m.abs().max(self.fence.least_x_m.abs())
+        let fence = &self.geofence;
+        4.0 * f32::EPSILON * fence.most_x_m.abs().max(fence.least_x_m.abs())
     }
 }
 
@@ -198,6 +199,6 @@ impl GuardConfig {
 const FARTHEST_M: f32 = 1e7;
 
 /// Returns true if the coordinate `x_m` is a number within ±1e7 m.
-pub(super) fn is_place(x_m: f32) -> bool {
+pub(super) fn is_coordinate(x_m: f32) -> bool {
     x_m.abs() <= FARTHEST_M
 }

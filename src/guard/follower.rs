@@ -20,9 +20,9 @@ pub(super) struct FenceFollower {
     /// x of the newest fence plane that the neighbour has announced, m.
     fence_m: f32,
     /// Distance along x that the neighbour requests to keep from this relay, m; infinite before its first.
-    asked_m: f32,
+    requested_m: f32,
     /// Distance along x to the neighbour that this relay has agreed to, m; infinite before any.
-    taken_m: f32,
+    agreed_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
     /// Neighbour's position across the line.
@@ -40,8 +40,8 @@ impl FenceFollower {
             keep_out: KeepOut::none(),
             number: 0,
             fence_m: f32::NEG_INFINITY,
-            asked_m: f32::INFINITY,
-            taken_m: f32::INFINITY,
+            requested_m: f32::INFINITY,
+            agreed_m: f32::INFINITY,
             target_m: 0.0,
             across: CrossSection::on_line(0.0),
             clear: false,
@@ -52,7 +52,7 @@ impl FenceFollower {
     /// Replaces the neighbour upstream by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
-            self.keep_out.disorder();
+            self.keep_out.mark_disordered();
         }
         self.renew(own, jitter);
         self.association.node = node;
@@ -64,14 +64,14 @@ impl FenceFollower {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
             // The limit is where this relay has come to, not where it was requested to go.
-            let limit_m = self.least(own).min(own.reachable.at_m);
+            let limit_m = self.min_x(own).min(own.reachable.setpoint_m);
             let separation_m = own.config.separation_m;
             // Possible shortfall, if the neighbour was allowed closer than the separation, or was never heard.
-            let missing_m = separation_m - self.asked_m.min(self.taken_m).min(separation_m);
-            keep_out.raise(Side::Upstream, self.association.node, limit_m + missing_m);
+            let missing_m = separation_m - self.requested_m.min(self.agreed_m).min(separation_m);
+            keep_out.add_lost(Side::Upstream, self.association.node, limit_m + missing_m);
             if missing_m > 0.0 {
                 keep_out.mark_near(limit_m + missing_m);
-            } else if !self.is_agreed() {
+            } else if !self.has_fence() {
                 keep_out.mark_near(limit_m + separation_m);
             } else if !self.clear {
                 keep_out.mark_near(self.fence_m);
@@ -109,8 +109,8 @@ impl FenceFollower {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
         if !was_absent {
-            let (node, at_m) = (self.association.node, own.reachable.at_m);
-            self.keep_out.raise(Side::Upstream, node, at_m);
+            let (node, at_m) = (self.association.node, own.reachable.setpoint_m);
+            self.keep_out.add_lost(Side::Upstream, node, at_m);
         }
         if is_ordered {
             self.association.mark_absent(association);
@@ -134,11 +134,13 @@ impl FenceFollower {
             return;
         }
         self.keep_out.remove_unflown();
-        if self.association.heard == 0 {
+        if self.association.peer_number == 0 {
             self.association.pair(fence.association);
-        } else if fence.association != self.association.heard && self.association.count_foreign() {
+        } else if fence.association != self.association.peer_number
+            && self.association.count_foreign()
+        {
             self.renew(own, jitter);
-            self.association.heard = fence.association;
+            self.association.peer_number = fence.association;
         }
         // Always reply, since the message may be repeated because a reply was lost.
         self.association.due = true;
@@ -155,7 +157,7 @@ impl FenceFollower {
             }
             self.number = fence.number;
             self.fence_m = fence.x_m;
-            self.asked_m = fence.apart_m;
+            self.requested_m = fence.apart_m;
             self.owner_informed = false;
         }
     }
@@ -167,57 +169,57 @@ impl FenceFollower {
 
     /// Returns the smallest allowed x, m. If it is above the current setpoint, this relay has to go there.
     #[inline(never)] // called from several places
-    pub(super) fn least(&self, own: &Own) -> f32 {
+    pub(super) fn min_x(&self, own: &Own) -> f32 {
         let granted = match (self.association.has_no_flown_neighbour(), self.number) {
             (true, _) => f32::NEG_INFINITY,
-            (false, 0) => own.reachable.at_m,
+            (false, 0) => own.reachable.setpoint_m,
             (false, _) => self.fence_m,
         };
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
     /// Returns true if nothing upstream forbids this relay to change its lateral offset or altitude.
-    pub(super) fn is_clear(&self, own: &Own) -> bool {
+    pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
-            && !self.is_held(own)
+            && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
     /// Returns true if the neighbour requests a distance along x below the separation. This relay then must not
     /// change its lateral offset or altitude.
-    pub(super) fn is_held(&self, own: &Own) -> bool {
-        self.asked_m < own.config.separation_m
+    pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
+        self.requested_m < own.config.separation_m
     }
 
     /// Returns true if the neighbour upstream may still be closer than the separation after a start. It has announced
     /// a fence plane, but this relay is not yet known to be beyond one.
     pub(super) const fn is_tight(&self) -> bool {
-        self.is_agreed() && !self.clear
+        self.has_fence() && !self.clear
     }
 
     /// Returns true if the agreed x of this relay and the upstream relay are closer than the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
-        self.is_agreed() && own.is_close(own.target_m() - self.target_m)
+        self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
     /// Agrees to the distance along x that the neighbour requests, unless that is too small. With `downstream_m`, the
     /// distance on the other side, it must add up to the separation, so that this relay's two neighbours are that far
     /// apart.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
-        let missing_m = own.config.separation_m - self.asked_m;
+        let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
-        if self.asked_m >= self.taken_m || enough {
-            self.taken_m = self.asked_m;
+        if self.requested_m >= self.agreed_m || enough {
+            self.agreed_m = self.requested_m;
         }
     }
 
     /// Returns the distance along x that the neighbour upstream is sure to keep, m. The limits on the downstream side
     /// use it.
-    pub(super) const fn taken_m(&self) -> f32 {
-        if self.keep_out.is_near() || self.is_agreed() && !self.clear {
+    pub(super) const fn kept_distance(&self) -> f32 {
+        if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
         } else {
-            self.taken_m
+            self.agreed_m
         }
     }
 
@@ -227,7 +229,7 @@ impl FenceFollower {
     /// wrong side.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
-            && (self.association.has_no_flown_neighbour() || self.is_agreed())
+            && (self.association.has_no_flown_neighbour() || self.has_fence())
     }
 
     /// Returns true if the neighbour upstream was reported at a larger x than this relay.
@@ -235,18 +237,18 @@ impl FenceFollower {
     /// Also true while a lost relay may be on the wrong side of this one.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         self.keep_out.is_disordered()
-            || !self.is_ordered() && self.association.is_passed(own, Side::Upstream)
+            || !self.is_ordered() && self.association.is_on_wrong_side(own, Side::Upstream)
     }
 
     /// Returns true if the neighbour has announced a fence plane in this association.
-    pub(super) const fn is_agreed(&self) -> bool {
+    pub(super) const fn has_fence(&self) -> bool {
         self.number != 0
     }
 
     /// Updates the state after a position report. A message is due once this relay is beyond the newest fence plane,
     /// because the neighbour waits for that. `low_m` is the lowest x of this relay and those beyond it, m.
-    pub(super) fn settle(&mut self, own: &Own, low_m: f32) {
-        if self.is_agreed() && own.reachable.is_known() {
+    pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
+        if self.has_fence() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
             self.association.due |= low_m >= self.fence_m && !self.owner_informed;
         }
@@ -257,8 +259,8 @@ impl FenceFollower {
     /// Until this relay is beyond the first fence plane, the neighbour upstream, and relays beyond it, may be closer
     /// than the separation. Afterwards all are below this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
-        if self.is_agreed() && !self.clear {
-            self.fence_m - self.asked_m.min(own.config.separation_m)
+        if self.has_fence() && !self.clear {
+            self.fence_m - self.requested_m.min(own.config.separation_m)
         } else {
             f32::NEG_INFINITY
         }
@@ -278,7 +280,7 @@ impl FenceFollower {
         if !placed {
             fence.x_m = own.reachable.low_m;
             fence.flags |= Fence::UNPLACED;
-        } else if self.taken_m <= self.asked_m {
+        } else if self.agreed_m <= self.requested_m {
             fence.flags |= Fence::AGREES;
         }
         Some(fence)
@@ -304,10 +306,10 @@ impl FenceFollower {
         if self.is_out_of_order(own) {
             return Some(HoldReason::Order);
         }
-        if !self.is_agreed() {
+        if !self.has_fence() {
             return Some(HoldReason::Unheard);
         }
         let step_m = target_m - self.target_m + own.config.rounding();
-        (step_m < self.taken_m.min(own.config.separation_m)).then_some(HoldReason::Close)
+        (step_m < self.agreed_m.min(own.config.separation_m)).then_some(HoldReason::Close)
     }
 }

@@ -97,23 +97,23 @@ use crate::time::{Instant, Jitter};
 
 pub use self::association::{Fence, HoldReason};
 use association::Association;
-use config::{Geofence, GuardConfig, is_place};
+use config::{Geofence, GuardConfig, is_coordinate};
 use follower::FenceFollower;
 use own::{Own, ReachableInterval};
 use owner::FenceOwner;
 
 /// Guard of one relay: computes safe setpoints on the way to the agreed position.
 ///
-/// Call [`commit`](Self::commit), [`position`](Self::position), [`hear`](Self::hear) and [`link`](Self::link) with new inputs.
+/// Call [`commit`](Self::commit), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`link`](Self::link) with new inputs.
 /// After each call [`steer`](Self::steer), fly to its result, then send the messages of [`poll`](Self::poll). Every call takes at
 /// most some hundred operations and two square roots, independent of the length of the chain.
 #[derive(Clone, Copy, Debug)]
 pub struct Guard {
     own: Own,
     jitter: Jitter,
-    born: Instant,
+    started_at: Instant,
     /// Last reported position, from which the first setpoint starts.
-    found: Option<Placement>,
+    initial_place: Option<Placement>,
     /// True while the drone is flown to this guard's setpoints.
     flown: bool,
     follower: FenceFollower,
@@ -123,16 +123,16 @@ pub struct Guard {
     /// It is on the wrong side of a neighbour, or several reminders in a row found its order along x unknown.
     disorder: bool,
     /// Number of consecutive reminders, one per second, that found the order along x unknown.
-    waits: u8,
+    unordered: u8,
     reminders: u8,
     refused: u32,
 }
 
 /// Number of reminders, one per second, between two messages of a relay that does not follow setpoints.
-const ALONE_EVERY: u8 = 4;
+const UNFLOWN_EVERY: u8 = 4;
 
 /// Number of consecutive reminders with an unknown order along x after which the chain halts.
-const MOST_WAITS: u8 = 3;
+const MAX_UNORDERED: u8 = 3;
 
 impl Guard {
     /// Creates a guard that starts at `now` between the mission's `neighbours`, toward Tx and toward Rx.
@@ -147,11 +147,11 @@ impl Guard {
             follower: FenceFollower::new(upstream, &mut jitter),
             owner: FenceOwner::new(downstream, &mut jitter),
             disorder: false,
-            waits: 0,
+            unordered: 0,
             reminders: 0,
             jitter,
-            born: now,
-            found: None,
+            started_at: now,
+            initial_place: None,
             flown: true,
             refused: 0,
         }
@@ -162,14 +162,14 @@ impl Guard {
         if !is_placement(place) {
             return bump(&mut self.refused);
         }
-        self.own.target = Some(self.own.config.cut(place));
+        self.own.target = Some(self.own.config.clamp(place));
         self.follower.association.due = true;
         self.owner.association.due = true;
     }
 
     /// Returns true if `place`, limited to the geofence, is the agreed position that the guard has now.
     pub fn is_for(&self, place: Placement) -> bool {
-        self.own.target == Some(self.own.config.cut(place))
+        self.own.target == Some(self.own.config.clamp(place))
     }
 
     /// Handles a position report of the flight controller, measured at time `at`.
@@ -185,8 +185,8 @@ impl Guard {
         if own.setpoint.is_some() {
             own.reachable.report(at, place.x_m, &own.config);
             own.report(at, place);
-        } else if self.flown && at >= self.born && own.config.may_begin_at(place) {
-            self.found = Some(place);
+        } else if self.flown && at >= self.started_at && own.config.may_begin_at(place) {
+            self.initial_place = Some(place);
         }
     }
 
@@ -199,8 +199,8 @@ impl Guard {
             return false;
         }
         self.flown = flown;
-        (self.disorder, self.waits) = (false, 0);
-        (self.born, self.found) = (now, None);
+        (self.disorder, self.unordered) = (false, 0);
+        (self.started_at, self.initial_place) = (now, None);
         if self.own.setpoint.is_some() {
             self.own.release(now);
             self.follower.leave(&mut self.jitter);
@@ -215,26 +215,26 @@ impl Guard {
     /// is `None`. Lost relays may hover anywhere beyond this relay, as after a start.
     pub fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(now) = now {
-            self.born = self.born.max(now + self.own.config.lag);
+            self.started_at = self.started_at.max(now + self.own.config.lag);
         }
-        self.found = None;
-        (self.disorder, self.waits) = (false, 0);
+        self.initial_place = None;
+        (self.disorder, self.unordered) = (false, 0);
         self.own.reported = None;
         self.own.target = None;
-        self.own.release(self.born);
+        self.own.release(self.started_at);
         self.follower.leave_line(&mut self.jitter);
         self.owner.leave_line(&mut self.jitter);
     }
 
     /// Changes the geofence. A relay outside of it returns with the next setpoint.
-    pub fn set_box(&mut self, fence: Geofence) {
-        self.own.config.fence = fence;
+    pub fn set_geofence(&mut self, fence: Geofence) {
+        self.own.config.geofence = fence;
     }
 
     /// Handles a message of node `from`, a neighbour at `side`.
     ///
     /// A message out of range is counted, one of an earlier association or of another node is ignored.
-    pub fn hear(&mut self, side: Side, from: u16, fence: &Fence) {
+    pub fn handle_fence(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);
         }
@@ -275,7 +275,7 @@ impl Guard {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         let (is_heard, limit_m, keep_out) = match side {
             Side::Upstream => (
-                self.follower.is_agreed(),
+                self.follower.has_fence(),
                 low_m,
                 &mut self.follower.keep_out,
             ),
@@ -283,7 +283,7 @@ impl Guard {
         };
         keep_out.clear();
         if others && !is_heard {
-            keep_out.expect(side, limit_m, self.own.config.separation_m);
+            keep_out.add_unheard(side, limit_m, self.own.config.separation_m);
         }
     }
 
@@ -294,7 +294,7 @@ impl Guard {
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.own.target?;
         let Some(before) = self.own.setpoint else {
-            let found = self.found?;
+            let found = self.initial_place?;
             self.own.reachable = ReachableInterval::at(found.x_m, now);
             let (x_m, apart) = (found.x_m, self.own.config.separation_m);
             self.follower.keep_out.begin(x_m, x_m + apart);
@@ -303,22 +303,23 @@ impl Guard {
             return self.own.setpoint;
         };
         let low_m = self.owner.low_m(&self.own);
-        self.follower.settle(&self.own, low_m);
+        self.follower.update_clearance(&self.own, low_m);
         self.clear_near();
         let is_ordered = self.is_ordered();
         self.halt(is_ordered, now);
         let before = self.own.setpoint.unwrap_or(before);
-        let clear = self.follower.is_clear(&self.own) && self.owner.is_clear(&self.own);
+        let clear =
+            self.follower.may_move_across(&self.own) && self.owner.may_move_across(&self.own);
         self.open(clear);
         let own = &self.own;
-        let taken_m = self.follower.taken_m();
+        let kept_m = self.follower.kept_distance();
         let apart = if own.open {
             own.config.separation_m
         } else {
-            self.owner.apart(own, taken_m)
+            self.owner.step(own, kept_m)
         };
-        let mut least = self.follower.least(own);
-        let mut most = self.owner.most(own, apart);
+        let mut least = self.follower.min_x(own);
+        let mut most = self.owner.max_x(own, apart);
         if !own.has_agreed_cross_section() {
             // A relay that has to move across the line first moves away from one that became silent nearby.
             least = least.max(self.follower.keep_out.near_m());
@@ -332,15 +333,15 @@ impl Guard {
         let across = if clear && moves { target } else { before };
         // A relay outside of the geofence returns as far as its limits allow, and goes no farther out.
         let wanted = across.cross_section().at(x_m);
-        let next = own.config.cut_toward(wanted, before);
+        let next = own.config.clamp_toward(wanted, before);
         let from = own.path_start(before);
         let next = self.follower.keep_out.path_end(from, next, &own.config);
         let next = self.owner.keep_out.path_end(from, next, &own.config);
-        self.own.reachable.go(next.x_m, now);
+        self.own.reachable.extend_to(next.x_m, now);
         self.own.set_setpoint(next, now);
         if self.follower.is_ordered() {
             let upstream_m = self.follower.high_m(&self.own);
-            self.owner.settle(&self.own, taken_m, upstream_m);
+            self.owner.schedule_fence(&self.own, kept_m, upstream_m);
         }
         self.own.setpoint
     }
@@ -361,13 +362,15 @@ impl Guard {
     /// altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
-        let waits = !clear && !own.has_agreed_cross_section();
+        let is_blocked = !clear && !own.has_agreed_cross_section();
         let close = self.follower.is_close(own) || self.owner.is_close(own);
         let tight = close && (self.follower.is_tight() || self.owner.is_tight());
-        let needs = tight || waits && (self.follower.is_held(own) || self.owner.holds(own));
+        let needs = tight
+            || is_blocked
+                && (self.follower.has_reduced_step(own) || self.owner.has_reduced_step(own));
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
-        own.open = needs || up.opens || down.opens;
-        let (upward, downward) = (needs || down.opens, needs || up.opens);
+        own.open = needs || up.open_requested || down.open_requested;
+        let (upward, downward) = (needs || down.open_requested, needs || up.open_requested);
         up.forward_open(upward);
         down.forward_open(downward);
     }
@@ -399,12 +402,12 @@ impl Guard {
     fn halt(&mut self, is_ordered: bool, now: Instant) {
         self.disorder &= !is_ordered && !self.is_seen_in_order();
         self.disorder |= self.is_out_of_order();
-        let halted = self.pass_halt();
+        let halted = self.forward_halt();
         self.own.halt(halted || !is_ordered, now);
     }
 
     /// Forwards the halt requests of this relay and of its neighbours; returns true if there are any.
-    fn pass_halt(&mut self) -> bool {
+    fn forward_halt(&mut self) -> bool {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         let (upstream, downstream) = (up.has_halt_request(), down.has_halt_request());
         up.forward_halt(self.disorder || downstream);
@@ -426,7 +429,7 @@ impl Guard {
             }
         }
         if !self.flown || self.own.target.is_none() || !self.own.reachable.is_known() {
-            self.pass_halt();
+            self.forward_halt();
             let (up, down) = (&mut self.follower.association, &mut self.owner.association);
             let fence_message = [(Side::Upstream, up), (Side::Downstream, down)]
                 .into_iter()
@@ -442,9 +445,9 @@ impl Guard {
         let own = &self.own;
         let placed = self.owner.is_ordered(own);
         if placed {
-            let taken_m = self.follower.taken_m();
+            let kept_m = self.follower.kept_distance();
             self.follower
-                .agree(own, self.owner.kept_distance(own, taken_m));
+                .agree(own, self.owner.kept_distance(own, kept_m));
         }
         let low_m = self.owner.low_m(own);
         if let Some(fence) = self.follower.poll_fence(own, low_m, placed) {
@@ -452,30 +455,31 @@ impl Guard {
         }
         let moves = self.follower.is_ordered();
         let upstream_m = self.follower.high_m(own);
-        let taken_m = self.follower.taken_m();
-        let fence = self.owner.poll_fence(own, taken_m, upstream_m, moves)?;
+        let kept_m = self.follower.kept_distance();
+        let fence = self.owner.poll_fence(own, kept_m, upstream_m, moves)?;
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
     /// Schedules all messages again that may have been lost; returns true if there are any. Call it about every second.
     pub fn remind(&mut self) -> bool {
         let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
-        self.waits = if begun && !self.is_ordered() {
-            self.waits.saturating_add(1)
+        self.unordered = if begun && !self.is_ordered() {
+            self.unordered.saturating_add(1)
         } else {
             0
         };
-        self.disorder |= self.waits >= MOST_WAITS && !self.is_seen_in_order();
-        let there = self.is_there();
-        let follower = self.follower.association.node != 0 && !(there && self.follower.is_agreed());
-        let owner = self.owner.association.node != 0 && !(there && self.owner.is_agreed());
+        self.disorder |= self.unordered >= MAX_UNORDERED && !self.is_seen_in_order();
+        let arrived = self.has_arrived();
+        let follower =
+            self.follower.association.node != 0 && !(arrived && self.follower.has_fence());
+        let owner = self.owner.association.node != 0 && !(arrived && self.owner.is_cleared());
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         self.own.count_reminder();
         // A relay without an association sends its position less often, unless it moves.
         self.reminders = self.reminders.wrapping_add(1);
-        let speaks = begun || self.own.has_moved() || self.reminders.is_multiple_of(ALONE_EVERY);
-        up.due |= follower && (speaks || up.sends_halt());
-        down.due |= owner && (speaks || down.sends_halt());
+        let sends = begun || self.own.has_moved() || self.reminders.is_multiple_of(UNFLOWN_EVERY);
+        up.due |= follower && (sends || up.sends_halt());
+        down.due |= owner && (sends || down.sends_halt());
         up.count_reminder();
         down.count_reminder();
         let leaves = up.remind() | down.remind();
@@ -484,15 +488,15 @@ impl Guard {
 
     /// Returns true if the setpoint is the agreed position and the relay was reported there since. The agreed position is limited
     /// to the geofence.
-    pub fn is_there(&self) -> bool {
+    pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
             (Some(target), Some(setpoint)) => {
                 !(own.open || own.halted)
                     && (target.x_m - setpoint.x_m).abs() <= own.config.rounding()
-                    && own.reachable.is_still()
+                    && own.reachable.has_arrived()
                     && own.has_agreed_cross_section()
-                    && own.still
+                    && own.arrived
             }
             _ => false,
         }
@@ -508,15 +512,15 @@ impl Guard {
         let own = &self.own;
         if !self.flown {
             let wrong = match side {
-                Side::Upstream => self.follower.association.is_passed(own, side),
-                Side::Downstream => self.owner.association.is_passed(own, side),
+                Side::Upstream => self.follower.association.is_on_wrong_side(own, side),
+                Side::Downstream => self.owner.association.is_on_wrong_side(own, side),
             };
             return wrong.then_some(HoldReason::Order);
         }
         own.target?;
         let reason = match side {
             Side::Upstream => self.follower.hold_reason(own),
-            Side::Downstream => self.owner.hold_reason(own, self.follower.taken_m()),
+            Side::Downstream => self.owner.hold_reason(own, self.follower.kept_distance()),
         };
         let association = match side {
             Side::Upstream => &self.follower.association,
@@ -541,18 +545,18 @@ impl Guard {
         let own = &self.own;
         let (clear, keep_out, association) = match side {
             Side::Upstream => (
-                self.follower.is_clear(own),
+                self.follower.may_move_across(own),
                 &self.follower.keep_out,
                 &self.follower.association,
             ),
             Side::Downstream => (
-                self.owner.is_clear(own),
+                self.owner.may_move_across(own),
                 &self.owner.keep_out,
                 &self.owner.association,
             ),
         };
-        let waits = own.waits(side, clear);
-        waits.then(|| keep_out.reason(association.node, HoldReason::Pending))
+        let is_held_up = own.is_held_up(side, clear);
+        is_held_up.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 
     /// Returns the number of rejected inputs: not a number, or out of range. It saturates.
@@ -563,5 +567,5 @@ impl Guard {
 
 #[inline(never)] // called from several places
 fn is_placement(place: Placement) -> bool {
-    is_place(place.x_m) && is_place(place.y_m) && is_place(place.altitude_m)
+    is_coordinate(place.x_m) && is_coordinate(place.y_m) && is_coordinate(place.altitude_m)
 }

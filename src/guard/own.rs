@@ -23,7 +23,7 @@ impl Span {
         }
     }
 
-    fn and(self, other: Self) -> Self {
+    fn union(self, other: Self) -> Self {
         Self {
             low_m: self.low_m.min(other.low_m),
             high_m: self.high_m.max(other.high_m),
@@ -34,17 +34,17 @@ impl Span {
 /// Interval along x, m, in which this relay may be, between its last report and its setpoints.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
-    pub(super) at_m: f32,
+    pub(super) setpoint_m: f32,
     pub(super) low_m: f32,
     pub(super) high_m: f32,
     /// Time of the last change of the setpoint's x.
-    changed: Instant,
-    /// Interval that contains the x of all setpoints since the time `since`.
-    late: Span,
-    since: Instant,
+    changed_at: Instant,
+    /// Interval that contains the x of all setpoints since the time `recent_since`.
+    recent_span: Span,
+    recent_since: Instant,
     /// Interval of the x of earlier setpoints, which may still have had an effect at the last report.
-    before: Span,
-    reported: Instant,
+    earlier_span: Span,
+    reported_at: Instant,
     /// True once a position report shows the effect of the first setpoint.
     known: bool,
 }
@@ -59,19 +59,19 @@ impl ReachableInterval {
     /// the relay may still fly to an earlier one.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
-            at_m: x_m,
+            setpoint_m: x_m,
             low_m: x_m,
             high_m: x_m,
-            changed: now,
-            late: Span::at(x_m),
-            since: now,
-            before: Span::at(x_m),
-            reported: now,
+            changed_at: now,
+            recent_span: Span::at(x_m),
+            recent_since: now,
+            earlier_span: Span::at(x_m),
+            reported_at: now,
             known: false,
         }
     }
 
-    fn is(&mut self, span: Span) {
+    fn set_span(&mut self, span: Span) {
         (self.low_m, self.high_m) = (span.low_m, span.high_m);
     }
 
@@ -84,34 +84,34 @@ impl ReachableInterval {
 
     /// Extends the interval of the relay's possible x by a new setpoint `x_m`. The relay may first fly on toward the
     /// last setpoint, and then turn.
-    pub(super) fn go(&mut self, x_m: f32, now: Instant) {
-        if (x_m - self.at_m).abs() > 0.0 {
-            self.at_m = x_m;
-            self.changed = now;
-            self.late = self.late.and(Span::at(x_m));
-            self.is(self.span().and(Span::at(x_m)));
+    pub(super) fn extend_to(&mut self, x_m: f32, now: Instant) {
+        if (x_m - self.setpoint_m).abs() > 0.0 {
+            self.setpoint_m = x_m;
+            self.changed_at = now;
+            self.recent_span = self.recent_span.union(Span::at(x_m));
+            self.set_span(self.span().union(Span::at(x_m)));
         }
     }
 
     /// Updates the interval of the relay's possible x by a position report of time `at`. The relay is between the
     /// reported x and its recent setpoints.
     pub(super) fn report(&mut self, at: Instant, x_m: f32, config: &GuardConfig) {
-        let hovers = (x_m - self.at_m).abs() <= config.hover_m + config.rounding();
-        let here = Span::at(if hovers { self.at_m } else { x_m });
-        if at >= self.since + config.lag {
+        let hovers = (x_m - self.setpoint_m).abs() <= config.hover_m + config.rounding();
+        let here = Span::at(if hovers { self.setpoint_m } else { x_m });
+        if at >= self.recent_since + config.lag {
             self.known = true;
-            self.before = self.late;
-            self.late = Span::at(self.at_m);
-            self.since = self.changed;
+            self.earlier_span = self.recent_span;
+            self.recent_span = Span::at(self.setpoint_m);
+            self.recent_since = self.changed_at;
         }
-        if at >= self.changed + config.lag {
-            self.before = self.late;
+        if at >= self.changed_at + config.lag {
+            self.earlier_span = self.recent_span;
         }
-        if self.known && at >= self.reported {
-            self.reported = at;
-            self.is(self.before.and(self.late).and(here));
+        if self.known && at >= self.reported_at {
+            self.reported_at = at;
+            self.set_span(self.earlier_span.union(self.recent_span).union(here));
         } else {
-            self.is(self.span().and(here));
+            self.set_span(self.span().union(here));
         }
     }
 
@@ -120,7 +120,7 @@ impl ReachableInterval {
     }
 
     /// Returns true if the relay has arrived at its setpoint's x.
-    pub(super) fn is_still(&self) -> bool {
+    pub(super) fn has_arrived(&self) -> bool {
         self.known && self.high_m <= self.low_m
     }
 }
@@ -137,9 +137,9 @@ pub(super) struct Own {
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
     /// Time of the last change of the setpoint's lateral offset or altitude.
-    turned: Instant,
+    cross_section_changed_at: Instant,
     /// True once the relay has arrived at the setpoint's lateral offset and altitude.
-    pub(super) still: bool,
+    pub(super) arrived: bool,
     /// True while the chain is open here, on request: neighbours are the separation apart along x.
     pub(super) open: bool,
     /// True while this relay holds its position, because the order of relays along x is wrong or unknown.
@@ -151,7 +151,7 @@ pub(super) struct Own {
     reminders: u8,
     /// Last setpoint at which this relay arrived, or its first one. A halt on the way from there stops the relay no
     /// farther outside the geofence than that.
-    left: Placement,
+    last_arrival: Placement,
 }
 
 impl Own {
@@ -162,21 +162,21 @@ impl Own {
             target: None,
             setpoint: None,
             reachable: ReachableInterval::unknown(now),
-            turned: now,
-            still: false,
+            cross_section_changed_at: now,
+            arrived: false,
             open: false,
             halted: true,
             reported: None,
             sent_place: Placement::on_line(0.0, 0.0),
             reminders: 0,
-            left: Placement::on_line(0.0, 0.0),
+            last_arrival: Placement::on_line(0.0, 0.0),
         }
     }
 
     pub(super) fn set_setpoint(&mut self, setpoint: Placement, now: Instant) {
         if self.cross_section() != setpoint.cross_section() {
-            self.turned = now;
-            self.still = false;
+            self.cross_section_changed_at = now;
+            self.arrived = false;
         }
         if self.setpoint != Some(setpoint) {
             self.reminders = 0;
@@ -189,7 +189,7 @@ impl Own {
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
-            Some(place) if !self.reachable.is_still() => (place.x_m, self.config.hover_m),
+            Some(place) if !self.reachable.has_arrived() => (place.x_m, self.config.hover_m),
             _ => return setpoint,
         };
         let least_m = (at_m - off_m).max(low_m);
@@ -205,7 +205,7 @@ impl Own {
     /// Returns true if the setpoint is short of the agreed position and has not moved for five reminders. The agreed
     /// position is then farther toward `side`. Or it has another lateral offset or altitude, and `clear` is false:
     /// this side forbids that move.
-    pub(super) fn waits(&self, side: Side, clear: bool) -> bool {
+    pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
         };
@@ -213,8 +213,8 @@ impl Own {
             Side::Upstream => setpoint.x_m - target.x_m,
             Side::Downstream => target.x_m - setpoint.x_m,
         };
-        let wants = ahead_m > self.config.rounding() || !clear && !self.has_agreed_cross_section();
-        self.reminders >= MAX_REMINDERS_STILL && wants
+        let moves = ahead_m > self.config.rounding() || !clear && !self.has_agreed_cross_section();
+        self.reminders >= MAX_REMINDERS_STILL && moves
     }
 
     /// Returns true if the relay has moved away from the last position that it has sent without setpoints.
@@ -230,7 +230,7 @@ impl Own {
     pub(super) const fn release(&mut self, now: Instant) {
         self.setpoint = None;
         self.reachable = ReachableInterval::unknown(now);
-        (self.turned, self.still) = (now, false);
+        (self.cross_section_changed_at, self.arrived) = (now, false);
         (self.open, self.halted) = (false, true);
     }
 
@@ -242,30 +242,30 @@ impl Own {
             && let Some(reported) = self.reported
         {
             let ReachableInterval { low_m, high_m, .. } = self.reachable;
-            let reported = self.config.cut_toward(reported, self.left);
-            if !self.reachable.is_still() {
+            let reported = self.config.clamp_toward(reported, self.last_arrival);
+            if !self.reachable.has_arrived() {
                 stop.x_m = reported.x_m.max(low_m).min(high_m);
             }
-            if !self.still {
+            if !self.arrived {
                 stop = reported.cross_section().at(stop.x_m);
             }
-            self.reachable.go(stop.x_m, now);
+            self.reachable.extend_to(stop.x_m, now);
             self.set_setpoint(stop, now);
         }
     }
 
     pub(super) fn begin(&mut self, place: Placement, now: Instant) {
-        self.left = place;
+        self.last_arrival = place;
         self.set_setpoint(place, now);
     }
 
     /// Handles a position report, measured at time `at`. The relay has arrived at its lateral offset and altitude if
     /// `at` is long enough after their last change.
     pub(super) fn report(&mut self, at: Instant, place: Placement) {
-        self.still |= at >= self.turned + self.config.lag
+        self.arrived |= at >= self.cross_section_changed_at + self.config.lag
             && self.is_near(place.cross_section(), self.cross_section());
-        if let Some(setpoint) = self.setpoint.filter(|_| self.still) {
-            self.left = setpoint;
+        if let Some(setpoint) = self.setpoint.filter(|_| self.arrived) {
+            self.last_arrival = setpoint;
         }
     }
 
@@ -297,7 +297,7 @@ impl Own {
     /// Returns the current goal of `node` along x, m: `target_m`, or its place in an open chain.
     pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
         if self.open {
-            self.config.open_place(node, target_m)
+            self.config.open_chain_x(node, target_m)
         } else {
             target_m
         }

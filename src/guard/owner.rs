@@ -17,19 +17,19 @@ pub(super) struct FenceOwner {
     /// x of the newest fence plane that this relay has announced, m; infinite before the first.
     fence_m: f32,
     /// Distance along x that this relay requests to keep from the fence plane, m; infinite before any.
-    asked_m: f32,
+    requested_m: f32,
     /// Distance along x to which the neighbour has agreed, m. A larger one that this relay requests replaces it at
     /// once. Infinite stands for the separation.
-    granted_m: f32,
+    agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
-    counted_m: f32,
+    follower_low_m: f32,
     /// Agreed x of the neighbour downstream, m.
     target_m: f32,
-    /// Lateral offset and altitude of the neighbour's setpoint; `still` is true once it has arrived there.
+    /// Lateral offset and altitude of the neighbour's setpoint; `arrived` is true once it has arrived there.
     across: CrossSection,
-    still: bool,
+    arrived: bool,
     /// True if the neighbour has received the newest fence plane.
-    answered: bool,
+    is_acknowledged: bool,
     /// True once the neighbour has reported that it is beyond a fence plane.
     clear: bool,
 }
@@ -41,13 +41,13 @@ impl FenceOwner {
             keep_out: KeepOut::none(),
             number: 0,
             fence_m: f32::INFINITY,
-            asked_m: f32::INFINITY,
-            granted_m: f32::INFINITY,
-            counted_m: f32::NEG_INFINITY,
+            requested_m: f32::INFINITY,
+            agreed_m: f32::INFINITY,
+            follower_low_m: f32::NEG_INFINITY,
             target_m: 0.0,
             across: CrossSection::on_line(0.0),
-            still: false,
-            answered: false,
+            arrived: false,
+            is_acknowledged: false,
             clear: false,
         }
     }
@@ -55,7 +55,7 @@ impl FenceOwner {
     /// Replaces the neighbour downstream by `node`; 0 for none.
     pub(super) fn link(&mut self, node: u16, own: &Own, jitter: &mut Jitter) {
         if self.is_out_of_order(own) {
-            self.keep_out.disorder();
+            self.keep_out.mark_disordered();
         }
         self.renew(own, jitter);
         self.association.node = node;
@@ -66,11 +66,11 @@ impl FenceOwner {
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
-            let limit_m = self.most(own, own.config.separation_m);
-            keep_out.raise(Side::Downstream, self.association.node, limit_m);
+            let limit_m = self.max_x(own, own.config.separation_m);
+            keep_out.add_lost(Side::Downstream, self.association.node, limit_m);
             if !self.is_ordered(own) {
                 keep_out.mark_near(limit_m - own.config.separation_m);
-            } else if self.holds(own) || !self.clear {
+            } else if self.has_reduced_step(own) || !self.clear {
                 keep_out.mark_near(limit_m);
             }
         }
@@ -106,8 +106,8 @@ impl FenceOwner {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
         if !was_absent {
-            let (node, at_m) = (self.association.node, own.reachable.at_m);
-            self.keep_out.raise(Side::Downstream, node, at_m);
+            let (node, at_m) = (self.association.node, own.reachable.setpoint_m);
+            self.keep_out.add_lost(Side::Downstream, node, at_m);
         }
         if is_ordered {
             self.association.mark_absent(association);
@@ -115,7 +115,7 @@ impl FenceOwner {
     }
 
     pub(super) const fn has_reply(&self) -> bool {
-        self.association.heard != 0
+        self.association.peer_number != 0
     }
 
     /// Returns true if no flown neighbour is downstream, or if its x is known to be beyond this relay's.
@@ -131,9 +131,9 @@ impl FenceOwner {
         if self.keep_out.is_disordered() {
             true
         } else if self.has_reply() {
-            !self.is_beyond(own) && self.counted_m > f32::NEG_INFINITY
+            !self.is_beyond(own) && self.follower_low_m > f32::NEG_INFINITY
         } else {
-            !self.is_ordered(own) && self.association.is_passed(own, Side::Downstream)
+            !self.is_ordered(own) && self.association.is_on_wrong_side(own, Side::Downstream)
         }
     }
 
@@ -151,48 +151,48 @@ impl FenceOwner {
             (false, true) => -off_m - own.config.rounding(),
             (false, false) => off_m,
         };
-        self.counted_m - own.reachable.high_m >= least_m
+        self.follower_low_m - own.reachable.high_m >= least_m
     }
 
     /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream is lower only by the
     /// errors of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
-        let is_lower = self.counted_m < low_m - 2.0 * own.config.rounding();
+        let is_lower = self.follower_low_m < low_m - 2.0 * own.config.rounding();
         if !self.association.has_no_flown_neighbour() && self.has_reply() && is_lower {
-            self.counted_m
+            self.follower_low_m
         } else {
             low_m
         }
     }
 
-    /// Returns the distance along x that this relay keeps from the neighbour downstream, m. `taken_m` is the distance
+    /// Returns the distance along x that this relay keeps from the neighbour downstream, m. `kept_m` is the distance
     /// agreed with the neighbour upstream; the two distances add up to at least the separation.
-    pub(super) fn apart(&self, own: &Own, taken_m: f32) -> f32 {
+    pub(super) fn step(&self, own: &Own, kept_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
-        self.granted_m.max(separation_m - taken_m).min(separation_m)
+        self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
     /// Returns the distance along x to the relay downstream that is certain, m. It is 0 near a lost relay, and until
-    /// the neighbour is beyond the first fence plane. `taken_m` is the distance agreed with the neighbour upstream.
-    pub(super) fn kept_distance(&self, own: &Own, taken_m: f32) -> f32 {
+    /// the neighbour is beyond the first fence plane. `kept_m` is the distance agreed with the neighbour upstream.
+    pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
             0.0
         } else {
-            self.apart(own, taken_m)
+            self.step(own, kept_m)
         }
     }
 
     /// Returns true if the distance along x is below the separation. Lateral offset and altitude then must not
     /// change, because they may separate the two relays.
-    pub(super) fn holds(&self, own: &Own) -> bool {
-        self.asked_m.min(self.granted_m) < own.config.separation_m
+    pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
+        self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
 
     /// Returns the neighbour's agreed position; `None` before its first fence message.
     pub(super) fn neighbour_place(&self) -> Option<Placement> {
-        self.counted_m
+        self.follower_low_m
             .is_finite()
             .then(|| self.across.at(self.target_m))
     }
@@ -213,7 +213,7 @@ impl FenceOwner {
             return;
         }
         self.keep_out.remove_unflown();
-        if !self.has_reply() && fence.echo == self.association.own {
+        if !self.has_reply() && fence.echo == self.association.own_number {
             self.association.pair(fence.association);
             self.association.due = true;
             self.keep_out
@@ -231,14 +231,14 @@ impl FenceOwner {
             return;
         }
         self.target_m = fence.target_m;
-        (self.across, self.still) = (fence.across, fence.has_flag(Fence::ARRIVED));
-        self.answered = fence.number == self.number;
-        if self.answered {
-            self.counted_m = self.counted_m.max(fence.x_m.min(self.fence_m));
+        (self.across, self.arrived) = (fence.across, fence.has_flag(Fence::ARRIVED));
+        self.is_acknowledged = fence.number == self.number;
+        if self.is_acknowledged {
+            self.follower_low_m = self.follower_low_m.max(fence.x_m.min(self.fence_m));
             self.clear |= self.number != 0 && fence.x_m >= self.fence_m;
-            if self.still && fence.has_flag(Fence::AGREES) {
+            if self.arrived && fence.has_flag(Fence::AGREES) {
                 let least_m = own.config.least_step(own.cross_section(), fence.across);
-                self.granted_m = self.granted_m.min(self.asked_m.max(least_m));
+                self.agreed_m = self.agreed_m.min(self.requested_m.max(least_m));
             }
         } else {
             self.association.due = true;
@@ -247,22 +247,22 @@ impl FenceOwner {
 
     /// Returns the largest allowed x, m, that keeps the distance `apart` from the neighbour, m.
     #[inline(never)] // called from several places
-    pub(super) fn most(&self, own: &Own, apart: f32) -> f32 {
+    pub(super) fn max_x(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
             self.association.has_no_flown_neighbour(),
             self.is_beyond(own),
         ) {
             (true, _) => f32::INFINITY,
-            (false, true) => self.counted_m - apart,
-            (false, false) => own.reachable.at_m,
+            (false, true) => self.follower_low_m - apart,
+            (false, false) => own.reachable.setpoint_m,
         };
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
     /// Returns true if nothing downstream forbids this relay to change its lateral offset or altitude.
-    pub(super) fn is_clear(&self, own: &Own) -> bool {
+    pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
-            && !self.holds(own)
+            && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
@@ -278,17 +278,20 @@ impl FenceOwner {
     }
 
     /// Returns true if the neighbour has received the newest fence plane and reported that it is beyond it.
-    pub(super) fn is_agreed(&self) -> bool {
-        self.clear && self.answered && self.counted_m >= self.fence_m
+    pub(super) fn is_cleared(&self) -> bool {
+        self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
     /// Returns the distance along x that the agreed positions need, m. It is below the separation only if both relays
     /// have arrived at their lateral offsets and altitudes and the agreed positions are that close.
-    fn best_apart(&self, own: &Own) -> f32 {
+    fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
-        let settled =
-            self.clear && self.still && own.still && own.has_agreed_cross_section() && !own.open;
+        let settled = self.clear
+            && self.arrived
+            && own.arrived
+            && own.has_agreed_cross_section()
+            && !own.open;
         if !(settled && own.is_close(step_m)) {
             return separation_m;
         }
@@ -300,40 +303,40 @@ impl FenceOwner {
     /// the neighbour is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays
     /// upstream, m.
     #[inline(never)] // called from several places
-    fn proposed_fence(&self, own: &Own, taken_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
+    fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
             return None;
         }
-        let best = self.best_apart(own);
+        let best = self.best_step(own);
         // A larger step only if this relay is already that far away.
-        let now_m = self.counted_m - own.reachable.high_m + own.config.rounding();
-        let ask = if best > self.granted_m.max(now_m) {
-            self.asked_m
+        let now_m = self.follower_low_m - own.reachable.high_m + own.config.rounding();
+        let step_m = if best > self.agreed_m.max(now_m) {
+            self.requested_m
         } else {
             best
         };
-        let nearest = own.reachable.high_m + self.apart(own, taken_m).max(ask);
+        let nearest = own.reachable.high_m + self.step(own, kept_m).max(step_m);
         let nearest = nearest.max(upstream_m + own.config.separation_m);
         if !self.clear {
-            return Some((nearest, ask, true));
+            return Some((nearest, step_m, true));
         }
         let other_m = own.goal_of(self.association.node, self.target_m);
         let goal = 0.5 * (own.goal_m() + other_m + best);
-        Some((goal.max(nearest), ask, goal >= nearest))
+        Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
     /// Schedules a message if the best position of the fence plane has changed. A final one is sent at once. While
     /// this relay moves, another one waits for the next reminder.
-    pub(super) fn settle(&mut self, own: &Own, taken_m: f32, upstream_m: f32) {
-        if let Some((x_m, ask, last)) = self.proposed_fence(own, taken_m, upstream_m) {
-            let stays = last || own.reachable.is_still();
-            self.association.due |= stays && self.is_other(own, x_m, ask);
+    pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
+        if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
+            let stays = last || own.reachable.has_arrived();
+            self.association.due |= stays && self.is_new_fence(own, x_m, step_m);
         }
     }
 
-    fn is_other(&self, own: &Own, x_m: f32, ask: f32) -> bool {
-        let asked = self.asked_m.min(own.config.separation_m);
-        self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (ask - asked).abs() > 0.0
+    fn is_new_fence(&self, own: &Own, x_m: f32, step_m: f32) -> bool {
+        let announced_m = self.requested_m.min(own.config.separation_m);
+        self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
     /// Returns the pending message to the neighbour downstream. The fence plane moves only here and if `moves` is
@@ -341,26 +344,26 @@ impl FenceOwner {
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,
-        taken_m: f32,
+        kept_m: f32,
         upstream_m: f32,
         moves: bool,
     ) -> Option<Fence> {
         if self.association.node == 0 || !core::mem::take(&mut self.association.due) {
             return None;
         }
-        let wish = self.proposed_fence(own, taken_m, upstream_m);
-        if let Some((x_m, ask, _)) =
-            wish.filter(|(x_m, ask, _)| moves && self.is_other(own, *x_m, *ask))
+        let proposed = self.next_fence(own, kept_m, upstream_m);
+        if let Some((x_m, step_m, _)) =
+            proposed.filter(|(x_m, step_m, _)| moves && self.is_new_fence(own, *x_m, *step_m))
         {
             self.number = match self.number.wrapping_add(1) {
                 0 => 1,
                 number => number,
             };
             self.fence_m = x_m;
-            self.asked_m = ask;
-            self.granted_m = self.granted_m.max(ask);
-            self.answered = false;
-            self.counted_m = self.counted_m.min(x_m);
+            self.requested_m = step_m;
+            self.agreed_m = self.agreed_m.max(step_m);
+            self.is_acknowledged = false;
+            self.follower_low_m = self.follower_low_m.min(x_m);
         }
         let x_m = if self.number == 0 {
             own.reachable.high_m
@@ -370,12 +373,12 @@ impl FenceOwner {
         Some(Fence {
             number: self.number,
             x_m,
-            apart_m: self.asked_m.min(own.config.separation_m),
+            apart_m: self.requested_m.min(own.config.separation_m),
             ..self.association.fence(own)
         })
     }
 
-    pub(super) fn hold_reason(&self, own: &Own, taken_m: f32) -> Option<HoldReason> {
+    pub(super) fn hold_reason(&self, own: &Own, kept_m: f32) -> Option<HoldReason> {
         if self.keep_out.is_disordered() {
             return Some(HoldReason::Order);
         }
@@ -399,7 +402,7 @@ impl FenceOwner {
             return Some(HoldReason::Order);
         }
         let step_m = self.target_m - target_m;
-        let far = step_m + own.config.rounding() < self.apart(own, taken_m);
+        let far = step_m + own.config.rounding() < self.step(own, kept_m);
         far.then_some(HoldReason::Close)
     }
 }

@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn a_duplicate_is_retransmitted_soon_unless_the_next_relay_has_it() {
+    fn a_duplicate_hastens_the_retransmission_to_the_next_relay() {
         let mut one = sent();
         one.on_duplicate(START, PATH);
         assert_eq!(one.poll_reply(), Some(Reply::InProgress));
@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reply_is_sent_once_or_on_a_lossy_channel_by_the_digits_of_its_hops() {
+    fn replies_on_a_lossy_channel_grow_with_the_digits_of_hops() {
         for (hops, digits) in [(0, 0), (1, 1), (7, 3), (8, 4), (49, 6), (199, 8)] {
             for lossy in [false, true] {
                 let (mut one, mut now) = (sent(), START);
@@ -435,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_sent_of_a_message_that_is_withdrawn_or_closed() {
+    fn a_withdrawn_or_closed_message_is_not_sent() {
         for (end, stage) in [
             (Circulation::withdraw as fn(&mut Circulation), Stage::Idle),
             (Circulation::close, Stage::Completed),

@@ -47,7 +47,7 @@ impl Member {
 
     /// Returns this relay's rank, counted from the leader with 1, and the number of relays. Both are those of the
     /// loaded mission, before any view change.
-    pub(crate) const fn place_in_all(&self) -> (u16, u16) {
+    pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
             Heading::TowardTx => self.all.saturating_sub(self.node).saturating_add(1),
@@ -160,10 +160,10 @@ impl<'a> Context<'a> {
 pub(crate) struct OtherLeases {
     /// Longest remaining time for which members of this relay's view may rely on this relay.
     pub(crate) lease_left: Duration,
-    /// Last accepted view. `rest` is the longest remaining lease of earlier views; `None` if a member may not have
+    /// Last accepted view. `earlier_lease_left` is the longest remaining lease of earlier views; `None` if a member may not have
     /// accepted `view`.
     pub(crate) view: ViewId,
-    pub(crate) rest: Option<Duration>,
+    pub(crate) earlier_lease_left: Option<Duration>,
 }
 
 impl OtherLeases {
@@ -171,16 +171,16 @@ impl OtherLeases {
     pub(crate) const NONE: Self = Self {
         lease_left: Duration::from_micros(0),
         view: ViewId::LOADED,
-        rest: Some(Duration::from_micros(0)),
+        earlier_lease_left: Some(Duration::from_micros(0)),
     };
 
     /// Returns the time until all leases of views before `view` have expired, in tenths of a second. `u16::MAX` if it
     /// is not known.
-    pub(crate) fn rest_of(self, view: ViewId) -> u16 {
+    pub(crate) fn earlier_lease_tenths(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
         } else {
-            let known = self.rest.filter(|_| view == self.view);
+            let known = self.earlier_lease_left.filter(|_| view == self.view);
             known.map_or(u16::MAX, tenths)
         }
     }
@@ -207,7 +207,7 @@ pub(crate) struct Effects {
     pub(crate) proposed_by: Option<Proposer>,
     /// True if a view proposal is outstanding: no pass continues before its decision.
     pub(crate) view_proposed: bool,
-    pub(crate) news: Option<LayerEvent>,
+    pub(crate) event: Option<LayerEvent>,
     /// Changes of the interference estimate and of the faulty receivers.
     pub(crate) sensed: Sensed,
 }
@@ -249,7 +249,7 @@ pub(crate) struct Sensed {
     /// The measurements do not fit a single source of interference.
     pub(crate) unclear: bool,
     /// Node whose measurements do not fit the other nodes' measurements.
-    pub(crate) off: Option<u16>,
+    pub(crate) faulty_sensor: Option<u16>,
 }
 
 /// Decision on a view proposal.
@@ -279,11 +279,11 @@ impl Effects {
         alive: None,
         proposed_by: None,
         view_proposed: false,
-        news: None,
+        event: None,
         sensed: Sensed {
             new_estimate: false,
             unclear: false,
-            off: None,
+            faulty_sensor: None,
         },
     };
 
@@ -303,9 +303,9 @@ impl Effects {
         ..Self::STALE
     };
 
-    pub(crate) const fn of(news: LayerEvent) -> Self {
+    pub(crate) const fn of(event: LayerEvent) -> Self {
         Self {
-            news: Some(news),
+            event: Some(event),
             ..Self::NONE
         }
     }
@@ -323,11 +323,11 @@ impl Effects {
 pub(crate) const PAUSE: Duration = Duration::from_micros(250);
 
 /// Maximum duration of a lease, as a multiple of `dead_after`.
-const LONGEST: u32 = 8;
+const MAX_LEASE: u32 = 8;
 
 /// Returns the maximum duration of a lease.
 pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
-    settings.dead_after.times(LONGEST)
+    settings.dead_after.times(MAX_LEASE)
 }
 
 /// Returns the longest round trip of the first pass through `all` relays with half of the frames lost.

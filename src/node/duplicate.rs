@@ -112,7 +112,7 @@ pub(crate) struct IndexClaims {
     /// Largest claim number received from another node with this index and epoch.
     rival: u32,
     /// Claim number of the other node with this index, as received last; 0 before any.
-    heard: u32,
+    last_rival: u32,
     /// Time of the last frame of another node with this index. The flag is true if this relay had a position when it
     /// received the first one.
     contest: Option<(Instant, bool)>,
@@ -149,7 +149,7 @@ impl IndexClaims {
         let mut duplicate = Self {
             number,
             rival: 0,
-            heard: 0,
+            last_rival: 0,
             contest: None,
             observed: [None; 2],
             echoed: None,
@@ -200,7 +200,7 @@ impl IndexClaims {
     }
 
     pub(crate) const fn other_number(&self) -> u32 {
-        self.heard
+        self.last_rival
     }
 
     /// Returns true if this relay has held a position since before it first received the other node.
@@ -252,7 +252,7 @@ impl IndexClaims {
         let held = self.had_position_before(now, has_lease, settings);
         if !rival.newer_epoch {
             self.rival = self.rival.max(rival.number);
-            self.heard = rival.number;
+            self.last_rival = rival.number;
         }
         if self.is_passive() {
             if !rival.passive {
@@ -414,7 +414,7 @@ mod tests {
     /// A claim that names another claim number than this relay's was sent before its last start. Such a claim is
     /// answered and has no other effect.
     #[test]
-    fn a_claim_that_does_not_answer_this_start_is_answered_and_has_no_other_effect() {
+    fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
         for has_lease in [false, true] {
             let mut duplicate = duplicate();
@@ -486,7 +486,7 @@ mod tests {
     /// Checks that only a relay that had a position before it received the other one raises its claim. 40 s later the
     /// other one counts as received for the first time again.
     #[test]
-    fn a_relay_that_was_placed_after_it_received_the_other_one_does_not_raise_its_claim() {
+    fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();
         for (had_place, later_s, raises) in [(false, 1, false), (true, 1, true), (false, 40, true)]
         {
@@ -500,7 +500,7 @@ mod tests {
     }
 
     #[test]
-    fn two_that_hold_a_lease_come_to_one_within_three_claims() {
+    fn of_two_relays_with_leases_one_is_passive_after_three_claims() {
         let settings = Settings::default();
         for seeds in [[1, 2], [2, 1], [3, 9], [9, 3]] {
             let mut both = seeds.map(|seed| IndexClaims::new(seed, at(0), &settings));
@@ -518,7 +518,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_of_its_own_claim_makes_it_ignore_its_own_frames() {
+    fn a_relay_with_echoes_ignores_its_own_frames() {
         let settings = Settings::default();
         let mut duplicate = duplicate();
         let own = duplicate.number();
@@ -582,7 +582,7 @@ mod tests {
     /// Checks that a relay repeats its claim to its index after a claim of an active node. It does so for four
     /// seconds, or until that node is passive.
     #[test]
-    fn a_number_is_defended_for_four_seconds_or_until_the_other_is_passive() {
+    fn an_index_is_defended_for_4_s_or_until_the_other_is_passive() {
         let settings = Settings::default();
         for passive in [false, true] {
             let mut duplicate = duplicate();
@@ -606,7 +606,7 @@ mod tests {
     }
 
     #[test]
-    fn it_becomes_active_after_silence_of_twice_dead_after_or_once_the_other_is_gone() {
+    fn a_passive_relay_becomes_active_after_twice_dead_after() {
         let settings = Settings::default();
         let mut duplicate = duplicate();
         let own = duplicate.number();

@@ -40,7 +40,7 @@ use crate::wire::message::{Message, Pulse, Pulsed};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
     /// No lease yet: there is no agreement in this view, or not all members are known to have it.
-    Open,
+    Pending,
     Until(Instant),
     Lapsed,
 }
@@ -60,9 +60,9 @@ pub(crate) struct Lease {
     /// Time until which other members may rely on this relay.
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which its positions may be used.
-    rest: (ViewId, Instant),
+    accepted: (ViewId, Instant),
     /// Latest possible expiry of a lease granted before the accepted view; `None` if unknown.
-    bound: Option<Instant>,
+    older_leases_end: Option<Instant>,
     /// True once all relays of the view are known to have accepted it, or to have taken part in a renewal.
     is_whole: bool,
     /// True once this relay has agreed on its position in this view.
@@ -70,7 +70,7 @@ pub(crate) struct Lease {
     /// Time at which the leader starts the next lease renewal; `None` if none is due.
     next_at: Option<Instant>,
     /// Slowly decaying maximum of recent round trips of lease renewals through the chain.
-    slowest: Duration,
+    round_trip: Duration,
     circulation: Circulation,
 }
 
@@ -82,15 +82,15 @@ impl Lease {
     /// Creates the lease of a relay that was switched on at `now`. It may have been in a view that it does not remember.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
-            state: LeaseState::Open,
+            state: LeaseState::Pending,
             current: None,
             vouched_until: now + settings.dead_after,
-            rest: (ViewId::LOADED, now),
-            bound: Some(now),
+            accepted: (ViewId::LOADED, now),
+            older_leases_end: Some(now),
             is_whole: false,
             is_agreed: false,
             next_at: None,
-            slowest: Duration::from_micros(0),
+            round_trip: Duration::from_micros(0),
             circulation: Circulation::new(seed),
         }
     }
@@ -105,13 +105,13 @@ impl Lease {
     pub(crate) const fn until(&self) -> Option<Instant> {
         match self.state {
             LeaseState::Until(at) => Some(at),
-            LeaseState::Open | LeaseState::Lapsed => None,
+            LeaseState::Pending | LeaseState::Lapsed => None,
         }
     }
 
     /// Returns true until the first lease of this view is granted.
-    pub(crate) const fn is_open(&self) -> bool {
-        matches!(self.state, LeaseState::Open)
+    pub(crate) const fn is_pending(&self) -> bool {
+        matches!(self.state, LeaseState::Pending)
     }
 
     /// Returns the silence after which a neighbour may be lost. It is the span of the last lease renewal, at least
@@ -125,8 +125,8 @@ impl Lease {
     pub(crate) fn other_leases(&self, now: Instant) -> OtherLeases {
         OtherLeases {
             lease_left: self.vouched_until.since(now),
-            view: self.rest.0,
-            rest: self.bound.map(|until| until.since(now)),
+            view: self.accepted.0,
+            earlier_lease_left: self.older_leases_end.map(|until| until.since(now)),
         }
     }
 
@@ -144,12 +144,12 @@ impl Lease {
     ) {
         let is_under_way = self.circulation.is_outstanding();
         let started_at = self.circulation.started_at();
-        if let Some(at) = started_at.filter(|_| is_under_way && !lost && self.rest.0 == base) {
-            self.slowest = self.slowest.max(now.since(at));
+        if let Some(at) = started_at.filter(|_| is_under_way && !lost && self.accepted.0 == base) {
+            self.round_trip = self.round_trip.max(now.since(at));
         }
-        let known = self.bound.filter(|_| self.rest.0 == base);
-        self.bound = known.map(|until| until.max(rest).max(self.vouched_until));
-        self.rest = (view, rest);
+        let known = self.older_leases_end.filter(|_| self.accepted.0 == base);
+        self.older_leases_end = known.map(|until| until.max(rest).max(self.vouched_until));
+        self.accepted = (view, rest);
         self.end();
     }
 
@@ -157,7 +157,7 @@ impl Lease {
     pub(crate) fn end(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
-        self.state = LeaseState::Open;
+        self.state = LeaseState::Pending;
         self.current = None;
         self.next_at = None;
         self.circulation.withdraw();
@@ -165,9 +165,9 @@ impl Lease {
 
     /// Records that all members have accepted this relay's view.
     pub(crate) fn confirm_view(&mut self) {
-        self.bound = Some(self.rest.1);
+        self.older_leases_end = Some(self.accepted.1);
         // The initial view is configured and needs no acceptance.
-        self.is_whole |= self.rest.0 != ViewId::LOADED;
+        self.is_whole |= self.accepted.0 != ViewId::LOADED;
     }
 
     /// Returns true once all relays of the view are known to have accepted it.
@@ -227,7 +227,7 @@ impl Lease {
         let Some(forwarded_at) = self.circulation.started_at() else {
             return;
         };
-        if self.state == LeaseState::Open && next / 2 > pulse.span {
+        if self.state == LeaseState::Pending && next / 2 > pulse.span {
             return;
         }
         let until = forwarded_at + from_tenths(pulse.span);
@@ -265,12 +265,12 @@ impl Lease {
         // other traffic.
         let period = self.period(context.settings());
         // The second renewal follows at once, because no other member has a lease before it.
-        let first = self.state == LeaseState::Open;
+        let first = self.state == LeaseState::Pending;
         let took = context.now.since(forwarded_at);
         // The maximum decays by 1/32 per renewal, so a run of lost frames counts for a minute or two.
-        let part = self.slowest.as_micros() / 32;
-        let lately = self.slowest.as_micros().saturating_sub(part);
-        self.slowest = took.max(Duration::from_micros(lately));
+        let part = self.round_trip.as_micros() / 32;
+        let lately = self.round_trip.as_micros().saturating_sub(part);
+        self.round_trip = took.max(Duration::from_micros(lately));
         let next = self.announced_span(context.settings());
         self.grant(context, current, next);
         let soon = context.now + PAUSE;
@@ -282,12 +282,12 @@ impl Lease {
         let half = Duration::from_micros(settings.probe_after.as_micros() / 2);
         // The last announced span may be the shortest one: several periods must fit into it.
         let most = Duration::from_micros(settings.dead_after.as_micros() / 4);
-        half.max(self.slowest.times(2).min(most)).max(PAUSE)
+        half.max(self.round_trip.times(2).min(most)).max(PAUSE)
     }
 
     /// Returns the duration of the lease that the leader announces, in tenths of a second.
     fn announced_span(&self, settings: &Settings) -> u16 {
-        let slow = self.slowest.times(3).as_micros();
+        let slow = self.round_trip.times(3).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
         let most = longest_lease(settings);
         let span = Duration::from_micros(wanted)
@@ -334,7 +334,7 @@ impl Lease {
         Effects {
             resent,
             view_needed: lapsed,
-            news: lapsed.then_some(LayerEvent::Lapsed),
+            event: lapsed.then_some(LayerEvent::Lapsed),
             ..Effects::NONE
         }
     }
@@ -382,7 +382,7 @@ mod tests {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);
         let mut lease = Lease::new(1, Instant::ZERO, &settings);
-        lease.rest = (view(1), Instant::ZERO);
+        lease.accepted = (view(1), Instant::ZERO);
         lease.current = Some(Current {
             number: 7,
             span: 150,
@@ -394,12 +394,12 @@ mod tests {
     }
 
     #[test]
-    fn an_unfinished_pulse_of_the_view_before_is_a_slow_one() {
+    fn an_unfinished_pulse_of_the_last_view_counts_as_slow() {
         assert!(span_after(1) >= 1_200);
     }
 
     #[test]
-    fn an_unfinished_pulse_of_a_relay_that_was_left_out_in_between_is_not() {
+    fn an_unfinished_pulse_of_a_relay_left_out_does_not_count() {
         assert_eq!(span_after(2), 150);
     }
 }

@@ -440,7 +440,7 @@ impl MissionUpdate {
     /// Returns the configured geofence, if any, fitted to the active mission. It grows along x with the line of a
     /// mission that has its own sites.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
-        let mut fence = member.settings.guard?.fence;
+        let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {
             let longer_m = member.mission.config().distance_m - self.uploads()?.loaded_m;
             fence.most_x_m = (fence.most_x_m + longer_m).max(fence.least_x_m);
@@ -463,7 +463,7 @@ impl Uploads {
         let Some(guard) = member.settings.guard else {
             return Ok(());
         };
-        let fence = guard.fence;
+        let fence = guard.geofence;
         let own_m = member.settings.profile.map(|own| own.altitude_m);
         let edge = |edge_m: f32, loaded_m: f32| match own_m {
             Some(own_m) if own_m.to_bits() == edge_m.to_bits() => loaded_m,

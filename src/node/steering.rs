@@ -85,7 +85,7 @@ impl Steering {
     /// Handles a motion message (fence) of the neighbour `from` at `side`.
     pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) {
         if let Some(guard) = self.guard() {
-            guard.hear(side, from, fence);
+            guard.handle_fence(side, from, fence);
         }
     }
 
@@ -120,7 +120,7 @@ impl Steering {
         if let Some(guard) = self.guard()
             && let Some(fence) = fence
         {
-            guard.set_box(fence);
+            guard.set_geofence(fence);
         }
     }
 

@@ -150,7 +150,7 @@ pub(super) fn poll_transmit(
             session.restart(number);
         }
         if let Some((_, to)) = node.poll_claim() {
-            session.ask(to);
+            session.request_reply(to);
         }
         session.pin(node.neighbours());
         let sent = endpoint.transmit_handshake(frame, node.stats_mut());
@@ -171,7 +171,7 @@ fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Mes
         && *ask != 0
         && ask % QUESTIONS == 0
     {
-        session.ask_silent(to);
+        session.request_reply_of_silent(to);
     }
     if node.needs_handshake(message) {
         session.show(to);
@@ -181,6 +181,6 @@ fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Mes
         && !hello.is_heard(node.member().node, to)
     {
         // The node may have restarted: then it accepts only handshakes and sends nothing by itself.
-        session.ask_silent(to);
+        session.request_reply_of_silent(to);
     }
 }

@@ -22,7 +22,7 @@ fn relay(auth: Option<Auth>) -> Relay {
 /// Checks that the relay stops sending once its frame counter is used up. A repeated counter would let an old frame
 /// pass for a new one.
 #[test]
-fn a_relay_that_signs_falls_silent_when_its_counter_is_used_up() {
+fn a_signing_relay_stops_at_its_last_counter() {
     let auth = Auth {
         key: Key::new([1; 32]),
         epoch: 1,

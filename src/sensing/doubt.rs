@@ -62,7 +62,7 @@ const LEAST: f64 = 0.02;
 const DECISIVE: f64 = 6.0;
 
 /// Maximum variance of the relative errors for measurements to count as consistent (some 1.5 dB).
-const OF_ONE_MIND: f64 = 0.1;
+const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
 /// measurements.
@@ -85,12 +85,12 @@ const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    Usual,
+    Normal,
     /// Sensing pass without this node, to find out if the others' measurements are consistent.
     Trying(u16),
     /// Sensing pass that tells this node that it is excluded. `false` is for the first such pass, `true` for the
     /// second.
-    Telling(u16, bool),
+    Announcing(u16, bool),
 }
 
 /// State of the leader's search for the relay with faulty measurements.
@@ -98,7 +98,7 @@ enum Stage {
 pub(crate) struct Trial {
     stage: Stage,
     /// Number of sensing passes (collections of measurements) until the next search may start.
-    rest: u8,
+    cooldown: u8,
     /// Node whose exclusion gave the best fit to the other nodes' measurements so far.
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
@@ -124,8 +124,8 @@ pub(crate) enum Next {
 
 impl Trial {
     pub(crate) const NONE: Self = Self {
-        stage: Stage::Usual,
-        rest: 0,
+        stage: Stage::Normal,
+        cooldown: 0,
         best: 0,
         seen: 0.0,
         seen_best: 0.0,
@@ -136,8 +136,8 @@ impl Trial {
     /// Node whose measurements the next sensing pass (collection of measurements) excludes, 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
-            Stage::Usual => 0,
-            Stage::Trying(node) | Stage::Telling(node, _) => node,
+            Stage::Normal => 0,
+            Stage::Trying(node) | Stage::Announcing(node, _) => node,
         }
     }
 
@@ -152,8 +152,8 @@ impl Trial {
     ) -> Next {
         let fit = Fit::of(sums, relative_error);
         match self.stage {
-            Stage::Usual => {
-                self.rest = self.rest.saturating_sub(1);
+            Stage::Normal => {
+                self.cooldown = self.cooldown.saturating_sub(1);
                 // A relay that measures far more than all others dominates the sums, so that nothing fits.
                 let (odd, seen) = match fit {
                     Ok(fit) => {
@@ -162,11 +162,11 @@ impl Trial {
                     }
                     Err(_) => (sums.count() > ENOUGH, f32::MAX),
                 };
-                if !odd || self.rest > 0 {
+                if !odd || self.cooldown > 0 {
                     return Next::Review;
                 }
                 if relays < FEWEST {
-                    self.rest = REST;
+                    self.cooldown = REST;
                     return Next::Unknown;
                 }
                 *self = Self {
@@ -194,19 +194,19 @@ impl Trial {
                     return Next::Again;
                 }
                 if self.is_decided() {
-                    self.stage = Stage::Telling(self.best, false);
+                    self.stage = Stage::Announcing(self.best, false);
                     return Next::Again;
                 }
-                self.stage = Stage::Usual;
-                self.rest = REST;
+                self.stage = Stage::Normal;
+                self.cooldown = REST;
                 Next::Unknown
             }
-            Stage::Telling(node, false) => {
-                self.stage = Stage::Telling(node, true);
+            Stage::Announcing(node, false) => {
+                self.stage = Stage::Announcing(node, true);
                 Next::Again
             }
-            Stage::Telling(_, true) => {
-                self.stage = Stage::Usual;
+            Stage::Announcing(_, true) => {
+                self.stage = Stage::Normal;
                 Next::Review
             }
         }
@@ -216,7 +216,7 @@ impl Trial {
         let [least, second] = [self.least, self.second].map(f64::from);
         let taken = f64::from(self.seen) - f64::from(self.seen_best);
         least > 0.0
-            && least < OF_ONE_MIND
+            && least < CONSISTENT
             && second > DECISIVE * least
             && taken > LEAST.max(DEVIATIONS * least)
     }
@@ -248,7 +248,7 @@ pub(crate) fn is_absurd(
     };
     let of_one_mind = |fit: Fit| {
         let ratio = f64::from(place.v) / fit.value(&place.terms);
-        fit.variance() < OF_ONE_MIND && is_apart(ratio, fit.variance(), (DEVIATIONS, 1e4))
+        fit.variance() < CONSISTENT && is_apart(ratio, fit.variance(), (DEVIATIONS, 1e4))
     };
     others.count() > ENOUGH
         && expected.is_some_and(known)
@@ -294,7 +294,7 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
     let heard_w = f64::from(UNIT_W) / v;
     others.count() > ENOUGH
         && others.measured() > 3.0
-        && fit.variance() < OF_ONE_MIND
+        && fit.variance() < CONSISTENT
         && v > 0.0
         && DEVIATIONS * fit.relative_variance(there) < 1.0
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
@@ -350,7 +350,7 @@ pub(super) fn judge_ends(
     relative_error: f32,
 ) -> EndsOff {
     let before = levels.off;
-    if mission.relays() < FEWEST_FOR_ENDS || !fit.is_of_one_mind() {
+    if mission.relays() < FEWEST_FOR_ENDS || !fit.is_consistent() {
         return before;
     }
     let distance_m = mission.config().distance_m;

@@ -190,7 +190,7 @@ pub(crate) fn review(
         Err(unfit) => {
             return Review {
                 ends: levels.off,
-                ..at_a_loss(mission, estimate, sums, listen, before, unfit)
+                ..without_fit(mission, estimate, sums, listen, before, unfit)
             };
         }
     };
@@ -235,7 +235,7 @@ pub(crate) fn review(
     };
     let Some(known) = known else { return adopt(0) };
     let chance = fit.chance();
-    let off = fit.off(
+    let off = fit.mean_square_difference(
         &coefficients(mission, &source),
         &coefficients(mission, &known),
     );
@@ -313,7 +313,7 @@ fn followed(
     let [was, will] = track.ahead(now + ahead + FLIGHT)?;
     let power_w = fit.power_w(mission, was)?;
     let at = |[x_m, y_m]: [f32; 2]| Interferer { power_w, x_m, y_m };
-    if fit.off_by(&coefficients(mission, &at(was))) <= ASTRAY * fit.chance() {
+    if fit.mean_square_from_fit(&coefficients(mission, &at(was))) <= ASTRAY * fit.chance() {
         return Some(at(will));
     }
     *track = Track::NONE;
@@ -391,7 +391,7 @@ fn at_receiver(
     }
 }
 
-fn at_a_loss(
+fn without_fit(
     mission: &Mission,
     estimate: &InterferenceEstimate,
     sums: &Sums,

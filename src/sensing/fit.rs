@@ -52,7 +52,7 @@ struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
     /// True if the fit has all four unknowns; false if the last one, the side of the line, is omitted.
-    whole: bool,
+    full_rank: bool,
 }
 
 /// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
@@ -82,7 +82,7 @@ impl Factor {
         Some(Self {
             below: [l1, l2, m2, l3, m3, n3],
             diagonal: [aa, b, c, d],
-            whole: d > least,
+            full_rank: d > least,
         })
     }
 
@@ -91,7 +91,7 @@ impl Factor {
         let [a, b, c, d] = right;
         let b = b - l1 * a;
         let c = c - l2 * a - m2 * b;
-        let d = if self.whole {
+        let d = if self.full_rank {
             d - l3 * a - m3 * b - n3 * c
         } else {
             0.0
@@ -103,7 +103,7 @@ impl Factor {
         let [l1, l2, m2, l3, m3, n3] = self.below;
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(right);
-        let d = if self.whole { d / dd } else { 0.0 };
+        let d = if self.full_rank { d / dd } else { 0.0 };
         let c = c / dc - n3 * d;
         let b = b / db - m2 * c - m3 * d;
         let a = a / da - l1 * b - l2 * c - l3 * d;
@@ -121,7 +121,7 @@ impl Factor {
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
-        let last = if self.whole { d * d / dd } else { 0.0 };
+        let last = if self.full_rank { d * d / dd } else { 0.0 };
         a * a / da + b * b / db + c * c / dc + last
     }
 }
@@ -178,7 +178,7 @@ impl Fit {
         let coefficients = factor.solve(right);
         let [a, b, c, d] = coefficients;
         let left = vv - (a * av + b * bv + c * cv + d * dv);
-        let unknowns = if factor.whole { 4.0 } else { 3.0 };
+        let unknowns = if factor.full_rank { 4.0 } else { 3.0 };
         let expected = f64::from(relative_error) * f64::from(relative_error);
         let expected = expected * count / measured.max(count);
         let (seen, beyond) = if count > unknowns {
@@ -240,7 +240,7 @@ impl Fit {
     }
 
     /// Returns true if the fit has more positions than unknowns, and their errors are as small as expected.
-    pub(crate) fn is_of_one_mind(&self) -> bool {
+    pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
@@ -251,7 +251,7 @@ impl Fit {
 
     /// Returns the mean square relative difference of two sources' interference at the measured positions. Each
     /// source is given by its four coefficients ([`coefficients`]).
-    pub(crate) fn off(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
+    pub(crate) fn mean_square_difference(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
@@ -259,13 +259,13 @@ impl Fit {
 
     /// Returns the mean square relative difference in interference of the fit and another source. That source is
     /// given by its four coefficients ([`coefficients`]).
-    pub(crate) fn off_by(&self, others: &[f64; 4]) -> f64 {
-        self.off(&self.coefficients, others)
+    pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
+        self.mean_square_difference(&self.coefficients, others)
     }
 
     /// Returns the expected mean square relative error of the fitted interference.
     pub(crate) fn chance(&self) -> f64 {
-        let unknowns = if self.factor.whole { 4.0 } else { 3.0 };
+        let unknowns = if self.factor.full_rank { 4.0 } else { 3.0 };
         unknowns * self.variance / self.count
     }
 
@@ -284,7 +284,7 @@ impl Fit {
         let [aa, _, _, ad, ..] = self.products;
         let half = 0.5 * f64::from(mission.config().distance_m);
         let t = ad / aa;
-        let is_known = self.factor.whole && d * d * self.factor.last() > 4.0 * self.variance;
+        let is_known = self.factor.full_rank && d * d * self.factor.last() > 4.0 * self.variance;
         let left = if is_known {
             d > 0.0
         } else {

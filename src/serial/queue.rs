@@ -103,11 +103,11 @@ impl<F: FnMut()> Pend for F {
 /// meanwhile.
 #[derive(Debug)]
 pub struct ByteQueues<const IN: usize, const OUT: usize> {
-    /// Queue of received bytes or faults, encoded by [`coded`].
+    /// Queue of received bytes or faults, encoded by [`encode`].
     received: [AtomicU16; IN],
     outgoing: [AtomicU8; OUT],
-    in_marks: Marks,
-    out_marks: Marks,
+    in_indices: RingIndices,
+    out_indices: RingIndices,
     lost: AtomicU32,
 }
 
@@ -123,16 +123,16 @@ impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
         Self {
             received: [const { AtomicU16::new(0) }; IN],
             outgoing: [const { AtomicU8::new(0) }; OUT],
-            in_marks: Marks::new(),
-            out_marks: Marks::new(),
+            in_indices: RingIndices::new(),
+            out_indices: RingIndices::new(),
             lost: AtomicU32::new(0),
         }
     }
 
     /// Returns the interrupt's end and the main loop's end, which uses `pend` to trigger the interrupt.
     pub fn split<K: Pend>(&mut self, pend: K) -> (InterruptEnd<'_>, QueuedPort<'_, K>) {
-        let (puts, takes) = sides(&self.received, &mut self.in_marks);
-        let (queues, sends) = sides(&self.outgoing, &mut self.out_marks);
+        let (puts, takes) = ring_ends(&self.received, &mut self.in_indices);
+        let (queues, sends) = ring_ends(&self.outgoing, &mut self.out_indices);
         let interrupt = InterruptEnd {
             received: puts,
             outgoing: sends,
@@ -151,8 +151,8 @@ impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
 
 /// Interrupt's end of the queues. Every call takes constant work per byte.
 pub struct InterruptEnd<'q> {
-    received: Filler<'q, AtomicU16>,
-    outgoing: Emptier<'q, AtomicU8>,
+    received: Producer<'q, AtomicU16>,
+    outgoing: Consumer<'q, AtomicU8>,
     lost: &'q AtomicU32,
     /// True after bytes were lost, until a [`Fault::Overrun`] is queued in their place.
     gap: bool,
@@ -171,10 +171,10 @@ impl InterruptEnd<'_> {
     ///
     /// Without room it is lost and counted, and the main loop reads one [`Fault::Overrun`] in its place.
     pub fn received(&mut self, item: Result<u8, Fault>) {
-        if self.gap && self.received.put(coded(Err(Fault::Overrun))) {
+        if self.gap && self.received.put(encode(Err(Fault::Overrun))) {
             self.gap = false;
         }
-        if self.gap || !self.received.put(coded(item)) {
+        if self.gap || !self.received.put(encode(item)) {
             self.gap = true;
             // Only the interrupt writes it, so a load and a store are enough, which every core has.
             let lost = self.lost.load(Ordering::Relaxed).saturating_add(1);
@@ -198,8 +198,8 @@ impl InterruptEnd<'_> {
 
 /// Main loop's end of the queues: a [`SerialPort`] that never waits for the UART.
 pub struct QueuedPort<'q, K> {
-    received: Emptier<'q, AtomicU16>,
-    outgoing: Filler<'q, AtomicU8>,
+    received: Consumer<'q, AtomicU16>,
+    outgoing: Producer<'q, AtomicU8>,
     lost: &'q AtomicU32,
     pend: K,
 }
@@ -231,7 +231,7 @@ impl<K: Pend> SerialPort for QueuedPort<'_, K> {
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault> {
         let mut count = 0;
         for place in into {
-            match self.received.peek().map(decoded) {
+            match self.received.peek().map(decode) {
                 Some(Ok(byte)) => *place = byte,
                 // Bytes before a fault are returned first.
                 Some(Err(fault)) if count == 0 => {
@@ -260,7 +260,7 @@ impl<K: Pend> SerialPort for QueuedPort<'_, K> {
 }
 
 /// Encodes a received byte as itself, and a fault as a code above 255.
-const fn coded(item: Result<u8, Fault>) -> u16 {
+const fn encode(item: Result<u8, Fault>) -> u16 {
     match item {
         Ok(byte) => byte as u16,
         Err(Fault::Overrun) => 0x100,
@@ -271,7 +271,7 @@ const fn coded(item: Result<u8, Fault>) -> u16 {
     }
 }
 
-const fn decoded(code: u16) -> Result<u8, Fault> {
+const fn decode(code: u16) -> Result<u8, Fault> {
     let [byte, above] = code.to_le_bytes();
     match (above, byte) {
         (0, byte) => Ok(byte),
@@ -285,14 +285,14 @@ const fn decoded(code: u16) -> Result<u8, Fault> {
 
 /// Atomic cell of a ring, for one item. The indices of the ring synchronise access, so the cell's own ordering is
 /// relaxed.
-pub(super) trait Place {
+pub(super) trait AtomicSlot {
     type Item: Copy;
 
     fn load(&self) -> Self::Item;
     fn store(&self, item: Self::Item);
 }
 
-impl Place for AtomicU8 {
+impl AtomicSlot for AtomicU8 {
     type Item = u8;
 
     fn load(&self) -> u8 {
@@ -304,7 +304,7 @@ impl Place for AtomicU8 {
     }
 }
 
-impl Place for AtomicU16 {
+impl AtomicSlot for AtomicU16 {
     type Item = u16;
 
     fn load(&self) -> u16 {
@@ -319,12 +319,12 @@ impl Place for AtomicU16 {
 /// Indices of a ring: its first item, and the end behind its last item. The ring is empty if they are equal, so one
 /// cell is never used.
 #[derive(Debug)]
-pub(super) struct Marks {
+pub(super) struct RingIndices {
     first: AtomicUsize,
     end: AtomicUsize,
 }
 
-impl Marks {
+impl RingIndices {
     pub(super) const fn new() -> Self {
         Self {
             first: AtomicUsize::new(0),
@@ -334,96 +334,96 @@ impl Marks {
 }
 
 #[derive(Debug)]
-struct Side<'q, P> {
-    places: &'q [P],
-    marks: &'q Marks,
+struct RingEnd<'q, P> {
+    slots: &'q [P],
+    indices: &'q RingIndices,
 }
 
 /// Producer's side of a ring, which appends items.
 #[derive(Debug)]
-pub(super) struct Filler<'q, P>(Side<'q, P>);
+pub(super) struct Producer<'q, P>(RingEnd<'q, P>);
 
 /// Consumer's side of a ring, which takes items.
 #[derive(Debug)]
-pub(super) struct Emptier<'q, P>(Side<'q, P>);
+pub(super) struct Consumer<'q, P>(RingEnd<'q, P>);
 
-/// Returns the producer's and the consumer's side of a ring. The exclusive borrow of `marks` makes them the only
+/// Returns the producer's and the consumer's side of a ring. The exclusive borrow of `indices` makes them the only
 /// ones.
-pub(super) fn sides<'q, P>(
-    places: &'q [P],
-    marks: &'q mut Marks,
-) -> (Filler<'q, P>, Emptier<'q, P>) {
-    let marks = &*marks;
+pub(super) fn ring_ends<'q, P>(
+    slots: &'q [P],
+    indices: &'q mut RingIndices,
+) -> (Producer<'q, P>, Consumer<'q, P>) {
+    let indices = &*indices;
     (
-        Filler(Side { places, marks }),
-        Emptier(Side { places, marks }),
+        Producer(RingEnd { slots, indices }),
+        Consumer(RingEnd { slots, indices }),
     )
 }
 
-impl<P> Side<'_, P> {
-    const fn behind(&self, at: usize) -> usize {
+impl<P> RingEnd<'_, P> {
+    const fn next(&self, at: usize) -> usize {
         let next = at.saturating_add(1);
-        if next < self.places.len() { next } else { 0 }
+        if next < self.slots.len() { next } else { 0 }
     }
 }
 
-impl<P: Place> Filler<'_, P> {
+impl<P: AtomicSlot> Producer<'_, P> {
     /// Appends an item to the ring; returns false if the ring is full.
     pub(super) fn put(&mut self, item: P::Item) -> bool {
-        let Side { places, marks } = &self.0;
-        let end = marks.end.load(Ordering::Relaxed);
-        let next = self.0.behind(end);
-        if next == marks.first.load(Ordering::Acquire) {
+        let RingEnd { slots, indices } = &self.0;
+        let end = indices.end.load(Ordering::Relaxed);
+        let next = self.0.next(end);
+        if next == indices.first.load(Ordering::Acquire) {
             return false;
         }
-        let Some(place) = places.get(end) else {
+        let Some(place) = slots.get(end) else {
             return false;
         };
         place.store(item);
-        marks.end.store(next, Ordering::Release);
+        indices.end.store(next, Ordering::Release);
         true
     }
 
     pub(super) fn room(&self) -> usize {
-        let Side { places, marks } = &self.0;
-        let end = marks.end.load(Ordering::Relaxed);
-        let first = marks.first.load(Ordering::Acquire);
+        let RingEnd { slots, indices } = &self.0;
+        let end = indices.end.load(Ordering::Relaxed);
+        let first = indices.first.load(Ordering::Acquire);
         let used = if end >= first {
             end.saturating_sub(first)
         } else {
-            places.len().saturating_sub(first.saturating_sub(end))
+            slots.len().saturating_sub(first.saturating_sub(end))
         };
-        places.len().saturating_sub(1).saturating_sub(used)
+        slots.len().saturating_sub(1).saturating_sub(used)
     }
 }
 
-impl<P: Place> Emptier<'_, P> {
+impl<P: AtomicSlot> Consumer<'_, P> {
     /// Returns the first item of the ring without removing it.
     pub(super) fn peek(&self) -> Option<P::Item> {
-        let Side { places, marks } = &self.0;
-        let first = marks.first.load(Ordering::Relaxed);
-        if first == marks.end.load(Ordering::Acquire) {
+        let RingEnd { slots, indices } = &self.0;
+        let first = indices.first.load(Ordering::Relaxed);
+        if first == indices.end.load(Ordering::Acquire) {
             return None;
         }
-        places.get(first).map(P::load)
+        slots.get(first).map(P::load)
     }
 
     /// Removes the first item of the ring, if there is one.
     pub(super) fn pop(&mut self) {
-        let marks = self.0.marks;
-        let first = marks.first.load(Ordering::Relaxed);
-        if first != marks.end.load(Ordering::Acquire) {
-            marks.first.store(self.0.behind(first), Ordering::Release);
+        let indices = self.0.indices;
+        let first = indices.first.load(Ordering::Relaxed);
+        if first != indices.end.load(Ordering::Acquire) {
+            indices.first.store(self.0.next(first), Ordering::Release);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ByteQueues, Fault, SerialPort, coded, decoded};
+    use super::{ByteQueues, Fault, SerialPort, decode, encode};
 
     #[test]
-    fn what_does_not_fit_is_counted_and_read_as_one_overrun_at_its_place() {
+    fn lost_bytes_are_counted_and_read_as_one_overrun() {
         let mut queues = ByteQueues::<5, 4>::new();
         let (mut interrupt, mut port) = queues.split(|| {});
         for byte in 0..9 {
@@ -443,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interrupt_sends_in_order_and_keeps_what_the_uart_does_not_take() {
+    fn the_interrupt_keeps_bytes_that_the_uart_rejects() {
         let mut pended = 0;
         let mut queues = ByteQueues::<4, 4>::new();
         let (mut interrupt, mut port) = queues.split(|| pended += 1);
@@ -478,7 +478,7 @@ mod tests {
         ];
         let bytes = (0..=u8::MAX).map(Ok);
         for item in bytes.chain(faults.map(Err)) {
-            assert_eq!(decoded(coded(item)), item);
+            assert_eq!(decode(encode(item)), item);
         }
     }
 }
@@ -487,59 +487,59 @@ mod tests {
 mod ring_tests {
     extern crate std;
 
-    use super::{AtomicU16, Marks, sides};
+    use super::{AtomicU16, RingIndices, ring_ends};
 
     #[test]
-    fn it_holds_one_less_than_its_places_in_order() {
-        let places = [const { AtomicU16::new(0) }; 4];
-        let mut marks = Marks::new();
-        let (mut filler, mut emptier) = sides(&places, &mut marks);
+    fn a_ring_holds_one_item_less_than_its_slots_in_order() {
+        let slots = [const { AtomicU16::new(0) }; 4];
+        let mut indices = RingIndices::new();
+        let (mut producer, mut consumer) = ring_ends(&slots, &mut indices);
         for round in 0..9 {
             for item in 0..3 {
-                assert_eq!(filler.room(), 3 - usize::from(item));
-                assert!(filler.put(10 * round + item));
+                assert_eq!(producer.room(), 3 - usize::from(item));
+                assert!(producer.put(10 * round + item));
             }
-            assert!(!filler.put(99));
+            assert!(!producer.put(99));
             for item in 0..3 {
-                assert_eq!(emptier.peek(), Some(10 * round + item));
-                emptier.pop();
+                assert_eq!(consumer.peek(), Some(10 * round + item));
+                consumer.pop();
             }
-            assert_eq!(emptier.peek(), None);
-            emptier.pop();
+            assert_eq!(consumer.peek(), None);
+            consumer.pop();
         }
     }
 
     #[test]
-    fn of_no_places_it_takes_nothing() {
-        let mut marks = Marks::new();
-        let (mut filler, mut emptier) = sides::<AtomicU16>(&[], &mut marks);
-        assert!(!filler.put(1));
-        emptier.pop();
-        assert_eq!((filler.room(), emptier.peek()), (0, None));
+    fn a_ring_without_slots_accepts_nothing() {
+        let mut indices = RingIndices::new();
+        let (mut producer, mut consumer) = ring_ends::<AtomicU16>(&[], &mut indices);
+        assert!(!producer.put(1));
+        consumer.pop();
+        assert_eq!((producer.room(), consumer.peek()), (0, None));
     }
 
     #[test]
-    fn two_threads_lose_nothing_and_keep_the_order() {
-        let places = [const { AtomicU16::new(0) }; 7];
-        let mut marks = Marks::new();
-        let (mut filler, mut emptier) = sides(&places, &mut marks);
+    fn two_threads_lose_no_item_and_keep_the_order() {
+        let slots = [const { AtomicU16::new(0) }; 7];
+        let mut indices = RingIndices::new();
+        let (mut producer, mut consumer) = ring_ends(&slots, &mut indices);
         std::thread::scope(|scope| {
             scope.spawn(move || {
                 for item in 0..2_000 {
-                    while !filler.put(item) {
+                    while !producer.put(item) {
                         std::thread::yield_now();
                     }
                 }
             });
             for item in 0..2_000 {
                 let got = loop {
-                    if let Some(got) = emptier.peek() {
+                    if let Some(got) = consumer.peek() {
                         break got;
                     }
                     std::thread::yield_now();
                 };
                 assert_eq!(got, item);
-                emptier.pop();
+                consumer.pop();
             }
         });
     }

@@ -168,7 +168,7 @@ mod tests {
     extern crate std;
 
     #[test]
-    fn every_counter_is_taken_at_most_once_and_late_ones_up_to_63_behind() {
+    fn each_counter_is_accepted_once_and_up_to_63_late() {
         let mut state = 1_u32;
         let mut random = |below: u32| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_counter_is_never_taken() {
+    fn the_last_counter_is_never_accepted() {
         let mut window = Window::default();
         assert!(!window.accept(u32::MAX));
         assert!(window.accept(u32::MAX - 1) && !window.accept(u32::MAX - 1));

@@ -140,7 +140,7 @@ mod tests {
 
     /// Compares the digests with those of the crate `blake2`, for lengths up to 299 bytes and any split.
     #[test]
-    fn it_is_the_published_one() {
+    fn the_hash_equals_the_published_one() {
         let mut state = 1_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

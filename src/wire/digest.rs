@@ -108,7 +108,7 @@ mod tests {
     use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig};
 
     #[test]
-    fn the_digest_tells_missions_apart() {
+    fn different_missions_have_different_digests() {
         let of = |change: fn(&mut MissionConfig)| {
             let mut config = paper(8);
             change(&mut config);

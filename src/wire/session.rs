@@ -37,7 +37,7 @@ const PEERS: usize = 8;
 
 /// Maximum difference between the lower halves of two nonces of one node in an epoch. A larger difference shows that
 /// two nodes use the same node number.
-const NEAR: u32 = 1 << 12;
+const MAX_GAP: u32 = 1 << 12;
 
 /// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. Fewer can be
 /// delayed frames.
@@ -49,25 +49,25 @@ struct Peer {
     /// True if a handshake to the table entry's node is to be sent.
     handshake: bool,
     /// True if the next handshake to the node requests a reply although the node is proven to be present.
-    asks: bool,
+    requests_reply: bool,
     /// True if the node has repeated this relay's nonce: it is present, and both know each other's nonce.
     proven: bool,
     /// Time of the entry's last use, counted in uses of the table (`Session::clock`).
     used: u32,
     /// Time of the last frame that proved the node's presence, or of its first frame with a larger nonce.
-    heard: Instant,
+    last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
-    own: u32,
+    own_number: u32,
     /// Largest nonce that the node has sent; 0 before any.
-    other: u64,
-    taken: Window,
-    older: Older,
+    nonce: u64,
+    window: Window,
+    older: OlderHandshakes,
 }
 
 /// Counter of handshakes that a node sent with an outdated nonce. It is of an older epoch, or the node restarted in
 /// the same one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-struct Older {
+struct OlderHandshakes {
     epoch: u32,
     /// Frame counter of the last outdated handshake, plus one.
     next: u32,
@@ -75,7 +75,7 @@ struct Older {
     times: u8,
 }
 
-impl Older {
+impl OlderHandshakes {
     /// Counts a handshake of an older epoch; returns true if it is the fifth (`WENT_BACK`). A replay of the same
     /// frame does not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
@@ -99,8 +99,8 @@ impl Older {
 impl Peer {
     const fn nonces(&self, epoch: u32) -> Nonces {
         Nonces {
-            sender: (epoch as u64) << 32 | self.own as u64,
-            receiver: self.other,
+            sender: (epoch as u64) << 32 | self.own_number as u64,
+            receiver: self.nonce,
         }
     }
 }
@@ -114,7 +114,7 @@ pub(crate) struct Session {
     /// Claim number of this relay, drawn at its start. The lower halves of this relay's nonces are above it.
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
-    made: u32,
+    last_number: u32,
     /// Claim of another node that uses this relay's number, from the last handshake with such a claim.
     rival: Option<Rival>,
     /// Counter of all uses of the table's entries, wrapping. It tells which entry was used least recently.
@@ -153,7 +153,7 @@ impl Session {
             epoch,
             gone_after,
             claim,
-            made: claim,
+            last_number: claim,
             rival: None,
             clock: 0,
             pinned: [None; 2],
@@ -173,7 +173,7 @@ impl Session {
 
     /// Schedules a handshake to node `to`, which is unproven until it replies.
     pub(crate) fn greet(&mut self, to: u16) {
-        self.make(to);
+        self.insert(to);
         if let Some(peer) = self.touch(to) {
             peer.handshake = true;
             peer.proven = false;
@@ -183,9 +183,9 @@ impl Session {
     /// Forgets all nodes, as after a restart. New nonces count up from `claim`, if that is above all nonces of this
     /// epoch so far.
     pub(crate) fn restart(&mut self, claim: u32) {
-        if claim > self.made {
+        if claim > self.last_number {
             self.claim = claim;
-            self.made = claim;
+            self.last_number = claim;
         }
         self.peers.clear();
     }
@@ -199,11 +199,11 @@ impl Session {
     }
 
     /// Schedules a handshake to node `to` that requests a reply, so that each learns the other's nonce.
-    pub(crate) fn ask(&mut self, to: u16) {
-        self.make(to);
+    pub(crate) fn request_reply(&mut self, to: u16) {
+        self.insert(to);
         if let Some(peer) = self.touch(to) {
             peer.handshake = true;
-            peer.asks = true;
+            peer.requests_reply = true;
         }
     }
 
@@ -211,11 +211,11 @@ impl Session {
     ///
     /// There is none if the node has restarted with an outdated nonce of the same epoch: a handshake contains its
     /// known nonce, with which it could continue its earlier start, and use nonces and counters twice.
-    pub(crate) fn ask_silent(&mut self, to: u16) {
+    pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
-            |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.other >> 32;
+            |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;
         if !self.find(to).is_some_and(begun_anew) {
-            self.ask(to);
+            self.request_reply(to);
         }
     }
 
@@ -242,7 +242,7 @@ impl Session {
         let epoch = self.epoch;
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             let Nonces { sender, receiver } = peer.nonces(epoch);
-            let asks = core::mem::take(&mut peer.asks) || !peer.proven;
+            let asks = core::mem::take(&mut peer.requests_reply) || !peer.proven;
             let tag = sender.to_le_bytes().into_iter();
             let tag = tag.chain(receiver.to_le_bytes());
             let tag = tag.chain([u8::from(asks)]);
@@ -275,7 +275,7 @@ impl Session {
         };
         if frame.handshake {
             return self
-                .meet(now, sender, frame, tag)
+                .check_handshake(now, sender, frame, tag)
                 .unwrap_or(Checked::Forged);
         }
         let epoch = self.epoch;
@@ -288,25 +288,25 @@ impl Session {
         let Some(peer) = self.touch(sender) else {
             return Checked::Forged;
         };
-        if !peer.taken.accept(frame.header.counter) {
+        if !peer.window.accept(frame.header.counter) {
             return Checked::Replayed;
         }
         let first = !peer.proven;
         peer.proven = true;
-        peer.heard = now;
+        peer.last_proof = now;
         peer.older.times = 0;
         Checked::Fresh { first }
     }
 
     /// Authenticates a handshake; `None` if its tag is wrong.
-    fn meet(
+    fn check_handshake(
         &mut self,
         now: Instant,
         sender: u16,
         frame: &Opened<'_>,
         tag: [u8; TAG],
     ) -> Option<Checked> {
-        let nonces = said(frame)?;
+        let nonces = nonces_of(frame)?;
         let asks = frame.body.last().copied()?;
         if nonces.sender == 0 || !is_same(self.with(nonces).tag(frame.signed), tag) {
             return None;
@@ -316,25 +316,25 @@ impl Session {
         }
         let gone_after = self.gone_after;
         self.peers.retain(|peer| {
-            let succeeds = peer.node == sender && is_rival(nonces.sender, peer.other);
-            !(succeeds && now.since(peer.heard) >= gone_after)
+            let succeeds = peer.node == sender && is_rival(nonces.sender, peer.nonce);
+            !(succeeds && now.since(peer.last_proof) >= gone_after)
         });
-        self.make(sender);
+        self.insert(sender);
         let epoch = self.epoch;
         let peer = self.touch(sender)?;
-        let begins = nonces.sender > peer.other;
+        let begins = nonces.sender > peer.nonce;
         if begins {
-            peer.other = nonces.sender;
-            peer.heard = now;
-            peer.taken = Window::default();
+            peer.nonce = nonces.sender;
+            peer.last_proof = now;
+            peer.window = Window::default();
             peer.proven = false;
         }
         let proof = nonces.receiver == peer.nonces(epoch).sender;
         // A node that has shown this relay's nonce forgets it only with a new nonce of its own.
-        let old = nonces.sender < peer.other || peer.proven && !proof;
+        let old = nonces.sender < peer.nonce || peer.proven && !proof;
         if old {
             // Another node of this number must learn of the node that this relay accepts.
-            peer.handshake |= asks == 1 && is_rival(nonces.sender, peer.other);
+            peer.handshake |= asks == 1 && is_rival(nonces.sender, peer.nonce);
             let [.., a, b, c, d] = nonces.sender.to_le_bytes();
             let epoch = u32::from_le_bytes([a, b, c, d]);
             let back = peer.older.count(epoch, frame.header.counter);
@@ -344,7 +344,7 @@ impl Session {
                 Checked::Replayed
             });
         }
-        if !peer.taken.accept(frame.header.counter) {
+        if !peer.window.accept(frame.header.counter) {
             return Some(Checked::Replayed);
         }
         peer.older.times = 0;
@@ -354,7 +354,7 @@ impl Session {
         }
         let first = !peer.proven;
         peer.proven = true;
-        peer.heard = now;
+        peer.last_proof = now;
         Some(Checked::Handshake { first })
     }
 
@@ -362,7 +362,11 @@ impl Session {
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
-        let nonces = if frame.handshake { said(frame) } else { own() };
+        let nonces = if frame.handshake {
+            nonces_of(frame)
+        } else {
+            own()
+        };
         let Some((nonces, tag)) = nonces.zip(frame.tag) else {
             return Sender::Unknown;
         };
@@ -380,7 +384,7 @@ impl Session {
             return Sender::Unknown;
         }
         let made = (number & !RAISED).wrapping_sub(self.claim & !RAISED);
-        if epoch == self.epoch && made <= (self.made - self.claim).saturating_add(NEAR) {
+        if epoch == self.epoch && made <= (self.last_number - self.claim).saturating_add(MAX_GAP) {
             return Sender::Itself;
         }
         Sender::Rival(Rival {
@@ -406,25 +410,25 @@ impl Session {
     /// Creates a table entry for `node` if it has none. A full table replaces an entry that is not pinned, preferably
     /// an unproven one, and of those the least recently used. After four billion entries no more are created: a nonce
     /// is never used twice.
-    fn make(&mut self, node: u16) {
+    fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
         }
-        let Some(made) = self.made.checked_add(1) else {
+        let Some(made) = self.last_number.checked_add(1) else {
             return;
         };
-        self.made = made;
+        self.last_number = made;
         let peer = Peer {
             node,
             handshake: false,
-            asks: false,
+            requests_reply: false,
             proven: false,
             used: self.clock,
-            heard: Instant::ZERO,
-            own: made,
-            other: 0,
-            taken: Window::default(),
-            older: Older::default(),
+            last_proof: Instant::ZERO,
+            own_number: made,
+            nonce: 0,
+            window: Window::default(),
+            older: OlderHandshakes::default(),
         };
         if let Err(peer) = self.peers.push(peer) {
             let (pinned, clock) = (self.pinned, self.clock);
@@ -453,11 +457,11 @@ const fn halves(nonce: u64) -> [u32; 2] {
 /// than [`NEAR`]. The bit [`RAISED`] of these is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
-    at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > NEAR
+    at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > MAX_GAP
 }
 
 /// Returns the nonces in a handshake, of its sender and its receiver. `None` if `frame` is no handshake.
-fn said(frame: &Opened<'_>) -> Option<Nonces> {
+fn nonces_of(frame: &Opened<'_>) -> Option<Nonces> {
     let (other, rest) = frame.body.split_first_chunk::<8>()?;
     let (known, &[0 | 1]) = rest.split_first_chunk::<8>()? else {
         return None;

@@ -7,7 +7,7 @@ use uav_relay::{
 use zerocopy::little_endian::{F32, F64, I32, U16, U32, U64};
 use zerocopy::{FromBytes, Immutable, IntoBytes, Unaligned};
 
-use super::{ConfigError, MAX_POINTS, Room, Sites};
+use super::{ConfigError, FieldStorage, MAX_POINTS, Sites};
 
 /// Configuration block as a structure: the fields of the table in `lib.rs`, byte for byte.
 #[derive(FromBytes, IntoBytes, Immutable, Unaligned)]
@@ -20,7 +20,7 @@ pub(super) struct Layout {
     pub(super) network: U16,
     pub(super) relays: U16,
     pub(super) method: u8,
-    pub(super) hold: u8,
+    pub(super) hold_altitude: u8,
     pub(super) distance_m: F32,
     pub(super) min_separation_m: F32,
     pub(super) tx_power_w: F32,
@@ -132,21 +132,21 @@ impl Layout {
     }
 
     /// Returns the block's interference: its field, or its interferer if it has no field points. The field's points
-    /// are stored in `room`. An interferer of zeros is unknown, if `listens` is true: the relays then measure.
+    /// are stored in `storage`. An interferer of zeros is unknown, if `listens` is true: the relays then measure.
     pub(super) fn interference(
         &self,
         listens: bool,
-        room: &'static mut Room,
+        storage: &'static mut FieldStorage,
     ) -> Result<Interference, ConfigError> {
-        for (place, [x_m, upsilon_per_w]) in room.iter_mut().zip(&self.field) {
+        for (place, [x_m, upsilon_per_w]) in storage.iter_mut().zip(&self.field) {
             *place = FieldPoint {
                 x_m: x_m.get(),
                 upsilon_per_w: upsilon_per_w.get(),
             };
         }
-        let room: &'static Room = room;
+        let storage: &'static FieldStorage = storage;
         let count = usize::from(self.points.get());
-        let points = room.get(..count).ok_or(ConfigError::Points)?;
+        let points = storage.get(..count).ok_or(ConfigError::Points)?;
         let unused = self.field.get(count..).unwrap_or_default();
         if !is_zero(unused.as_flattened()) {
             return Err(ConfigError::Unused);

@@ -108,7 +108,7 @@ pub const MAX_POINTS: usize = 16;
 const CHECKED: usize = LEN - 4;
 
 /// Maximum configurable silence of a neighbour until a heartbeat is requested from it, ms.
-pub const MOST_PROBE_AFTER_MS: u32 = 1_200_000;
+pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
 const LEN_FIELD: u16 = 388;
@@ -117,15 +117,15 @@ const LEN_FIELD: u16 = 388;
 pub type Block = [u8; LEN];
 
 /// Storage for the points of a mission's interference field.
-pub type Room = [FieldPoint; MAX_POINTS];
+pub type FieldStorage = [FieldPoint; MAX_POINTS];
 
 /// Initial content of the storage for field points, before a block is read.
-pub const EMPTY: Room = [FieldPoint {
+pub const EMPTY: FieldStorage = [FieldPoint {
     x_m: 0.0,
     upsilon_per_w: 0.0,
 }; MAX_POINTS];
 
-/// Reads and checks a configuration block of arbitrary bytes. The points of its field are stored in `room`.
+/// Reads and checks a configuration block of arbitrary bytes. The points of its field are stored in `storage`.
 ///
 /// A relay accepts every returned configuration if its build has the features for it. It rejects the joint method for
 /// more than 100 relays.
@@ -133,7 +133,7 @@ pub const EMPTY: Room = [FieldPoint {
 /// # Errors
 /// [`ConfigError`] names the fault, and for a number out of range which one.
 #[inline(never)] // its stack frame is released before the relay needs the space
-pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigError> {
+pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config, ConfigError> {
     if block.iter().all(|&byte| byte == 0xFF) || block.iter().all(|&byte| byte == 0) {
         return Err(ConfigError::Blank);
     }
@@ -151,13 +151,13 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     let method = raw.method()?;
     let measure = raw.measure()?;
     let listen = raw.listen()?;
-    let interference = raw.interference(listen.is_some(), room)?;
+    let interference = raw.interference(listen.is_some(), storage)?;
     let sites = raw.sites()?;
     if sites.is_none() && autopilot_key(block).is_some() {
         return Err(ConfigError::AutopilotKey);
     }
     let probe_after_ms = raw.probe_after_ms.get();
-    if probe_after_ms > MOST_PROBE_AFTER_MS {
+    if probe_after_ms > MAX_PROBE_AFTER_MS {
         return Err(ConfigError::Silence);
     }
     let [carrier_hz, excess_los, excess_nlos, los_weight] = raw.channel.map(F64::get);
@@ -190,7 +190,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     if !profile.is_valid() {
         return Err(ConfigError::Profile);
     }
-    if raw.hold > 1 {
+    if raw.hold_altitude > 1 {
         return Err(ConfigError::Hold);
     }
     if method != Method::Align && raw.points > 0 {
@@ -207,7 +207,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         },
         mission,
         profile,
-        hold_altitude: raw.hold == 1,
+        hold_altitude: raw.hold_altitude == 1,
         method,
         measure,
         listen,

@@ -11,7 +11,7 @@ use uav_relay::{
 use super::BAUD;
 
 /// Default silence of a neighbour until it is probed, ms. It applies if the block's value is 0.
-const USUAL_PROBE_AFTER_MS: u64 = 5_000;
+const DEFAULT_PROBE_AFTER_MS: u64 = 5_000;
 
 /// Checked content of a configuration block.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -46,7 +46,7 @@ impl Config {
             Wiring::Shared => Settings::radio(BAUD, ChannelLoad::of_radios(self.mission.relays())),
         };
         let probe_after_ms = match self.probe_after_ms {
-            0 => USUAL_PROBE_AFTER_MS,
+            0 => DEFAULT_PROBE_AFTER_MS,
             ms => ms.into(),
         };
         Settings {

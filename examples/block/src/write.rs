@@ -42,7 +42,7 @@ pub fn write(
         network: config.identity.network.into(),
         relays: mission.relays.into(),
         method,
-        hold: config.hold_altitude.into(),
+        hold_altitude: config.hold_altitude.into(),
         distance_m: mission.distance_m.into(),
         min_separation_m: mission.min_separation_m.into(),
         tx_power_w: mission.tx_power_w.into(),

@@ -16,7 +16,7 @@ use crate::registers::{Register, Registers};
 
 /// Clock hardware of a board: crystal and over-drive.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Plan {
+pub struct ClockHardware {
     /// Crystal or external clock of the board, if it has one.
     pub crystal: Option<Crystal>,
     /// True for a chip with the over-drive that 180 MHz needs: the STM32F446.
@@ -25,7 +25,7 @@ pub struct Plan {
 
 /// Board with an STM32F405 and a crystal of 8 MHz. With another crystal, or none, the chip runs from its internal
 /// oscillator.
-pub const STM32F405: Plan = Plan {
+pub const STM32F405: ClockHardware = ClockHardware {
     crystal: Some(Crystal {
         hz: 8_000_000,
         bypass: false,
@@ -34,7 +34,7 @@ pub const STM32F405: Plan = Plan {
 };
 
 /// Board NUCLEO-F446RE, whose ST-LINK supplies a clock of 8 MHz at the pin OSC_IN.
-pub const NUCLEO_F446RE: Plan = Plan {
+pub const NUCLEO_F446RE: ClockHardware = ClockHardware {
     crystal: Some(Crystal {
         hz: 8_000_000,
         bypass: true,
@@ -73,8 +73,8 @@ impl Clocks {
         pll: None,
     };
 
-    const fn of(speed: Speed, source: Source) -> Self {
-        let core_hz = speed.factor * PLL_INPUT_HZ / 2;
+    const fn of(speed: Pll, source: Source) -> Self {
+        let core_hz = speed.plln * PLL_INPUT_HZ / 2;
         Self {
             core_hz,
             apb1_hz: core_hz / 4,
@@ -88,23 +88,23 @@ const PLL_INPUT_HZ: u32 = 2_000_000;
 
 /// PLL settings for a core frequency.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Speed {
+struct Pll {
     over_drive: bool,
     /// Multiplier of the PLL, PLLN. The core gets half the PLL's input of 2 MHz times this number.
-    factor: u32,
+    plln: u32,
     /// Divisor PLLQ for the PLL's USB clock, which may be 48 MHz or less.
-    usb: u32,
+    pllq: u32,
 }
 
-const FASTEST: Speed = Speed {
+const FASTEST: Pll = Pll {
     over_drive: true,
-    factor: 180,
-    usb: 8,
+    plln: 180,
+    pllq: 8,
 };
-const FAST: Speed = Speed {
+const FAST: Pll = Pll {
     over_drive: false,
-    factor: 168,
-    usb: 7,
+    plln: 168,
+    pllq: 7,
 };
 
 /// Bits of the register RCC_CR: internal oscillator (HSI) on, HSI ready, PLL on, PLL ready.
@@ -152,21 +152,21 @@ const POLLS: u32 = 20_000;
 
 /// Sets up the clocks of a board, and returns the frequencies reached. Call it once after a reset, with interrupts
 /// off. It takes at most 0.2 s.
-pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
+pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     if !back_to_hsi(chip) {
         // An emulator without a clock tree.
         return Clocks::HSI;
     }
     cache(chip, 0);
-    let crystal = plan.crystal.filter(|of| crystal::start(chip, *of));
+    let crystal = hardware.crystal.filter(|of| crystal::start(chip, *of));
     let from_crystal = crystal.map(|of| (Source::Crystal, of.hz / PLL_INPUT_HZ));
     let from_hsi = Some((Source::Internal, HSI_HZ / PLL_INPUT_HZ));
     for (source, divisor) in [from_crystal, from_hsi].into_iter().flatten() {
         for speed in [FASTEST, FAST] {
-            if (speed.over_drive && !plan.over_drive) || !off(chip) {
+            if (speed.over_drive && !hardware.over_drive) || !off(chip) {
                 continue;
             }
-            let scale = if plan.over_drive {
+            let scale = if hardware.over_drive {
                 SCALE_1_OF_TWO_BITS
             } else {
                 SCALE_1
@@ -186,8 +186,8 @@ pub fn start(chip: &mut impl Registers, plan: &Plan) -> Clocks {
 
 /// Returns the frequencies that [`start`] reaches, and switches back to the internal oscillator. For a HAL whose own
 /// clock set-up has unbounded waits: it gets only clocks that work.
-pub fn probe(chip: &mut impl Registers, plan: &Plan) -> Clocks {
-    let clocks = start(chip, plan);
+pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
+    let clocks = start(chip, hardware);
     if clocks.pll.is_some() && back_to_hsi(chip) {
         cache(chip, 0);
         let _ = off(chip);
@@ -244,13 +244,13 @@ fn off(chip: &mut impl Registers) -> bool {
 
 /// Starts the PLL, which must be off, at the settings of `speed`; returns false if that fails. `divisor` turns the
 /// source into 2 MHz; `scale` are the voltage bits of PWR_CR.
-fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Speed, scale: u32) -> bool {
+fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Pll, scale: u32) -> bool {
     chip.modify(Register::PowerControl, scale, scale);
     let from = match source {
         Source::Crystal => PLL_FROM_CRYSTAL,
         Source::Internal => 0,
     };
-    let fields = divisor | speed.factor << 6 | from | speed.usb << 24;
+    let fields = divisor | speed.plln << 6 | from | speed.pllq << 24;
     chip.modify(Register::PllConfig, PLL_FIELDS, fields);
     chip.modify(Register::ClockControl, 0, PLL_ON);
     if !chip.wait(Register::ClockControl, PLL_READY, PLL_READY, POLLS)
@@ -281,16 +281,16 @@ mod tests {
 
     use std::vec::Vec;
 
-    use super::{Clocks, NUCLEO_F446RE, Plan, STM32F405, Source, probe, start};
-    use crate::mock::{Block, Faults};
+    use super::{ClockHardware, Clocks, NUCLEO_F446RE, STM32F405, Source, probe, start};
+    use crate::mock::{Faults, MockRegisters};
 
-    fn all() -> impl Iterator<Item = Faults> {
+    fn all_faults() -> impl Iterator<Item = Faults> {
         (0..1_u32 << Faults::BITS)
             .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
     }
 
     /// Returns the clocks that a chip with these faults can reach.
-    fn expected(plan: &Plan, faults: Faults) -> Clocks {
+    fn expected(hardware: &ClockHardware, faults: Faults) -> Clocks {
         let is_crystal =
             !faults.crystal_dead && !faults.timer_dead && faults.crystal_hz == 8_000_000;
         let mut sources = Vec::new();
@@ -306,7 +306,7 @@ mod tests {
             return Clocks::HSI;
         };
         let over_drive =
-            plan.over_drive && !faults.over_drive_dead && !faults.over_drive_switch_dead;
+            hardware.over_drive && !faults.over_drive_dead && !faults.over_drive_switch_dead;
         let mhz = if over_drive { 180 } else { 168 };
         Clocks {
             core_hz: mhz * 1_000_000,
@@ -319,22 +319,22 @@ mod tests {
     /// Starts the clocks under every combination of faults. The mock panics at a write that the reference manuals
     /// forbid.
     #[test]
-    fn whatever_fails_the_clocks_are_those_that_the_chip_has() {
-        let none = Plan {
+    fn the_clocks_are_correct_under_all_combinations_of_faults() {
+        let none = ClockHardware {
             crystal: None,
             ..STM32F405
         };
         let mut count = 0;
         let mut reached = std::collections::BTreeMap::new();
-        for plan in [STM32F405, NUCLEO_F446RE] {
-            for faults in all() {
-                let mut block = Block::with(faults, plan.over_drive);
-                let clocks = start(&mut block, &plan);
-                assert_eq!(clocks, expected(&plan, faults), "{faults:?}");
-                let [core, apb1, apb2] = block.clocks();
-                let said = [clocks.core_hz, clocks.apb1_hz, clocks.apb2_hz];
-                assert_eq!(said, [core, apb1, apb2], "{faults:?}");
-                assert!(block.reads < 700_000, "{} reads, {faults:?}", block.reads);
+        for hardware in [STM32F405, NUCLEO_F446RE] {
+            for faults in all_faults() {
+                let mut chip = MockRegisters::with(faults, hardware.over_drive);
+                let clocks = start(&mut chip, &hardware);
+                assert_eq!(clocks, expected(&hardware, faults), "{faults:?}");
+                let [core, apb1, apb2] = chip.clocks();
+                let reported = [clocks.core_hz, clocks.apb1_hz, clocks.apb2_hz];
+                assert_eq!(reported, [core, apb1, apb2], "{faults:?}");
+                assert!(chip.reads < 700_000, "{} reads, {faults:?}", chip.reads);
                 count += 1;
                 *reached
                     .entry((clocks.core_hz / 1_000_000, clocks.pll.map(|pll| pll as u8)))
@@ -342,22 +342,22 @@ mod tests {
             }
         }
         std::println!("{count} combinations: {reached:?}");
-        let mut block = Block::with(Faults::default(), false);
-        assert_eq!(start(&mut block, &none).pll, Some(Source::Internal));
+        let mut chip = MockRegisters::with(Faults::default(), false);
+        assert_eq!(start(&mut chip, &none).pll, Some(Source::Internal));
     }
 
     #[test]
     fn a_probe_leaves_the_hsi() {
-        for plan in [STM32F405, NUCLEO_F446RE] {
-            for faults in all() {
-                let mut block = Block::with(faults, plan.over_drive);
+        for hardware in [STM32F405, NUCLEO_F446RE] {
+            for faults in all_faults() {
+                let mut chip = MockRegisters::with(faults, hardware.over_drive);
                 assert_eq!(
-                    probe(&mut block, &plan),
-                    expected(&plan, faults),
+                    probe(&mut chip, &hardware),
+                    expected(&hardware, faults),
                     "{faults:?}"
                 );
-                assert_eq!(block.clocks(), [16_000_000; 3], "{faults:?}");
-                assert!(block.is_pll_off() || faults.hsi_hidden, "{faults:?}");
+                assert_eq!(chip.clocks(), [16_000_000; 3], "{faults:?}");
+                assert!(chip.is_pll_off() || faults.hsi_hidden, "{faults:?}");
             }
         }
     }
@@ -366,9 +366,9 @@ mod tests {
     #[test]
     fn the_baud_rate_is_that_of_the_clock_reached() {
         for hz in [16, 42, 45, 84, 90].map(|mhz| mhz * 1_000_000) {
-            let asked = crate::baud::believed(115_200, hz);
+            let requested = crate::baud::compensated_baud(115_200, hz);
             // Computed as stm32f4xx-hal 0.23 does, with the clock of the reset.
-            let divisor = (16_000_000 + asked / 2) / asked;
+            let divisor = (16_000_000 + requested / 2) / requested;
             let baud = f64::from(hz) / f64::from(divisor);
             assert!((baud / 115_200.0 - 1.0).abs() < 2e-3, "{hz}: {baud}");
         }

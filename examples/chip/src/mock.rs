@@ -53,7 +53,7 @@ impl Faults {
 }
 
 #[derive(Default)]
-pub(crate) struct Block {
+pub(crate) struct MockRegisters {
     values: BTreeMap<Register, u32>,
     pub(crate) written: Vec<(Register, u32)>,
     pub(crate) reads: u32,
@@ -62,10 +62,10 @@ pub(crate) struct Block {
     captured: u32,
 }
 
-impl Block {
+impl MockRegisters {
     /// Creates the mock registers in their state after a reset. `over_drive` is true for an STM32F446.
     pub(crate) fn with(faults: Faults, over_drive: bool) -> Self {
-        let mut block = Self {
+        let mut registers = Self {
             faults,
             over_drive,
             ..Self::default()
@@ -77,10 +77,10 @@ impl Block {
                 (Register::PllConfig, 0x2400_3010),
                 (Register::PowerControl, voltage),
             ] {
-                block.values.insert(register, value);
+                registers.values.insert(register, value);
             }
         }
-        block
+        registers
     }
 
     fn value(&self, register: Register) -> u32 {
@@ -182,7 +182,7 @@ impl Block {
     }
 }
 
-impl Registers for Block {
+impl Registers for MockRegisters {
     fn read(&mut self, register: Register) -> u32 {
         self.reads += 1;
         let faults = self.faults;

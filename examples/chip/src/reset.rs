@@ -62,12 +62,12 @@ impl Reset {
 #[cfg(test)]
 mod tests {
     use super::Reset;
-    use crate::mock::Block;
+    use crate::mock::MockRegisters;
     use crate::registers::{Register, Registers as _};
 
     /// Reads the values that RCC_CSR has after each kind of reset, by the reference manuals.
     #[test]
-    fn the_cause_is_read_once_and_forgotten() {
+    fn the_reset_cause_is_read_once() {
         for (status, cause) in [
             (0x0E00_0000, Reset::Power),
             (0x0600_0000, Reset::Brownout),
@@ -77,7 +77,7 @@ mod tests {
             (0x4400_0000, Reset::Watchdog),
             (0x0000_0000, Reset::Unknown),
         ] {
-            let mut block = Block::default();
+            let mut block = MockRegisters::default();
             block.write(Register::ResetStatus, status);
             assert_eq!(Reset::take(&mut block), cause, "{status:#010x}");
             assert_eq!(block.read(Register::ResetStatus) >> 24 & 1, 1, "RMVF");

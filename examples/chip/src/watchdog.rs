@@ -57,12 +57,12 @@ pub fn feed(chip: &mut impl Registers) {
 #[cfg(test)]
 mod tests {
     use super::{PRESCALER, RELOAD, TIMEOUT_MS, feed, may_feed, start};
-    use crate::mock::Block;
+    use crate::mock::MockRegisters;
     use crate::registers::Register::{DebugFreeze, WatchdogKey, WatchdogPrescaler, WatchdogReload};
 
     #[test]
-    fn it_is_started_unlocked_set_and_fed() {
-        let mut block = Block::default();
+    fn the_watchdog_is_started_unlocked_set_and_fed() {
+        let mut block = MockRegisters::default();
         start(&mut block);
         let expected = [
             (DebugFreeze, 0x1000),
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn it_waits_as_long_as_is_said() {
+    fn the_watchdog_has_the_documented_period() {
         let divisor = 4 << PRESCALER;
         for (ms, khz) in TIMEOUT_MS.into_iter().zip([32, 47, 17]) {
             assert_eq!((RELOAD + 1) * divisor / khz, ms);

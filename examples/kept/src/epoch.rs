@@ -29,5 +29,5 @@ pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> 
     if epoch == u32::MAX {
         return None;
     }
-    Some((epoch, log.keep(&[epoch], WhenFull::Erase)))
+    Some((epoch, log.append(&[epoch], WhenFull::Erase)))
 }

@@ -10,7 +10,7 @@
 //! stays intact until a newer one has been read back. A record that was cut short, lies in worn flash or has another key fails
 //! its CRC and is ignored.
 //!
-//! An erase stops the CPU. [`Journal::tidy`] erases at a start; in flight [`Journal::keep`] erases only with [`WhenFull::Erase`].
+//! An erase stops the CPU. [`Journal::tidy`] erases at a start; in flight [`Journal::append`] erases only with [`WhenFull::Erase`].
 
 use uav_relay::CRC_32C;
 
@@ -18,7 +18,7 @@ use uav_relay::CRC_32C;
 pub const BLANK: u32 = u32::MAX;
 
 /// Number of words of a record besides its payload: its number and its CRC.
-pub const AROUND: usize = 2;
+pub const OVERHEAD: usize = 2;
 
 /// Number of positions tried for one record, because flash cells may be worn.
 const TRIES: usize = 4;
@@ -63,7 +63,7 @@ impl<F: Flash> Flash for &mut F {
     }
 }
 
-/// Action of [`Journal::keep`] when both sectors are full.
+/// Action of [`Journal::append`] when both sectors are full.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WhenFull {
     /// Refuse to store the record.
@@ -96,30 +96,30 @@ struct Newest {
 }
 
 impl<F: Flash> Journal<F> {
-    /// Creates a journal whose records have `kept` words of payload. Records stored under another `key` are ignored.
-    pub const fn new(flash: F, kept: usize, key: u32) -> Self {
+    /// Creates a journal whose records have `payload_words` words of payload. Records stored under another `key` are ignored.
+    pub const fn new(flash: F, payload_words: usize, key: u32) -> Self {
         Self {
             flash,
-            words: kept + AROUND,
+            words: payload_words + OVERHEAD,
             key,
         }
     }
 
-    /// Returns the payload of the newest record, if any. `KEPT` must be the journal's payload length, words.
+    /// Returns the payload of the newest record, if any. `WORDS` must be the journal's payload length, words.
     ///
     /// Work: linear in the words of the sectors, and a CRC for the newest record and each one behind it.
-    pub fn newest<const KEPT: usize>(&mut self) -> Option<[u32; KEPT]> {
-        let mut kept = [BLANK; KEPT];
-        self.read_newest(&mut kept)?;
-        Some(kept)
+    pub fn newest<const WORDS: usize>(&mut self) -> Option<[u32; WORDS]> {
+        let mut payload = [BLANK; WORDS];
+        self.read_newest(&mut payload)?;
+        Some(payload)
     }
 
     #[inline(never)] // one copy for all lengths
-    fn read_newest(&mut self, kept: &mut [u32]) -> Option<()> {
+    fn read_newest(&mut self, payload: &mut [u32]) -> Option<()> {
         let found = self.found();
         let sector = current(found);
         let first = found.get(sector)?.newest?.record * self.words + 1;
-        for (at, word) in (first..).zip(kept) {
+        for (at, word) in (first..).zip(payload) {
             *word = self.flash.read(sector, at);
         }
         Some(())
@@ -137,8 +137,8 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Stores the payload `kept` as a new record; returns true if it was read back correctly.
-    pub fn keep(&mut self, kept: &[u32], when_full: WhenFull) -> bool {
+    /// Stores `payload` as a new record; returns true if it was read back correctly.
+    pub fn append(&mut self, payload: &[u32], when_full: WhenFull) -> bool {
         let found = self.found();
         let [first, second] = found.map(|found| found.newest);
         let newest = first.max(second);
@@ -158,10 +158,10 @@ impl<F: Flash> Journal<F> {
             let mut places = used..room.min(used + TRIES);
             return places.any(|record| {
                 let first = record * self.words;
-                let behind = first + 1 + kept.len();
+                let behind = first + 1 + payload.len();
                 // The CRC is written last, so that a record with a valid CRC is complete.
                 let stands = self.flash.write(sector, first, &[number])
-                    && self.flash.write(sector, first + 1, kept);
+                    && self.flash.write(sector, first + 1, payload);
                 let sum = self.sum(sector, first);
                 stands && self.flash.write(sector, behind, &[sum])
             });

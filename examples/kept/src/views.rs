@@ -20,12 +20,12 @@ pub const SECTORS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 pub const WORDS: usize = ViewRecord::LENGTH.div_ceil(4);
 
 /// Packs a view record, which holds the relay's votes, into words.
-pub fn kept(record: &ViewRecord) -> [u32; WORDS] {
+pub fn pack_record(record: &ViewRecord) -> [u32; WORDS] {
     pack(&record.to_bytes())
 }
 
 /// Unpacks a stored view record; `None` if the words do not have its format.
-pub fn record(kept: &[u32]) -> Option<ViewRecord> {
+pub fn unpack_record(kept: &[u32]) -> Option<ViewRecord> {
     ViewRecord::from_bytes(&unpack::<{ ViewRecord::LENGTH }>(kept))
 }
 
@@ -38,29 +38,29 @@ pub const fn log<F: Flash>(flash: F, block: u32) -> Journal<F> {
 #[derive(Debug)]
 pub struct Views {
     /// True if the newest record of votes is in the flash.
-    kept: bool,
+    is_stored: bool,
 }
 
 impl Views {
     /// Restores the votes from before the reboot into a new `relay`. Only a stored upload may have been restored
     /// before.
     ///
-    /// If a record exists, `stands_by` gets true if the relay accepts it; a record of another firmware may be
+    /// If a record exists, `votes_restored` gets true if the relay accepts it; a record of another firmware may be
     /// refused.
     pub fn resume<F: Flash>(
         relay: &mut Relay,
         now: Instant,
         mut log: Journal<F>,
-        stands_by: impl FnOnce(bool),
+        votes_restored: impl FnOnce(bool),
     ) -> Self {
         log.tidy();
         let mut kept = true;
         if let Some(words) = log.newest::<WORDS>() {
-            let record = record(&words);
+            let record = unpack_record(&words);
             kept = record.is_some_and(|record| relay.resume_view(now, &record).is_ok());
-            stands_by(kept);
+            votes_restored(kept);
         }
-        Self { kept }
+        Self { is_stored: kept }
     }
 
     /// Stores the relay's changed votes. Returns `Some` when storing begins to work (true) or to fail (false).
@@ -68,8 +68,8 @@ impl Views {
     /// If the write fails the relay flies on, because a drone in the air must not be stopped for it.
     #[inline(never)] // rarely called
     pub fn store<F: Flash>(&mut self, record: &ViewRecord, mut log: Journal<F>) -> Option<bool> {
-        let before = self.kept;
-        self.kept = log.keep(&kept(record), WhenFull::Erase);
-        (self.kept != before).then_some(self.kept)
+        let before = self.is_stored;
+        self.is_stored = log.append(&pack_record(record), WhenFull::Erase);
+        (self.is_stored != before).then_some(self.is_stored)
     }
 }

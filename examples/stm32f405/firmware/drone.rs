@@ -25,7 +25,7 @@ pub(crate) struct Drone {
 /// [`switch_on`] and this function are not inlined, so that their stack frames are released.
 #[inline(never)]
 pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
-    let field = cortex_m::singleton!(FIELD: config::Room = config::EMPTY)?;
+    let field = cortex_m::singleton!(FIELD: config::FieldStorage = config::EMPTY)?;
     match config::read(board::block(), field) {
         Ok(config) => {
             log::begins(&config);

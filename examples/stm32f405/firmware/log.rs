@@ -26,7 +26,7 @@ use super::chip::Begun;
 use super::config::{Config, ConfigError};
 
 #[cfg(all(feature = "defmt", not(feature = "rtt")))]
-pub(crate) use super::uart_log::asked;
+pub(crate) use super::uart_log::counters_requested;
 #[cfg(all(feature = "defmt", not(feature = "rtt")))]
 use super::uart_log::lost;
 #[cfg(feature = "rtt")]
@@ -34,7 +34,7 @@ use defmt_rtt as _;
 
 /// Returns false: without a log over the UART nobody can request the counters.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
-pub(crate) const fn asked() -> bool {
+pub(crate) const fn counters_requested() -> bool {
     false
 }
 
@@ -217,10 +217,10 @@ pub(crate) fn refused(error: ConfigError) {
     }
 }
 
-/// Logs the signing epoch; `kept` is true if it was stored.
+/// Logs the signing epoch; `is_stored` is true if it was stored.
 #[cfg(feature = "auth")]
-pub(crate) fn signs(epoch: u32, kept: bool) {
-    if kept {
+pub(crate) fn signs(epoch: u32, is_stored: bool) {
+    if is_stored {
         info!("frames are signed, epoch {=u32}", epoch);
     } else {
         error!(
@@ -249,10 +249,10 @@ pub(crate) fn resumes(version: u16) {
     );
 }
 
-/// Logs an uploaded mission; `kept` is true if it was stored.
+/// Logs an uploaded mission; `is_stored` is true if it was stored.
 #[cfg(feature = "upload")]
-pub(crate) fn uploaded(version: u16, kept: bool) {
-    if kept {
+pub(crate) fn uploaded(version: u16, is_stored: bool) {
+    if is_stored {
         info!("mission version {=u16} stored", version);
     } else {
         warn!(
@@ -262,18 +262,18 @@ pub(crate) fn uploaded(version: u16, kept: bool) {
     }
 }
 
-/// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
-pub(crate) fn stands_by(taken: bool) {
-    if taken {
+/// Logs the votes restored after a reboot; `accepted` is true if the relay accepts them.
+pub(crate) fn votes_restored(accepted: bool) {
+    if accepted {
         info!("votes on views restored from flash");
     } else {
         error!("votes on views in flash are of another firmware, and ignored");
     }
 }
 
-/// Logs that storing the relay's votes works again (`kept` is true) or fails (`kept` is false).
-pub(crate) fn votes(kept: bool) {
-    if kept {
+/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (`is_stored` is false).
+pub(crate) fn votes(is_stored: bool) {
+    if is_stored {
         info!("votes on views can be stored again");
     } else {
         error!("votes on views cannot be stored: a reboot in flight loses them");

@@ -18,7 +18,7 @@ pub(crate) fn resume_upload(relay: &mut Relay) {
     let mut log = uploads();
     log.tidy();
     let newest = log.newest::<{ uploads::WORDS }>();
-    if let Some(upload) = newest.and_then(|kept| uploads::upload(&kept))
+    if let Some(upload) = newest.and_then(|stored| uploads::unpack_upload(&stored))
         && relay.resume(&upload).is_ok()
     {
         log::resumes(upload.version());
@@ -27,10 +27,10 @@ pub(crate) fn resume_upload(relay: &mut Relay) {
 
 #[cfg(feature = "upload")]
 #[inline(never)]
-pub(crate) fn keep_upload(relay: &Relay) {
+pub(crate) fn store_upload(relay: &Relay) {
     let Some(upload) = relay.upload() else { return };
-    let kept = uploads().keep(&uploads::kept(upload), WhenFull::Refuse);
-    log::uploaded(upload.version(), kept);
+    let stored = uploads().append(&uploads::pack_upload(upload), WhenFull::Refuse);
+    log::uploaded(upload.version(), stored);
 }
 
 #[cfg(feature = "upload")]
@@ -46,13 +46,13 @@ impl Views {
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());
-        Self(views::Views::resume(relay, now, log, log::stands_by))
+        Self(views::Views::resume(relay, now, log, log::votes_restored))
     }
 
     /// Stores the relay's changed votes. Returns true even if the write fails, so that the relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
-        if let Some(kept) = self.0.store(record, views::log(flash::VIEWS, block())) {
-            log::votes(kept);
+        if let Some(stored) = self.0.store(record, views::log(flash::VIEWS, block())) {
+            log::votes(stored);
         }
         true
     }

@@ -9,7 +9,7 @@ use stm32f4xx_hal::pac::Interrupt;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::{Config, Error, Event, Instance, Serial};
 use uav_relay::serial::{ByteQueues, Fault, InterruptEnd, Pend, QueuedPort};
-use uav_relay_chip::baud::believed;
+use uav_relay_chip::baud::compensated_baud;
 
 use super::{board, clock};
 
@@ -65,7 +65,7 @@ impl<U: Instance> Served<U> {
 /// Returns the settings of a UART whose clock is `apb_hz`. They correct the error of the HAL, which assumes the clock
 /// after a reset.
 pub(crate) fn config(apb_hz: u32) -> Config {
-    Config::default().baudrate(believed(BAUD, apb_hz).bps())
+    Config::default().baudrate(compensated_baud(BAUD, apb_hz).bps())
 }
 
 /// Hands the UART to its interrupt handler. Returns the main loop's port, which accesses the queues.

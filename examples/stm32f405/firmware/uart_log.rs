@@ -46,17 +46,17 @@ pub(crate) fn start(uart: Serial<UART4>) {
 }
 
 /// Returns true if somebody requests the counters: an `s` was received on the log's UART.
-pub(crate) fn asked() -> bool {
-    let mut asked = false;
+pub(crate) fn counters_requested() -> bool {
+    let mut counters_requested = false;
     with(|log| {
         let mut byte = [0];
         if let Some(port) = &mut log.port
             && matches!(port.read(&mut byte), Ok(1))
         {
-            asked = byte == *b"s";
+            counters_requested = byte == *b"s";
         }
     });
-    asked
+    counters_requested
 }
 
 pub(crate) fn lost() -> u32 {

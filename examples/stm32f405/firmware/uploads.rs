@@ -17,7 +17,7 @@ pub const SECTORS: [u32; 2] = [0x0806_0000, 0x0808_0000];
 pub const WORDS: usize = Upload::LENGTH.div_ceil(4);
 
 /// Packs an uploaded mission into words.
-pub fn kept(upload: &Upload) -> [u32; WORDS] {
+pub fn pack_upload(upload: &Upload) -> [u32; WORDS] {
     let mut bytes = [0; Upload::LENGTH];
     // A checked upload always fits.
     upload.encode(&mut bytes);
@@ -25,6 +25,6 @@ pub fn kept(upload: &Upload) -> [u32; WORDS] {
 }
 
 /// Unpacks a stored upload; `None` if the words do not have its format.
-pub fn upload(kept: &[u32]) -> Option<Upload> {
-    Upload::decode(&unpack::<{ Upload::LENGTH }>(kept))
+pub fn unpack_upload(words: &[u32]) -> Option<Upload> {
+    Upload::decode(&unpack::<{ Upload::LENGTH }>(words))
 }

@@ -275,27 +275,27 @@ impl Watched {
             assert!(!told || silent, "told to fly nowhere");
             return;
         };
-        if let Some(GuardConfig { mut fence, .. }) = self.settings.guard {
+        if let Some(GuardConfig { mut geofence, .. }) = self.settings.guard {
             if self.relay.sites().is_some() {
                 // The geofence extends with the distance of the receiver.
                 let longer_m = self.relay.mission().config().distance_m - self.loaded_m;
-                fence.most_x_m += longer_m;
+                geofence.most_x_m += longer_m;
             }
             // A first setpoint may be anywhere; from outside the geofence it must not move farther out.
             let before = before.unwrap_or(place);
             for (is, was, least, most) in [
-                (place.x_m, before.x_m, fence.least_x_m, fence.most_x_m),
-                (place.y_m, before.y_m, fence.least_y_m, fence.most_y_m),
+                (place.x_m, before.x_m, geofence.least_x_m, geofence.most_x_m),
+                (place.y_m, before.y_m, geofence.least_y_m, geofence.most_y_m),
                 (
                     place.altitude_m,
                     before.altitude_m,
-                    fence.least_altitude_m,
-                    fence.most_altitude_m,
+                    geofence.least_altitude_m,
+                    geofence.most_altitude_m,
                 ),
             ] {
                 assert!(
                     (least.min(was)..=most.max(was)).contains(&is),
-                    "{place:?} outside of {fence:?}, and before at {before:?}"
+                    "{place:?} outside of {geofence:?}, and before at {before:?}"
                 );
             }
         } else {

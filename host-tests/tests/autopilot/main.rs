@@ -214,7 +214,7 @@ fn operator_values_are_sent_once_a_second() {
         );
         assert!(values.iter().all(|value| *value == expected));
     }
-    assert!(vehicle.link.say("a line of a relay"));
+    assert!(vehicle.link.send_text("a line of a relay"));
     vehicle.run(100);
     assert!(vehicle.has_text("a line of a relay"));
 }

@@ -2,12 +2,12 @@
 
 use chacha20::ChaCha8Rng;
 use host_tests::firmware::epoch::{KEY, WORDS, begin};
-use host_tests::firmware::journal::{AROUND, Journal};
+use host_tests::firmware::journal::{Journal, OVERHEAD};
 use host_tests::firmware::ram::Ram;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::seed;
 
-const ENTRY: usize = WORDS + AROUND;
+const ENTRY: usize = WORDS + OVERHEAD;
 
 fn start(flash: &mut Ram, floor: u32) -> Option<(u32, bool)> {
     begin(&mut Journal::new(flash, WORDS, KEY), floor)

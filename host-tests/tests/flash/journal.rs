@@ -1,14 +1,14 @@
 //! Journal in the flash: the last record survives any power failure.
 
 use chacha20::ChaCha8Rng;
-use host_tests::firmware::journal::{AROUND, BLANK, Journal, WhenFull};
+use host_tests::firmware::journal::{BLANK, Journal, OVERHEAD, WhenFull};
 use host_tests::firmware::ram::Ram;
 use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::seed;
 
 const KEY: u32 = 0xB10C_B10C;
 const KEPT: usize = 3;
-const RECORD: usize = KEPT + AROUND;
+const RECORD: usize = KEPT + OVERHEAD;
 
 fn log(flash: &mut Ram) -> Journal<&mut Ram> {
     Journal::new(flash, KEPT, KEY)
@@ -29,21 +29,21 @@ fn records_fill_both_sectors_and_the_newest_is_read() {
     log(&mut flash).tidy();
     assert_eq!(newest(&mut flash), None);
     for number in 1..=8 {
-        assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
+        assert!(log(&mut flash).append(&entry(number), WhenFull::Refuse));
         assert_eq!(newest(&mut flash), Some(entry(number)));
         let mut other = Journal::new(&mut flash, KEPT, KEY + 1);
         assert_eq!(other.newest::<KEPT>(), None, "another key");
     }
     let full = flash.sectors.clone();
-    assert!(!log(&mut flash).keep(&entry(9), WhenFull::Refuse));
+    assert!(!log(&mut flash).append(&entry(9), WhenFull::Refuse));
     assert_eq!((&full, flash.erased.len()), (&flash.sectors, 0));
     // Tidying at the start makes room for all records of a sector.
     log(&mut flash).tidy();
     assert_eq!(flash.erased, [0]);
     for number in 9..=12 {
-        assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
+        assert!(log(&mut flash).append(&entry(number), WhenFull::Refuse));
     }
-    assert!(!log(&mut flash).keep(&entry(13), WhenFull::Refuse));
+    assert!(!log(&mut flash).append(&entry(13), WhenFull::Refuse));
     assert_eq!(newest(&mut flash), Some(entry(12)));
 }
 
@@ -52,7 +52,7 @@ fn records_fill_both_sectors_and_the_newest_is_read() {
 fn a_full_log_continues_in_the_older_sector() {
     let mut flash = Ram::blank(4 * RECORD, 1);
     for number in 1..=40 {
-        assert!(log(&mut flash).keep(&entry(number), WhenFull::Erase));
+        assert!(log(&mut flash).append(&entry(number), WhenFull::Erase));
         assert_eq!(newest(&mut flash), Some(entry(number)));
     }
     assert_eq!(flash.erased, [0, 1, 0, 1, 0, 1, 0, 1]);
@@ -61,8 +61,8 @@ fn a_full_log_continues_in_the_older_sector() {
 #[test]
 fn a_record_with_any_changed_bit_is_ignored() {
     let mut flash = Ram::blank(4 * RECORD, 1);
-    assert!(log(&mut flash).keep(&entry(1), WhenFull::Refuse));
-    assert!(log(&mut flash).keep(&entry(2), WhenFull::Refuse));
+    assert!(log(&mut flash).append(&entry(1), WhenFull::Refuse));
+    assert!(log(&mut flash).append(&entry(2), WhenFull::Refuse));
     for bit in 0..32 * RECORD {
         let mut bad = flash.copy(0);
         bad.sectors[0][RECORD + bit / 32] ^= 1 << (bit % 32);
@@ -79,7 +79,7 @@ fn a_record_with_any_changed_bit_is_ignored() {
 fn records_of_another_key_are_erased_at_a_start() {
     let mut flash = Ram::blank(4 * RECORD, 1);
     for number in 1..=6 {
-        assert!(log(&mut flash).keep(&entry(number), WhenFull::Refuse));
+        assert!(log(&mut flash).append(&entry(number), WhenFull::Refuse));
     }
     let mut other = Journal::new(&mut flash, KEPT, KEY + 1);
     other.tidy();
@@ -92,18 +92,18 @@ fn records_of_another_key_are_erased_at_a_start() {
 fn worn_flash_is_skipped() {
     for worn in 0..=5 {
         let mut flash = Ram::blank(20 * RECORD, 1);
-        assert!(log(&mut flash).keep(&entry(1), WhenFull::Erase));
+        assert!(log(&mut flash).append(&entry(1), WhenFull::Erase));
         flash.worn = worn;
-        let kept = log(&mut flash).keep(&entry(2), WhenFull::Erase);
+        let kept = log(&mut flash).append(&entry(2), WhenFull::Erase);
         assert_eq!(kept, worn < 4, "{worn}");
         assert_eq!(newest(&mut flash), Some(entry(1 + u32::from(kept))));
         flash.worn = 0;
-        assert!(log(&mut flash).keep(&entry(3), WhenFull::Erase));
+        assert!(log(&mut flash).append(&entry(3), WhenFull::Erase));
         assert_eq!(newest(&mut flash), Some(entry(3)));
         assert!(flash.erased.is_empty());
     }
     let mut none = Ram::blank(0, 1);
-    assert!(!log(&mut none).keep(&entry(1), WhenFull::Erase));
+    assert!(!log(&mut none).append(&entry(1), WhenFull::Erase));
 }
 
 /// Checks that a power failure at any moment neither loses stored records nor creates others. It may happen during an
@@ -127,7 +127,7 @@ fn no_record_is_lost_at_any_power_failure() {
                 assert_eq!(newest(&mut flash), kept);
             }
             let before = flash.erased.len();
-            let stands = log(&mut flash).keep(&entry(number), WhenFull::Erase);
+            let stands = log(&mut flash).append(&entry(number), WhenFull::Erase);
             let erased = flash.erased.len() > before;
             // By chance a truncated word may be complete.
             let found = newest(&mut flash);

@@ -1,8 +1,8 @@
 //! Uploads in a drone's flash; `journal.rs` tests power failures.
 
-use host_tests::firmware::journal::{AROUND, Journal, WhenFull};
+use host_tests::firmware::journal::{Journal, OVERHEAD, WhenFull};
 use host_tests::firmware::ram::Ram;
-use host_tests::firmware::uploads::{WORDS, kept, upload};
+use host_tests::firmware::uploads::{WORDS, pack_upload, unpack_upload};
 use uav_relay::Upload;
 use uav_relay_scenario::Scenario;
 use uav_relay_tools::provision::block::Flight;
@@ -19,16 +19,16 @@ fn version(number: u16) -> Upload {
 fn the_stated_number_of_uploads_is_stored_in_a_flight() {
     let mut flash = Ram::blank(SECTOR, 1);
     let mut log = Journal::new(&mut flash, WORDS, 7);
-    assert_eq!(SECTOR / (WORDS + AROUND), 1_092);
-    assert!(log.keep(&kept(&version(1)), WhenFull::Refuse));
-    assert!(log.keep(&kept(&version(2)), WhenFull::Refuse));
+    assert_eq!(SECTOR / (WORDS + OVERHEAD), 1_092);
+    assert!(log.append(&pack_upload(&version(1)), WhenFull::Refuse));
+    assert!(log.append(&pack_upload(&version(2)), WhenFull::Refuse));
     let newest = log.newest::<WORDS>().unwrap();
-    assert_eq!(upload(&newest), Some(version(2)));
+    assert_eq!(unpack_upload(&newest), Some(version(2)));
 }
 
 #[test]
-fn invalid_bytes_are_no_upload() {
-    assert_eq!(upload(&kept(&version(77))), Some(version(77)));
-    assert_eq!(upload(&[]), None);
-    assert_eq!(upload(&[u32::MAX; WORDS]), None);
+fn what_is_no_upload_is_none() {
+    assert_eq!(unpack_upload(&pack_upload(&version(77))), Some(version(77)));
+    assert_eq!(unpack_upload(&[]), None);
+    assert_eq!(unpack_upload(&[u32::MAX; WORDS]), None);
 }

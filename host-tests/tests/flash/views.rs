@@ -1,8 +1,8 @@
 //! Votes on views in a drone's flash, binding after a reboot; `journal.rs` tests power failures.
 
-use host_tests::firmware::journal::{AROUND, Journal, WhenFull};
+use host_tests::firmware::journal::{Journal, OVERHEAD, WhenFull};
 use host_tests::firmware::ram::Ram;
-use host_tests::firmware::views::{SECTORS, WORDS, kept, record};
+use host_tests::firmware::views::{SECTORS, WORDS, pack_record, unpack_record};
 use host_tests::fixtures::voted;
 use uav_relay::ViewRecord;
 
@@ -10,7 +10,8 @@ use uav_relay::ViewRecord;
 const SECTOR: usize = 4 * 1024;
 
 fn found(log: &mut Journal<&mut Ram>) -> Option<ViewRecord> {
-    log.newest::<WORDS>().and_then(|kept| record(&kept))
+    log.newest::<WORDS>()
+        .and_then(|words| unpack_record(&words))
 }
 
 #[test]
@@ -20,10 +21,10 @@ fn the_stated_number_of_views_is_stored_before_an_erase() {
     for number in 1..=1_000 {
         let said = voted(7, 5, number, true);
         let mut log = Journal::new(&mut flash, WORDS, 7);
-        assert!(log.keep(&kept(&said), WhenFull::Erase));
+        assert!(log.append(&pack_record(&said), WhenFull::Erase));
         assert_eq!(found(&mut log), Some(said));
     }
-    assert_eq!(SECTOR / (WORDS + AROUND), 240);
+    assert_eq!(SECTOR / (WORDS + OVERHEAD), 240);
     assert_eq!(flash.erased, [0, 1, 0], "behind 480, 720 and 960");
     let mut start = Journal::new(&mut flash, WORDS, 7);
     start.tidy();
@@ -33,28 +34,28 @@ fn the_stated_number_of_views_is_stored_before_an_erase() {
 /// Checks a power failure while a vote is recorded. The previous record stays valid, because the new vote was not
 /// sent.
 #[test]
-fn after_a_torn_record_the_previous_one_is_read() {
-    for written in 1..WORDS + AROUND {
+fn of_a_record_that_is_torn_the_one_before_holds() {
+    for written in 1..WORDS + OVERHEAD {
         let mut flash = Ram::blank(SECTOR, written as u64);
         let mut log = Journal::new(&mut flash, WORDS, 7);
-        assert!(log.keep(&kept(&voted(7, 5, 1, true)), WhenFull::Erase));
+        assert!(log.append(&pack_record(&voted(7, 5, 1, true)), WhenFull::Erase));
         flash.power = Some(written);
         let mut log = Journal::new(&mut flash, WORDS, 7);
-        assert!(!log.keep(&kept(&voted(7, 5, 2, false)), WhenFull::Erase));
+        assert!(!log.append(&pack_record(&voted(7, 5, 2, false)), WhenFull::Erase));
         assert!(flash.switch_on());
         let mut log = Journal::new(&mut flash, WORDS, 7);
         assert_eq!(found(&mut log), Some(voted(7, 5, 1, true)));
-        assert!(log.keep(&kept(&voted(7, 5, 3, true)), WhenFull::Erase));
+        assert!(log.append(&pack_record(&voted(7, 5, 3, true)), WhenFull::Erase));
         assert_eq!(found(&mut log), Some(voted(7, 5, 3, true)));
     }
 }
 
 #[test]
-fn invalid_bytes_are_no_view_record() {
-    assert_eq!(record(&[]), None);
-    assert_eq!(record(&[u32::MAX; WORDS]), None);
+fn what_is_no_record_is_none() {
+    assert_eq!(unpack_record(&[]), None);
+    assert_eq!(unpack_record(&[u32::MAX; WORDS]), None);
     let other_format = 2;
-    let mut words = kept(&voted(7, 5, 1, true));
+    let mut words = pack_record(&voted(7, 5, 1, true));
     words[0] = words[0] & !0xFF | other_format;
-    assert_eq!(record(&words), None);
+    assert_eq!(unpack_record(&words), None);
 }

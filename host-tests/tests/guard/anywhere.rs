@@ -257,7 +257,7 @@ impl World {
                 }
                 drone
                     .guard
-                    .hear(message.side, node(message.from), &message.fence);
+                    .handle_fence(letter.side, node(letter.from), &letter.fence);
             }
         }
         for k in 0..self.drones.len() {
@@ -373,14 +373,17 @@ impl World {
 
 /// Returns random agreed positions: in order along the line, separated, and within the box across it.
 fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
-    let distance = f64::from(config.fence.most_x_m);
+    let distance = f64::from(config.geofence.most_x_m);
     let step = f64::from(config.separation_m) * 1.001;
     let slack = distance - step * relays as f64;
     let mut spare: Vec<f64> = (0..relays).map(|_| rng.random_range(0.0..=slack)).collect();
     spare.sort_by(f64::total_cmp);
     let across = [
-        (config.fence.least_y_m, config.fence.most_y_m),
-        (config.fence.least_altitude_m, config.fence.most_altitude_m),
+        (config.geofence.least_y_m, config.geofence.most_y_m),
+        (
+            config.geofence.least_altitude_m,
+            config.geofence.most_altitude_m,
+        ),
     ];
     (0..relays)
         .map(|k| {
@@ -395,7 +398,7 @@ fn config(rng: &mut ChaCha8Rng, relays: usize) -> GuardConfig {
     let separation = rng.random_range(4.0..=20.0);
     let room = if rng.random_bool(0.5) { 0.0 } else { 30.0 };
     GuardConfig {
-        fence: Geofence {
+        geofence: Geofence {
             least_x_m: 0.0,
             most_x_m: (separation * relays as f64 * rng.random_range(1.3..=6.0)) as f32,
             least_y_m: -room,
@@ -424,7 +427,7 @@ fn starts(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Poin
         1 => [0.0, 3.0 * apart],
         _ => [3.0 * apart; 2],
     };
-    let mut x = rng.random_range(-20.0..=0.5 * f64::from(config.fence.most_x_m));
+    let mut x = rng.random_range(-20.0..=0.5 * f64::from(config.geofence.most_x_m));
     let mut places: Vec<Point> = (0..relays)
         .map(|_| {
             x += step * rng.random_range(0.0..=1.0);
@@ -479,7 +482,7 @@ fn agenda(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<(f64
         if rng.random_bool(0.3) {
             let at_s = rng.random_range(1.0..80.0);
             let to = [
-                rng.random_range(-20.0..=f64::from(config.fence.most_x_m)),
+                rng.random_range(-20.0..=f64::from(config.geofence.most_x_m)),
                 rng.random_range(-5.0..=5.0) * apart,
                 (40.0 + rng.random_range(-1.0..=5.0) * apart).max(5.0),
             ];
@@ -625,7 +628,7 @@ fn fly(seed: u64) -> Report {
         let all = world.drones.iter();
         report.arrived = plan.peek().is_none()
             && world.later.is_empty()
-            && all.clone().all(|drone| drone.guard.is_there());
+            && all.clone().all(|drone| drone.guard.has_arrived());
         if report.arrived || world.now_s > LAST_S {
             break;
         }

@@ -12,8 +12,8 @@ use crate::world::World;
 const SPEED: f64 = 10.0;
 
 fn world(relays: usize, from_m: f64, step_m: f64) -> World {
-    let config = GuardConfig {
-        fence: Geofence {
+    let confines = GuardConfig {
+        geofence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,
             least_y_m: -100.0,
@@ -51,7 +51,7 @@ fn time(world: &mut World) -> f64 {
     while !world
         .drones
         .iter()
-        .all(|drone| drone.guard.as_ref().unwrap().is_there())
+        .all(|drone| drone.guard.as_ref().unwrap().has_arrived())
     {
         assert!(world.now_s < begun_s + 1000.0, "they do not get there");
         world.step();
@@ -100,7 +100,7 @@ fn drones_approach_positions_that_are_too_close() {
     println!("{ends:?}");
     for k in [0, 4] {
         assert!(
-            world.drones[k].guard.as_ref().unwrap().is_there(),
+            world.drones[k].guard.as_ref().unwrap().has_arrived(),
             "{ends:?}"
         );
     }

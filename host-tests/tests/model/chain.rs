@@ -186,21 +186,16 @@ impl<'a> World<'a> {
         self.turn(end(line).0)
     }
 
-<<<<<<< HEAD
-    /// Delivers bytes of a frame at the end of a line. The model checks how the relay counts a pass.
+    /// Delivers bytes of a frame at the end of a line.
+    ///
+    /// If they complete a pass (a round of messages along the chain), the model checks how the relay's statistics
+    /// count it.
     pub(crate) fn deliver_and_check(
         &mut self,
         line: usize,
         bytes: &[u8],
         frame: &Flying,
     ) -> Checked {
-=======
-    /// Delivers bytes of a frame at the end of a line.
-    ///
-    /// If they complete a pass (a round of messages along the chain), the model checks how the relay's statistics
-    /// count it.
-    pub(crate) fn hear(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
->>>>>>> part-d2
         let (to, port) = end(line);
         let from = match port {
             Port::Upstream => Side::Upstream,

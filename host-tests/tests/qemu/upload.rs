@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use host_tests::firmware::emulator::{Kept, SPEED};
 use host_tests::firmware::journal::{Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
-use host_tests::firmware::uploads::{SECTORS, WORDS, kept};
+use host_tests::firmware::uploads::{SECTORS, WORDS, pack_upload};
 use uav_relay::MAX_FRAME;
 use uav_relay::{Auth, Ground, Key, Progress, Side, Upload, Wiring};
 use uav_relay_scenario::{Interference, Scenario, Source};
@@ -144,11 +144,11 @@ fn three_drones_fly_a_stored_upload() {
             let mut flash = Ram::blank(LARGE, 1);
             let mut log = Journal::new(&mut flash, WORDS, check);
             for version in [2, 3] {
-                assert!(log.keep(&kept(&upload(&loaded, version)), WhenFull::Refuse));
+                assert!(log.append(&pack_upload(&upload(&loaded, version)), WhenFull::Refuse));
             }
             flash.power = Some(11);
             let mut log = Journal::new(&mut flash, WORDS, check);
-            assert!(!log.keep(&kept(&upload(&loaded, 4)), WhenFull::Refuse));
+            assert!(!log.append(&pack_upload(&upload(&loaded, 4)), WhenFull::Refuse));
             vec![(SECTORS[0], flash.bytes())]
         })
         .collect();

@@ -3,7 +3,7 @@
 use host_tests::firmware::emulator::Kept;
 use host_tests::firmware::journal::{Journal, WhenFull};
 use host_tests::firmware::ram::Ram;
-use host_tests::firmware::views::{SECTORS, WORDS, kept};
+use host_tests::firmware::views::{SECTORS, WORDS, pack_record};
 use host_tests::fixtures::voted;
 use uav_relay::ViewRecord;
 use uav_relay::wire::digest::digest;
@@ -29,7 +29,8 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
     for (at, record) in said.iter().enumerate() {
         let is_last = at + 1 == said.len();
         flash.power = is_last.then_some(9);
-        let stands = Journal::new(&mut flash, WORDS, check).keep(&kept(record), WhenFull::Erase);
+        let stands =
+            Journal::new(&mut flash, WORDS, check).append(&pack_record(record), WhenFull::Erase);
         assert_eq!(stands, !is_last);
     }
     vec![(SECTORS[0], flash.bytes())]

@@ -253,11 +253,11 @@ pub(crate) fn own(
                 1 => scaled(rng, 4.0, 1e-3, 1e5),
                 _ => mission.config().min_separation_m,
             },
-            fence: if rng.random_ratio(1, 4) {
+            geofence: if rng.random_ratio(1, 4) {
                 fence(rng)
             } else {
                 let guard = GuardConfig::of(mission, held);
-                guard.with_room_for(common.without_quorum).fence
+                guard.with_room_for(common.without_quorum).geofence
             },
             ..GuardConfig::of(mission, held)
         }),

@@ -73,7 +73,7 @@ impl Wires {
     /// Makes the ground station at `end`, loaded with `base`, request the mission in flight.
     pub(crate) fn request_flown(&mut self, base: &Mission, end: Side) {
         let now = self.bench.now;
-        self.bench.ground(base, end, AUTH).ask_flown(now);
+        self.bench.ground(base, end, AUTH).request_flown(now);
     }
 
     pub(crate) fn flown(&self, end: Side) -> Option<FlownMission> {

@@ -8,8 +8,8 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::message::{
-    AdjustStep, Answer, Claim, Decision, Heard, Hello, Message, Moved, OwnSeat, Poll, Proposal,
-    Pulse, Pulsed, Roster, Successor, Sweep, Token,
+    AdjustStep, Claim, Decision, Heard, Hello, Message, Moved, OwnSeat, Poll, Proposal, Pulse,
+    Pulsed, Roster, Successor, Sweep, SweepVerdict, Token,
 };
 use uav_relay::{
     Band, Interference, Interferer, Local, Placement, Profile, Sites, Upload, View, ViewId,
@@ -83,12 +83,12 @@ impl MessageFields<'_> {
 }
 
 /// Returns the crate's message with the values that `wire_message` has by the tables of the format.
-pub(crate) fn message(wire_message: &WireMessage) -> Message {
-    let fields = wire_message.fields();
-    let of = MessageFields(&fields);
-    match wire_message.name() {
-        "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(wire_message.name(), &of)),
-        "Verdict" => Message::Verdict(Answer {
+pub(crate) fn message(said: &Said) -> Message {
+    let fields = said.fields();
+    let of = Of(&fields);
+    match said.name() {
+        "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(said.name(), &of)),
+        "Verdict" => Message::Verdict(SweepVerdict {
             number: of.word("number"),
             view_digest: of.word("view_digest"),
             verdict: Verdict {

@@ -130,12 +130,12 @@ fn guarded() -> SignedBench {
     let mission = Mission::try_new(paper(8)).unwrap();
     // The geofence has room for all offers here.
     let mut guard = GuardConfig::of(&mission, mission.config().common);
-    guard.fence = Geofence {
+    guard.geofence = Geofence {
         least_y_m: -1e3,
         most_y_m: 1e3,
         least_altitude_m: 0.0,
         most_altitude_m: 1e3,
-        ..guard.fence
+        ..guard.geofence
     };
     let mut met = SignedBench::fourth_with(Settings {
         guard: Some(guard),

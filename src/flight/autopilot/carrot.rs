@@ -15,7 +15,7 @@ use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
 /// Distance from the setpoint, m, below which the carrot (the autopilot's moving target) has arrived.
-const THERE_M: f32 = 0.01;
+const ARRIVED_M: f32 = 0.01;
 
 /// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s.
 const END_PER_S: f32 = 0.5;
@@ -173,7 +173,7 @@ impl Carrot {
     }
 
     /// Returns the moving target's position `ago` before its last step, extrapolated back by its velocity.
-    fn before(&self, ago: Duration) -> Placement {
+    fn place_before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
         Placement {
@@ -189,7 +189,7 @@ impl Carrot {
         let left = length(to);
         let speed = length(self.velocity_m_s);
         let needs = pace.stopping_m(speed);
-        if self.is_standing || left <= THERE_M || dot(self.velocity_m_s, to) <= 0.0 {
+        if self.is_standing || left <= ARRIVED_M || dot(self.velocity_m_s, to) <= 0.0 {
             return self.place;
         }
         let part = (needs / left).min(1.0);
@@ -220,7 +220,7 @@ impl Carrot {
         let a = pace.acceleration_m_s2;
         let turn = TURN_PART * a * dt;
         // A new setpoint may be to the side or behind. The velocity in other directions is reduced first.
-        let ahead = to.map(|part| part / left.max(THERE_M));
+        let ahead = to.map(|part| part / left.max(ARRIVED_M));
         let toward = dot(self.velocity_m_s, ahead);
         let [x, y, up] = self.velocity_m_s;
         let aside = [
@@ -230,12 +230,12 @@ impl Carrot {
         ];
         let slip = length(aside);
         let keeps = if slip > turn { 1.0 - turn / slip } else { 0.0 };
-        if left <= THERE_M && keeps <= 0.0 {
+        if left <= ARRIVED_M && keeps <= 0.0 {
             *self = Self::at(setpoint, now);
             return;
         }
         // A drone ahead of the carrot has no lag to catch up: with a negative lag the carrot would oscillate with the drone.
-        let behind = |(place, ago)| dot(way(place, self.before(ago)), to) / left;
+        let behind = |(place, ago)| dot(way(place, self.place_before(ago)), to) / left;
         let lag_m = drone.map_or(0.0, behind).max(0.0);
         let most = (CARROT_PART * pace.speed_m_s - CATCH_UP_PER_S * lag_m)
             .max(LEAST_PART * pace.speed_m_s);
@@ -304,7 +304,7 @@ const SENT_FOR: Duration = Duration::from_millis(3_000);
 
 /// Tolerance between the target that an ArduCopter reports and a standing target, 1e-7 degrees. For a moving target
 /// it is [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
-const TAKEN_WITHIN: u32 = 20;
+const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
 
@@ -319,13 +319,13 @@ pub(super) struct Target {
     /// Number of times that the standing target has been sent.
     times_sent: u8,
     /// True once the autopilot has reported this target as its own.
-    is_taken: bool,
+    is_accepted: bool,
     /// Time since which targets have been sent without a break.
     since: Instant,
     /// Number of consecutive reports in which the autopilot names another target.
-    elsewhere: u8,
+    other_targets: u8,
     /// True once the autopilot has reported any target.
-    is_said: bool,
+    is_reported: bool,
 }
 
 impl Target {
@@ -335,10 +335,10 @@ impl Target {
             carrot: Carrot::at(place, now),
             due: now,
             times_sent: 0,
-            is_taken: false,
+            is_accepted: false,
             since: now,
-            elsewhere: 0,
-            is_said: false,
+            other_targets: 0,
+            is_reported: false,
         }
     }
 
@@ -346,7 +346,7 @@ impl Target {
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
         self.times_sent = 0;
-        self.is_taken = false;
+        self.is_accepted = false;
     }
 
     /// Compares the autopilot's reported target with the one sent; returns true, once, if they differ. They count as
@@ -354,14 +354,14 @@ impl Target {
     ///
     /// While the target moves, the report may lag behind it by the time between two messages.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
-        self.is_said = true;
+        self.is_reported = true;
         let Some(point) = axis.point(self.carrot.place) else {
             return false;
         };
-        let near = |a: i32, b: i32| a.abs_diff(b) <= TAKEN_WITHIN;
+        let near = |a: i32, b: i32| a.abs_diff(b) <= ACCEPTED_WITHIN;
         let is_there = near(point.lat_e7, lat_e7) && near(point.lon_e7, lon_e7);
         if self.times_sent > 0 {
-            self.is_taken = is_there;
+            self.is_accepted = is_there;
         }
         let amsl_mm = point.amsl_mm;
         let said = axis.place(Geodetic {
@@ -377,15 +377,15 @@ impl Target {
         });
         // A standing target is reported exactly, or not at all.
         if is_there || is_near && self.times_sent == 0 {
-            self.elsewhere = 0;
+            self.other_targets = 0;
             return false;
         }
         if now.since(self.since) < SENT_FOR {
             return false;
         }
-        let before = self.elsewhere;
-        self.elsewhere = before.saturating_add(1);
-        before < REFUSED_AFTER && self.elsewhere >= REFUSED_AFTER
+        let before = self.other_targets;
+        self.other_targets = before.saturating_add(1);
+        before < REFUSED_AFTER && self.other_targets >= REFUSED_AFTER
     }
 
     /// Records that the drone's own position was sent as the target.
@@ -402,10 +402,10 @@ impl Target {
                 Kind::Px4 => STANDING,
                 Kind::ArduCopter => AGAIN,
             };
-        let is_known = self.is_taken || !self.is_said && self.times_sent >= UNCONFIRMED;
+        let is_known = self.is_accepted || !self.is_reported && self.times_sent >= UNCONFIRMED;
         let is_sent = !is_standing || kind == Kind::Px4 || !is_known;
         if !is_standing {
-            (self.times_sent, self.is_taken) = (0, false);
+            (self.times_sent, self.is_accepted) = (0, false);
         } else if is_sent && kind == Kind::ArduCopter {
             self.times_sent = self.times_sent.saturating_add(1);
         }
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn it_gets_there_no_faster_than_allowed_and_stops_gently() {
+    fn a_carrot_keeps_its_speed_limit_and_stops_gently() {
         let pace = Pace::default();
         let to = Placement {
             y_m: 40.0,
@@ -514,7 +514,7 @@ mod tests {
     /// Withdraws the setpoint at every moment of a flight: the deceleration is within its limit. The setpoint is
     /// never overshot.
     #[test]
-    fn it_stops_gently_wherever_it_is_withdrawn() {
+    fn a_withdrawn_carrot_stops_gently_anywhere() {
         let to = Placement::on_line(60.0, 20.0);
         let pace = Pace::default();
         for after in 1..200 {

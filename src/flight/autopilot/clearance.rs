@@ -54,7 +54,7 @@ impl Clearance {
     }
 
     /// Updates the lists of lost relays by an event of the relay.
-    pub(super) fn hear(&mut self, event: Event) {
+    pub(super) fn handle_event(&mut self, event: Event) {
         match event {
             Event::NeighbourLost { side, node } => {
                 let lost = self.side_mut(side);
@@ -164,9 +164,9 @@ mod tests {
         let mut clearance = Clearance::default();
         let side = Side::Downstream;
         for node in [4, 5] {
-            clearance.hear(Event::NeighbourLost { side, node });
+            clearance.handle_event(Event::NeighbourLost { side, node });
         }
-        clearance.hear(Event::NeighbourLost {
+        clearance.handle_event(Event::NeighbourLost {
             side: Side::Upstream,
             node: 2,
         });
@@ -208,15 +208,15 @@ mod tests {
     }
 
     #[test]
-    fn a_relay_that_is_back_is_not_lost_and_more_than_seven_are_not_cleared() {
+    fn a_command_clears_at_most_seven_lost_relays() {
         let mut clearance = Clearance::default();
         let side = Side::Upstream;
-        clearance.hear(Event::NeighbourLost { side, node: 2 });
-        clearance.hear(Event::NeighbourBack { side, node: 2 });
+        clearance.handle_event(Event::NeighbourLost { side, node: 2 });
+        clearance.handle_event(Event::NeighbourBack { side, node: 2 });
         let event = clearance.command(FROM, parameters(&[2.0]), false);
         assert!(matches!(event, Some(AutopilotEvent::ClearRefused { .. })));
         for node in 1..=8 {
-            clearance.hear(Event::NeighbourLost { side, node });
+            clearance.handle_event(Event::NeighbourLost { side, node });
         }
         let all = core::array::from_fn(|at| at as f32 + 1.0);
         let event = clearance.command(FROM, all, false);

@@ -4,7 +4,7 @@ use super::carrot::Target;
 use super::report::{AutopilotEvent, Events};
 use super::state::{FlightMode, Kind, Release, ReleaseCause, WaitReason};
 use super::vehicle::millis;
-use super::vehicle::{Astray, OffLine};
+use super::vehicle::{OffLine, OffLineDetector};
 use crate::event::Event;
 use crate::flight::autopilot::carrot::{Carrot, Pace};
 use crate::flight::autopilot::clearance::{CLEAR_LOST, Clearance};
@@ -48,7 +48,7 @@ const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
 /// Time within which an ArduCopter reports its fence after a mode change caused by a breach.
-const FENCE_TOLD: Duration = Duration::from_millis(1_300);
+const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
 /// Time for which a reason not to engage the drone must last before it is reported. The next constant is the minimum
 /// time since the last report.
@@ -80,7 +80,7 @@ pub struct Autopilot {
     streams: Streams,
     state: State,
     setpoint: Option<Placement>,
-    look: Option<Bearing>,
+    bearing: Option<Bearing>,
     /// Side of the neighbour that a directional antenna points to.
     antenna: Option<Side>,
     target: Option<Target>,
@@ -108,7 +108,7 @@ pub struct Autopilot {
     is_new_view: bool,
     report: Report,
     position: Option<Position>,
-    astray: Astray,
+    off_line_detector: OffLineDetector,
     clearance: Clearance,
     /// Newest noise measurement of a SiK radio, with the drone's position.
     noise: RadioNoise,
@@ -132,7 +132,7 @@ impl Autopilot {
             streams: Streams::new(now),
             state: State::Silent,
             setpoint: None,
-            look: None,
+            bearing: None,
             antenna: None,
             target: None,
             stop: None,
@@ -148,7 +148,7 @@ impl Autopilot {
             is_new_view: false,
             report: Report::default(),
             position: None,
-            astray: Astray::default(),
+            off_line_detector: OffLineDetector::default(),
             clearance: Clearance::default(),
             noise: RadioNoise::NONE,
             events: Events::default(),
@@ -170,25 +170,25 @@ impl Autopilot {
         for byte in bytes {
             self.parser.push(*byte);
             while let Some(received) = self.trust.next_received(now, &mut self.parser) {
-                self.noise.hear(now, &received, &self.vehicle);
-                self.obey(&received);
+                self.noise.record(now, &received, &self.vehicle);
+                self.handle_command(&received);
                 let was_breached = self.vehicle.is_breached;
-                let heard = self.vehicle.hear(now, &received, &self.axis);
+                let heard = self.vehicle.read(now, &received, &self.axis);
                 if self.vehicle.is_breached && !was_breached {
                     self.events.breached = true;
                     let text = ["relay: autopilot fence breached", ""];
-                    self.report.tell(Line::warning(Topic::Fence, text));
+                    self.report.queue_line(Line::warning(Topic::Fence, text));
                 }
                 if heard != VehicleUpdate::Nothing {
-                    self.streams.hear(received.id);
+                    self.streams.count_message(received.id);
                 }
-                self.take(now, heard);
+                self.apply_update(now, heard);
             }
         }
     }
 
     /// Processes an operator's command to this companion, from any sender whose frames are accepted.
-    fn obey(&mut self, received: &Received) {
+    fn handle_command(&mut self, received: &Received) {
         let Some(Incoming::CommandLong {
             command: CLEAR_LOST,
             parameters,
@@ -216,12 +216,12 @@ impl Autopilot {
             None => return,
         };
         self.events.clearance = event;
-        self.report.tell(line);
+        self.report.queue_line(line);
     }
 
-    fn take(&mut self, now: Instant, heard: VehicleUpdate) {
-        match heard {
-            VehicleUpdate::Nothing | VehicleUpdate::News => {}
+    fn apply_update(&mut self, now: Instant, update: VehicleUpdate) {
+        match update {
+            VehicleUpdate::Nothing | VehicleUpdate::StateChanged => {}
             VehicleUpdate::Found => {
                 self.events.found = self.vehicle.kind();
                 self.streams = Streams::new(now);
@@ -232,15 +232,15 @@ impl Autopilot {
             }
             VehicleUpdate::Position(position) => {
                 self.position = Some(position);
-                self.astray.returned();
+                self.off_line_detector.returned();
             }
             VehicleUpdate::OffLine(at) => {
                 let is_in_air = !matches!(self.state, State::Silent | State::Grounded);
-                if self.astray.hear(now, at, is_in_air) {
+                if self.off_line_detector.record(now, at, is_in_air) {
                     self.events.off_line = OffLine::new(at, &self.axis);
                 }
             }
-            VehicleUpdate::Answer(result) => self.streams.answer(result),
+            VehicleUpdate::RequestResult(result) => self.streams.answer(result),
             VehicleUpdate::Target(lat_e7, lon_e7) => {
                 if self.state == State::Engaged
                     && let Some(target) = &mut self.target
@@ -264,10 +264,10 @@ impl Autopilot {
         let before = core::mem::replace(&mut self.axis, axis);
         let moved = |place| before.point(place).and_then(|point| axis.place(point));
         self.vehicle.move_places(moved);
-        (self.setpoint, self.look, self.stop) = (None, None, None);
+        (self.setpoint, self.bearing, self.stop) = (None, None, None);
         // The position was measured before the relay knew the line.
         self.position = None;
-        self.astray = Astray::default();
+        self.off_line_detector = OffLineDetector::default();
         self.target = self.target.and_then(|target| {
             let at = moved(target.carrot.place);
             at.map(|place| Target::at(place, now))
@@ -296,8 +296,8 @@ impl Autopilot {
     }
 
     /// Sets the heading that a directional antenna needs. `None`, or an invalid azimuth, leaves the heading to the autopilot.
-    pub fn handle_bearing(&mut self, look: Option<Bearing>) {
-        self.look = look.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
+    pub fn handle_bearing(&mut self, bearing: Option<Bearing>) {
+        self.bearing = bearing.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
     /// Sets the side of the neighbour that a directional antenna, forward on the drone, points to.
@@ -350,35 +350,35 @@ impl Autopilot {
         let sides = [Side::Upstream, Side::Downstream];
         for ((side, reason), before) in sides.into_iter().zip(reasons).zip(before) {
             if reason != before {
-                self.report.tell(Line::hold(side, reason));
+                self.report.queue_line(Line::hold(side, reason));
             }
         }
     }
 
     /// Queues a text of at most 50 bytes for the operator; returns true if there was room. At most three texts can
     /// wait. Equal texts are sent at least 10 s apart.
-    pub fn say(&mut self, text: &str) -> bool {
-        self.report.say(text)
+    pub fn send_text(&mut self, text: &str) -> bool {
+        self.report.queue_text(text)
     }
 
     /// Processes an event of the relay. Events that matter in flight are sent to the operator as a text. A new view
     /// is one line, on an engaged drone. Reasons that keep a drone from its place are reported by
     /// [`handle_hold`](Self::handle_hold) and as reasons not to engage it.
     pub fn handle_event(&mut self, event: Event) {
-        self.clearance.hear(event);
+        self.clearance.handle_event(event);
         match event {
             Event::ViewAccepted => self.is_new_view = true,
             Event::Converged => {
                 let is_new = core::mem::take(&mut self.is_new_view);
                 if is_new && self.state == State::Engaged && self.hold == [None; 2] {
                     let line = Line::info(Topic::Relay, "relay: flies to new position");
-                    self.report.tell(line);
+                    self.report.queue_line(line);
                 }
             }
             _ => {}
         }
         if let Some(line) = Line::of(event) {
-            self.report.tell(line);
+            self.report.queue_line(line);
         }
     }
 
@@ -429,14 +429,14 @@ impl Autopilot {
                 let is_unclear = release.cause == ReleaseCause::Chosen
                     && self.vehicle.kind() == Some(Kind::ArduCopter)
                     && !matches!(release.mode, FlightMode::Sticks | FlightMode::Hold);
-                let until = if is_unclear { now + FENCE_TOLD } else { now };
+                let until = if is_unclear { now + FENCE_SHOWN } else { now };
                 self.release = Some((release, until));
                 return self.review_release(now);
             }
             _ => return,
         };
         self.release = None;
-        self.report.tell(Line::info(Topic::Control, line));
+        self.report.queue_line(Line::info(Topic::Control, line));
     }
 
     /// Reports a pending release of control once its cause is known.
@@ -454,7 +454,7 @@ impl Autopilot {
         self.release = None;
         self.events.released = Some(release);
         let line = Line::warning(Topic::Control, release.text());
-        self.report.tell(line);
+        self.report.queue_line(line);
     }
 
     /// Keeps the state [`State::Blind`] until positions have been received regularly for some time. The state then
@@ -537,7 +537,7 @@ impl Autopilot {
             ),
         };
         self.events.waits = Some(event);
-        self.report.tell(line);
+        self.report.queue_line(line);
     }
 
     /// Returns the time at which the reason not to engage the drone is reported; `None` if nothing is due.
@@ -659,7 +659,7 @@ impl Autopilot {
         let velocity_m_s =
             (!carrot.is_standing()).then(|| self.axis.to_ned(x_m, carrot.velocity_m_s));
         let yaw_rad = self
-            .look
+            .bearing
             .map(|look| self.axis.heading_rad(x_m, look.azimuth_rad));
         Some(self.frame(Outgoing::SetPosition {
             boot_ms: self.boot_ms(now),
@@ -705,7 +705,7 @@ impl Autopilot {
     /// Returns the position of a drone that is too far from its line, and its distance; else `None`. Such a drone has
     /// no position in the mission's coordinates. `None`, too, without a position for 3 s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
-        let at = self.astray.newest(self.clock.internal(now))?;
+        let at = self.off_line_detector.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)
     }
 
@@ -722,7 +722,7 @@ impl Autopilot {
 
     /// Returns the next event.
     pub fn poll_event(&mut self) -> Option<AutopilotEvent> {
-        let hears = self.streams.hears();
+        let hears = self.streams.answers_requests();
         let mistrusted = || {
             let mistrust = self.trust.take_event(hears)?;
             Some(AutopilotEvent::Mistrusted(mistrust))

@@ -140,12 +140,12 @@ pub(super) struct Report {
     values: [Option<f32>; NAMES.len()],
     /// Number of values already sent in the current round.
     sent: usize,
-    again_at: Option<Instant>,
+    next_values_at: Option<Instant>,
 }
 
 impl Report {
     /// Queues a line for the operator. A full queue drops its oldest line.
-    pub(super) fn tell(&mut self, line: Line) {
+    pub(super) fn queue_line(&mut self, line: Line) {
         let newest = self.lines.iter().rfind(|other| other.topic == line.topic);
         if newest == Some(&line) {
             return;
@@ -158,7 +158,7 @@ impl Report {
     }
 
     /// Queues a line of the firmware; returns true if it was queued or is already waiting.
-    pub(super) fn say(&mut self, text: &str) -> bool {
+    pub(super) fn queue_text(&mut self, text: &str) -> bool {
         let mut line = String::new();
         for character in text.chars() {
             if line.push(character).is_err() {
@@ -228,8 +228,8 @@ impl Report {
             None => [None; 3],
         };
         self.values = [sir_db, x, y, h].map(|value| value.filter(|value| value.is_finite()));
-        if self.again_at.is_none() {
-            self.again_at = Some(now);
+        if self.next_values_at.is_none() {
+            self.next_values_at = Some(now);
         }
     }
 
@@ -246,7 +246,7 @@ impl Report {
                 text: &text,
             }));
         }
-        if self.again_at.is_none_or(|at| at > now) {
+        if self.next_values_at.is_none_or(|at| at > now) {
             return None;
         }
         let left = self.values.into_iter().zip(NAMES).skip(self.sent);
@@ -261,7 +261,7 @@ impl Report {
             }
         }
         self.sent = 0;
-        self.again_at = Some(now + PERIOD);
+        self.next_values_at = Some(now + PERIOD);
         None
     }
 
@@ -270,7 +270,7 @@ impl Report {
         let waits = !(self.lines.is_empty() && self.texts.is_empty());
         let lines = self.recent.iter().map(|(_, until)| *until);
         let lines = lines.filter(|until| waits && *until > now);
-        lines.chain(self.again_at).min()
+        lines.chain(self.next_values_at).min()
     }
 }
 
@@ -398,20 +398,20 @@ mod tests {
     const OFF: Line = Line::info(Topic::Control, "off");
 
     #[test]
-    fn a_line_is_sent_once_in_ten_seconds_and_the_last_one_is_true() {
+    fn a_line_is_sent_once_in_ten_seconds_and_the_last_is_current() {
         let mut report = Report::default();
         for i in 0..50_u64 {
-            report.tell(if i % 2 == 0 { ON } else { OFF });
+            report.queue_line(if i % 2 == 0 { ON } else { OFF });
             let said = texts(&mut report, at(200 * i));
             assert_eq!(said.is_empty(), i >= 2, "{i}: {said:?}");
         }
         // The last one was `off`, as was the last that an operator read: nothing is left to say.
         assert_eq!(texts(&mut report, at(30_000)).len(), 0);
-        report.tell(ON);
+        report.queue_line(ON);
         assert_eq!(texts(&mut report, at(31_000)).as_slice(), ["on"]);
-        report.tell(OFF);
+        report.queue_line(OFF);
         assert_eq!(texts(&mut report, at(32_000)).as_slice(), ["off"]);
-        report.tell(ON);
+        report.queue_line(ON);
         assert_eq!(texts(&mut report, at(33_000)).len(), 0);
         assert_eq!(report.next_timeout(at(33_000)), Some(at(41_000)));
         assert_eq!(texts(&mut report, at(41_000)).as_slice(), ["on"]);
@@ -420,9 +420,9 @@ mod tests {
     #[test]
     fn lines_of_the_firmware_are_limited_too() {
         let mut report = Report::default();
-        assert!(report.say("a") && report.say("b") && report.say("a"));
+        assert!(report.queue_text("a") && report.queue_text("b") && report.queue_text("a"));
         assert_eq!(texts(&mut report, at(0)).as_slice(), ["a", "b"]);
-        assert!(report.say("a"));
+        assert!(report.queue_text("a"));
         assert!(texts(&mut report, at(9_000)).is_empty());
         assert_eq!(texts(&mut report, at(10_000)).as_slice(), ["a"]);
     }

@@ -43,7 +43,7 @@ pub enum State {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Observed {
     /// True if the autopilot was received within 3 s.
-    pub(super) there: bool,
+    pub(super) is_received: bool,
     /// True if the drone is armed and in the air.
     pub(super) flying: bool,
     /// True if the pilot has chosen the mode in which a companion sets the target. The choice was made since this link started.
@@ -56,7 +56,7 @@ impl State {
     /// Returns the control state that follows this one after `observed`.
     pub(super) const fn next(self, observed: Observed) -> Self {
         let Observed {
-            there,
+            is_received: there,
             flying,
             granted,
             located,
@@ -240,7 +240,7 @@ mod tests {
 
     fn observations() -> impl Iterator<Item = Observed> {
         (0..16_u8).map(|bits| Observed {
-            there: bits & 1 != 0,
+            is_received: bits & 1 != 0,
             flying: bits & 2 != 0,
             granted: bits & 4 != 0,
             located: bits & 8 != 0,
@@ -249,12 +249,12 @@ mod tests {
 
     #[expect(clippy::match_same_arms, reason = "as the table has them")]
     #[test]
-    fn the_table_is_the_machine() {
+    fn the_state_machine_equals_its_table() {
         for state in ALL {
             for seen in observations() {
                 let next = state.next(seen);
                 let expected = match state {
-                    _ if !seen.there => State::Silent,
+                    _ if !seen.is_received => State::Silent,
                     State::Silent => State::Grounded,
                     _ if !seen.flying => State::Grounded,
                     State::Grounded => State::Standby,
@@ -270,11 +270,11 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_flown_that_is_not_granted_in_the_air_and_known() {
+    fn a_drone_is_engaged_only_if_granted_in_the_air_and_located() {
         for state in ALL {
             for seen in observations() {
                 if state.next(seen).is_flown() {
-                    assert!(seen.there && seen.flying && seen.granted && seen.located);
+                    assert!(seen.is_received && seen.flying && seen.granted && seen.located);
                     assert!(
                         !matches!(state, State::Silent | State::Grounded),
                         "without a step between"

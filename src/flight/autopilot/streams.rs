@@ -16,7 +16,7 @@ const ANSWER: Duration = Duration::from_millis(400);
 
 /// Number of [`WINDOW`]s without a message after which requests for it end. A message without which the drone cannot
 /// fly is requested every 16 windows instead: the next constant.
-const IN_VAIN: u8 = 4;
+const MAX_SILENT_WINDOWS: u8 = 4;
 const SELDOM: u8 = 16;
 
 /// Number of unanswered requests after which the autopilot seems not to receive the link's frames.
@@ -26,7 +26,7 @@ const UNANSWERED: u8 = 2;
 const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 
 /// Message that the link requests from the autopilot, and its interval.
-struct Asked {
+struct RequestedMessage {
     id: u32,
     interval: Duration,
     /// False for a message that the link can do without. These are the fence, and the target, which only an ArduCopter reports and
@@ -34,23 +34,23 @@ struct Asked {
     is_vital: bool,
 }
 
-const ASKED: [Asked; 4] = [
-    Asked {
+const REQUESTED: [RequestedMessage; 4] = [
+    RequestedMessage {
         id: id::GLOBAL_POSITION_INT,
         interval: Duration::from_millis(200),
         is_vital: true,
     },
-    Asked {
+    RequestedMessage {
         id: id::EXTENDED_SYS_STATE,
         interval: Duration::from_millis(500),
         is_vital: true,
     },
-    Asked {
+    RequestedMessage {
         id: id::POSITION_TARGET_GLOBAL_INT,
         interval: Duration::from_millis(500),
         is_vital: false,
     },
-    Asked {
+    RequestedMessage {
         id: id::FENCE_STATUS,
         interval: Duration::from_millis(1_000),
         is_vital: false,
@@ -60,20 +60,20 @@ const ASKED: [Asked; 4] = [
 /// State of the request for one message of the autopilot.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
-    asks: bool,
-    came: u32,
+    is_requested: bool,
+    messages: u32,
     /// Number of consecutive windows in which the requested message was not received.
-    in_vain: u8,
+    silent_windows: u8,
     is_denied: bool,
 }
 
 /// Requests for all messages that the link needs, and the autopilot's answers.
 #[derive(Clone, Debug)]
 pub(super) struct Streams {
-    all: [Stream; ASKED.len()],
+    all: [Stream; REQUESTED.len()],
     since: Instant,
     /// Index of the message of the outstanding request, and the request's time.
-    under_way: Option<(usize, Instant)>,
+    outstanding: Option<(usize, Instant)>,
     unanswered: u8,
     is_answered: bool,
 }
@@ -81,25 +81,25 @@ pub(super) struct Streams {
 impl Streams {
     pub(super) const fn new(now: Instant) -> Self {
         let stream = Stream {
-            asks: true,
-            came: 0,
-            in_vain: 0,
+            is_requested: true,
+            messages: 0,
+            silent_windows: 0,
             is_denied: false,
         };
         Self {
-            all: [stream; ASKED.len()],
+            all: [stream; REQUESTED.len()],
             since: now,
-            under_way: None,
+            outstanding: None,
             unanswered: 0,
             is_answered: false,
         }
     }
 
     /// Counts a received message with the number `id`.
-    pub(super) fn hear(&mut self, id: u32) {
-        for (stream, asked) in self.all.iter_mut().zip(ASKED) {
+    pub(super) fn count_message(&mut self, id: u32) {
+        for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             if asked.id == id {
-                stream.came = stream.came.saturating_add(1);
+                stream.messages = stream.messages.saturating_add(1);
             }
         }
     }
@@ -107,7 +107,7 @@ impl Streams {
     /// Processes the autopilot's answer to the outstanding request; `result` is its `MAV_RESULT`.
     pub(super) fn answer(&mut self, result: u8) {
         self.is_answered = true;
-        if let Some((which, _)) = self.under_way.take()
+        if let Some((which, _)) = self.outstanding.take()
             && DENIED.contains(&result)
             && let Some(stream) = self.all.get_mut(which)
         {
@@ -116,7 +116,7 @@ impl Streams {
     }
 
     /// Returns true if the autopilot answers requests, false if it does not; `None` while that is unknown.
-    pub(super) const fn hears(&self) -> Option<bool> {
+    pub(super) const fn answers_requests(&self) -> Option<bool> {
         if self.is_answered {
             Some(true)
         } else if self.unanswered >= UNANSWERED {
@@ -132,56 +132,56 @@ impl Streams {
         if passed < WINDOW {
             return;
         }
-        for (stream, asked) in self.all.iter_mut().zip(ASKED) {
+        for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             // Twice as many and one more would have been due. A division would need a proof that no interval is 0.
-            let more = 2 * u64::from(stream.came) + 1;
+            let more = 2 * u64::from(stream.messages) + 1;
             let is_seldom = more * asked.interval.as_micros() <= passed.as_micros();
-            stream.in_vain = if stream.came > 0 {
+            stream.silent_windows = if stream.messages > 0 {
                 0
             } else {
-                stream.in_vain.saturating_add(1)
+                stream.silent_windows.saturating_add(1)
             };
-            stream.asks = is_seldom
+            stream.is_requested = is_seldom
                 && !stream.is_denied
-                && (stream.in_vain < IN_VAIN
-                    || asked.is_vital && stream.in_vain.is_multiple_of(SELDOM));
-            stream.came = 0;
+                && (stream.silent_windows < MAX_SILENT_WINDOWS
+                    || asked.is_vital && stream.silent_windows.is_multiple_of(SELDOM));
+            stream.messages = 0;
         }
         self.since = now;
     }
 
     /// Requests the message with the autopilot's target again. An ArduCopter sends it only in the companion's mode.
     pub(super) fn renew(&mut self) {
-        for (stream, asked) in self.all.iter_mut().zip(ASKED) {
+        for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;
-            if is_target && !stream.is_denied && stream.in_vain > 0 {
-                stream.in_vain = 0;
-                stream.asks = true;
+            if is_target && !stream.is_denied && stream.silent_windows > 0 {
+                stream.silent_windows = 0;
+                stream.is_requested = true;
             }
         }
     }
 
     pub(super) fn next_timeout(&self, now: Instant) -> Instant {
         let window = self.since + WINDOW;
-        let next = self.under_way.map(|(_, at)| at + ANSWER);
+        let next = self.outstanding.map(|(_, at)| at + ANSWER);
         next.filter(|at| *at > now)
             .map_or(window, |at| at.min(window))
     }
 
     /// Returns the next message to request, and its interval in µs; `None` if no request is due.
     pub(super) fn take(&mut self, now: Instant, kind: Kind) -> Option<(u32, u32)> {
-        if let Some((_, at)) = self.under_way {
+        if let Some((_, at)) = self.outstanding {
             if now.since(at) < ANSWER {
                 return None;
             }
-            self.under_way = None;
+            self.outstanding = None;
             self.unanswered = self.unanswered.saturating_add(1);
         }
-        let streams = self.all.iter_mut().zip(ASKED).enumerate();
+        let streams = self.all.iter_mut().zip(REQUESTED).enumerate();
         for (which, (stream, asked)) in streams {
-            let asks = core::mem::take(&mut stream.asks);
+            let asks = core::mem::take(&mut stream.is_requested);
             if asks && (asked.is_vital || kind == Kind::ArduCopter) {
-                self.under_way = Some((which, now));
+                self.outstanding = Some((which, now));
                 let interval_us = u32::try_from(asked.interval.as_micros());
                 return Some((asked.id, interval_us.unwrap_or(u32::MAX)));
             }

@@ -61,7 +61,7 @@ pub(super) enum VehicleUpdate {
     /// Message that shows a restart of the autopilot.
     Restarted,
     /// New information that may change the control state.
-    News,
+    StateChanged,
     /// New position of the drone, in the mission's coordinates.
     Position(Position),
     /// New position of the drone that is too far from the line for the mission's coordinates.
@@ -69,7 +69,7 @@ pub(super) enum VehicleUpdate {
     /// Target that the autopilot reports: latitude and longitude, 1e-7 degrees.
     Target(i32, i32),
     /// Answer to a request for a message, with its `MAV_RESULT`.
-    Answer(u8),
+    RequestResult(u8),
 }
 
 /// State of the autopilot and the drone, as known from received messages.
@@ -104,7 +104,7 @@ pub(super) struct Vehicle {
 impl Vehicle {
     /// Processes a received message. The first sender that identifies itself as an autopilot is kept for good, since
     /// other vehicles may be received through it.
-    pub(super) fn hear(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
+    pub(super) fn read(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
             return VehicleUpdate::Nothing;
@@ -159,7 +159,7 @@ impl Vehicle {
                 self.review_choice(now);
                 // The landed state has to be reported again after each take-off.
                 self.in_air &= self.armed;
-                VehicleUpdate::News
+                VehicleUpdate::StateChanged
             }
             Incoming::ExtendedSysState { landed_state } => {
                 self.in_air = match landed_state {
@@ -167,7 +167,7 @@ impl Vehicle {
                     LANDING => self.in_air,
                     _ => false,
                 };
-                VehicleUpdate::News
+                VehicleUpdate::StateChanged
             }
             Incoming::GlobalPosition {
                 boot_ms,
@@ -176,7 +176,7 @@ impl Vehicle {
                 amsl_mm,
                 velocity_cm_s,
             } => {
-                let Some(at) = self.clock.hear(now, boot_ms) else {
+                let Some(at) = self.clock.creation_time(now, boot_ms) else {
                     self.restart();
                     return VehicleUpdate::Restarted;
                 };
@@ -215,20 +215,20 @@ impl Vehicle {
             }
             Incoming::FenceStatus { is_breached } => {
                 self.is_breached = is_breached;
-                VehicleUpdate::News
+                VehicleUpdate::StateChanged
             }
             // A question of the autopilot contains no time of this link.
             Incoming::TimeSync {
                 answered: 1..,
                 asked,
             } => {
-                self.echo.hear(now, asked);
-                VehicleUpdate::News
+                self.echo.handle_reply(now, asked);
+                VehicleUpdate::StateChanged
             }
             Incoming::CommandAck {
                 command: SET_MESSAGE_INTERVAL,
                 result,
-            } => VehicleUpdate::Answer(result),
+            } => VehicleUpdate::RequestResult(result),
             _ => VehicleUpdate::Nothing,
         }
     }
@@ -323,7 +323,7 @@ impl Vehicle {
     /// Returns the observations that determine the control state at `now`.
     pub(super) fn observed(&self, now: Instant) -> Observed {
         Observed {
-            there: self.heard_at.is_some_and(|at| now.since(at) < SILENT),
+            is_received: self.heard_at.is_some_and(|at| now.since(at) < SILENT),
             flying: self.armed && self.in_air,
             granted: self.granted && self.chosen,
             located: self.position(now).is_some(),
@@ -360,7 +360,7 @@ impl RadioNoise {
     pub(super) const NONE: Self = Self(None);
 
     /// Records the noise of a RADIO_STATUS message if the drone is in the air at a known position.
-    pub(super) fn hear(&mut self, now: Instant, received: &Received, vehicle: &Vehicle) {
+    pub(super) fn record(&mut self, now: Instant, received: &Received, vehicle: &Vehicle) {
         if SENSING && let Some(Incoming::RadioStatus { noise, .. }) = received.message {
             let heard = vehicle.place_in_air(now).zip(noise_w(noise));
             self.0 = heard.or(self.0);
@@ -379,7 +379,7 @@ const PERIOD: Duration = Duration::from_millis(500);
 /// Maximum age of the newest answered TIMESYNC question; beyond it the link counts as late.
 const LATE: Duration = Duration::from_millis(1_500);
 
-const GIVES_UP: Duration = Duration::from_millis(10_000);
+const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
 
 /// Maximum age of a TIMESYNC question whose answer counts.
 const OLDEST: Duration = Duration::from_millis(60_000);
@@ -397,7 +397,7 @@ const TAG: u32 = 0xA_52A5;
 ///
 /// A question has a tag, drawn at each start of the companion. An answer buffered since before a restart therefore does not count.
 ///
-/// An autopilot that has not answered within [`GIVES_UP`] of the first question does not support echoes. Then only the time stamps
+/// An autopilot that has not answered within [`SUPPORT_TIMEOUT`] of the first question does not support echoes. Then only the time stamps
 /// of its positions show their ages. Until then a link that has just started counts as late. An autopilot that has answered once
 /// counts as late whenever it does not answer.
 #[derive(Clone, Copy, Debug)]
@@ -408,7 +408,7 @@ pub(super) struct Echo {
     /// Time of the first TIMESYNC question.
     begun_at: Option<Instant>,
     /// Time of the newest TIMESYNC question that was answered.
-    asked_at: Option<Instant>,
+    answered_at: Option<Instant>,
 }
 
 impl Default for Echo {
@@ -417,7 +417,7 @@ impl Default for Echo {
             tag: TAG,
             due: None,
             begun_at: None,
-            asked_at: None,
+            answered_at: None,
         }
     }
 }
@@ -447,32 +447,32 @@ impl Echo {
     }
 
     /// Processes an answer to a TIMESYNC question, which contains the `question`.
-    pub(super) fn hear(&mut self, now: Instant, question: u64) {
+    pub(super) fn handle_reply(&mut self, now: Instant, question: u64) {
         let asked_at = Instant::from_micros(question >> SHIFT);
         let is_own = question & ((1 << SHIFT) - 1) == u64::from(self.tag) && asked_at <= now;
         if is_own && now.since(asked_at) < OLDEST {
-            self.asked_at = self.asked_at.max(Some(asked_at));
+            self.answered_at = self.answered_at.max(Some(asked_at));
         }
     }
 
     /// Returns the earliest time at which a message received now was sent, if that is known.
     pub(super) const fn floor(&self) -> Option<Instant> {
-        self.asked_at
+        self.answered_at
     }
 
     /// Returns true while the autopilot's messages may be older than `LATE`.
     pub(super) fn is_late(&self, now: Instant) -> bool {
-        match (self.asked_at, self.begun_at) {
+        match (self.answered_at, self.begun_at) {
             (Some(at), _) => now.since(at) >= LATE,
-            (None, Some(at)) => now.since(at) < GIVES_UP,
+            (None, Some(at)) => now.since(at) < SUPPORT_TIMEOUT,
             (None, None) => true,
         }
     }
 
     /// Returns the time at which the next question is due or the link becomes late.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
-        let late = self.asked_at.map(|at| at + LATE).filter(|at| *at > now);
-        let all = [self.due, late, self.begun_at.map(|at| at + GIVES_UP)];
+        let late = self.answered_at.map(|at| at + LATE).filter(|at| *at > now);
+        let all = [self.due, late, self.begun_at.map(|at| at + SUPPORT_TIMEOUT)];
         all.into_iter().flatten().filter(|at| *at > now).min()
     }
 }
@@ -500,11 +500,11 @@ const DRIFT: u32 = 10;
 /// counts as late for that long.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RemoteClock {
-    known: Option<Known>,
+    known: Option<Anchor>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Known {
+struct Anchor {
     /// Minimum difference between the clocks, µs: in the previous half of the window, and the present one.
     least: [i64; 2],
     since: Instant,
@@ -516,20 +516,20 @@ struct Known {
 impl RemoteClock {
     /// Returns the time at which a message was created, on the relay's clock. The message arrived at `now` and was created
     /// `boot_ms` after the autopilot's start. Returns `None` if the autopilot has restarted.
-    pub(super) fn hear(&mut self, now: Instant, boot_ms: u32) -> Option<Instant> {
-        let said = i64::from(boot_ms) * 1_000;
-        let difference = now.as_micros().cast_signed().saturating_sub(said);
-        let known = self.known.get_or_insert(Known {
+    pub(super) fn creation_time(&mut self, now: Instant, boot_ms: u32) -> Option<Instant> {
+        let boot_us = i64::from(boot_ms) * 1_000;
+        let difference = now.as_micros().cast_signed().saturating_sub(boot_us);
+        let known = self.known.get_or_insert(Anchor {
             least: [difference; 2],
             since: now,
             messages: 0,
-            last: (now, said),
+            last: (now, boot_us),
         });
-        let (before, said_before) = core::mem::replace(&mut known.last, (now, said));
-        let back = said_before.saturating_sub(said);
+        let (before, boot_us_before) = core::mem::replace(&mut known.last, (now, boot_us));
+        let back = boot_us_before.saturating_sub(boot_us);
         if back > RESTARTED_US {
             self.known = None;
-            self.hear(now, boot_ms);
+            self.creation_time(now, boot_ms);
             return None;
         }
         // Messages arrive in order: a clock that goes back has lost time, and the link is not slower for that.
@@ -603,16 +603,16 @@ impl OffLine {
 /// | off the line, on the ground | reported once |
 /// | off the line, in the air | reported at most once in 10 s |
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Astray {
+pub(super) struct OffLineDetector {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
     /// True once a position far from the line was reported while the drone was on the ground.
     reported_on_ground: bool,
 }
 
-impl Astray {
+impl OffLineDetector {
     /// Records a position far from the line; returns true if it has to be reported.
-    pub(super) fn hear(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
+    pub(super) fn record(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;
         let is_due = self.reported_at.is_none_or(|at| now.since(at) >= AGAIN);
@@ -645,7 +645,7 @@ mod tests {
     use crate::time::{Duration, Instant};
 
     #[test]
-    fn an_answer_to_a_question_of_another_start_is_none() {
+    fn a_reply_to_a_request_of_another_start_is_ignored() {
         let at = |ms| Instant::from_millis(ms);
         let mut before = Echo::default();
         before.seed(1);
@@ -654,9 +654,9 @@ mod tests {
         after.seed(2);
         after.restart();
         let own = after.take(at(5_100)).expect("the first question");
-        after.hear(at(5_200), asked);
+        after.handle_reply(at(5_200), asked);
         assert_eq!(after.floor(), None);
-        after.hear(at(5_200), own);
+        after.handle_reply(at(5_200), own);
         assert_eq!(after.floor(), Some(at(5_100)));
         assert!(
             !after.is_late(at(5_200)) && after.is_late(at(5_100) + Duration::from_millis(1_500))
@@ -675,13 +675,13 @@ mod clock_tests {
 
     /// Returns the apparent age of each message of a flight, ms. `said` returns the autopilot's clock at a time,
     /// `delay` the link's delay.
-    fn ages(said: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
+    fn ages(clock_ms: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();
         for made in (0..80_000).step_by(200) {
             let came = at(made + delay(made));
-            let boot_ms = u32::try_from(said(made)).expect("short");
-            let true_at = clock.hear(came, boot_ms).expect("no restart");
+            let boot_ms = u32::try_from(clock_ms(made)).expect("short");
+            let true_at = clock.creation_time(came, boot_ms).expect("no restart");
             all.push(came.since(true_at).as_micros() / 1_000)
                 .expect("room");
         }
@@ -689,15 +689,15 @@ mod clock_tests {
     }
 
     #[test]
-    fn what_comes_late_was_true_earlier() {
+    fn a_late_message_has_an_earlier_creation_time() {
         let mut clock = RemoteClock::default();
-        assert_eq!(clock.hear(at(10_000), 500), Some(at(10_000)));
-        assert_eq!(clock.hear(at(10_200), 700), Some(at(10_200)));
-        let late = clock.hear(at(10_480), 900).expect("no restart");
+        assert_eq!(clock.creation_time(at(10_000), 500), Some(at(10_000)));
+        assert_eq!(clock.creation_time(at(10_200), 700), Some(at(10_200)));
+        let late = clock.creation_time(at(10_480), 900).expect("no restart");
         assert_eq!(at(10_480).since(late).as_micros() / 1_000, 79, "80 ms late");
         // A faster message shows that all earlier ones were late.
-        assert_eq!(clock.hear(at(10_550), 1_100), Some(at(10_550)));
-        let late = clock.hear(at(10_800), 1_300).expect("no restart");
+        assert_eq!(clock.creation_time(at(10_550), 1_100), Some(at(10_550)));
+        let late = clock.creation_time(at(10_800), 1_300).expect("no restart");
         assert_eq!(at(10_800).since(late).as_micros() / 1_000, 49, "50 ms late");
     }
 
@@ -707,7 +707,7 @@ mod clock_tests {
         // The relay's is faster by 500 in a million: it gains half a second.
         for i in 0..5_000_u32 {
             let now = Instant::from_micros(u64::from(i) * 200_100);
-            let true_at = clock.hear(now, i * 200).expect("the same start");
+            let true_at = clock.creation_time(now, i * 200).expect("the same start");
             assert!(now.since(true_at).as_micros() <= 100, "{i}");
         }
     }
@@ -721,7 +721,7 @@ mod clock_tests {
     }
 
     #[test]
-    fn a_clock_that_stops_for_a_moment_is_followed_within_eight_seconds() {
+    fn a_clock_that_stops_briefly_is_followed_within_8_s() {
         let ages = ages(
             |ms| if ms < 20_000 { ms } else { ms - 1_500 },
             |ms| if (20_000..20_001).contains(&ms) { 5 } else { 6 },
@@ -753,11 +753,11 @@ mod clock_tests {
     }
 
     #[test]
-    fn a_clock_that_begins_anew_is_noticed_once() {
+    fn a_restart_of_the_clock_is_reported_once() {
         let mut clock = RemoteClock::default();
-        assert!(clock.hear(at(100_000), 90_000).is_some());
-        assert_eq!(clock.hear(at(101_000), 50), None);
-        assert_eq!(clock.hear(at(101_200), 250), Some(at(101_200)));
+        assert!(clock.creation_time(at(100_000), 90_000).is_some());
+        assert_eq!(clock.creation_time(at(101_000), 50), None);
+        assert_eq!(clock.creation_time(at(101_200), 250), Some(at(101_200)));
     }
 
     #[test]

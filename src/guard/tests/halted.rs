@@ -21,7 +21,7 @@ impl One {
 
 /// Returns a message of a neighbour that knows this relay's association.
 fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
-    let echo = one.says(side).association;
+    let echo = one.sent(side).association;
     Fence {
         echo,
         number,
@@ -30,7 +30,7 @@ fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
 }
 
 #[test]
-fn the_first_setpoint_is_the_place_in_space_until_the_order_is_known() {
+fn the_first_setpoint_holds_until_the_order_is_known() {
     let mut one = One {
         guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
         now: Instant::ZERO,
@@ -45,18 +45,18 @@ fn the_first_setpoint_is_the_place_in_space_until_the_order_is_known() {
     }
     // The neighbour is reported 3 m beyond: the two move apart along x before either moves across the line.
     let told = answer(&mut one, Side::Downstream, 103.0, 0);
-    one.hears(Side::Downstream, 2, told);
+    one.receive(Side::Downstream, 2, told);
     let first = one.guard.setpoint().unwrap();
     assert_eq!(first.cross_section(), high.cross_section());
     assert!(first.x_m <= 100.0);
-    let fence = one.says(Side::Downstream);
+    let fence = one.sent(Side::Downstream);
     let told = answer(&mut one, Side::Downstream, fence.x_m + 1.0, fence.number);
-    one.hears(Side::Downstream, 2, told);
+    one.receive(Side::Downstream, 2, told);
     assert_eq!(one.guard.setpoint(), Some(at(60.0)));
 }
 
 #[test]
-fn a_start_outside_the_box_goes_no_farther_out() {
+fn a_start_outside_the_geofence_goes_no_farther_out() {
     let mut one = One {
         guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
         now: Instant::ZERO,
@@ -66,14 +66,14 @@ fn a_start_outside_the_box_goes_no_farther_out() {
     one.is_at_place(at(-30.0));
     assert_eq!(one.guard.setpoint(), Some(at(-30.0)));
     let told = answer(&mut one, Side::Downstream, 500.0, 0);
-    one.hears(Side::Downstream, 2, told);
+    one.receive(Side::Downstream, 2, told);
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
 /// Two relays closer along x than the errors of their reports are in order only if they may pass. They may pass each
 /// other if lateral offset and altitude keep them the separation apart.
 #[test]
-fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
+fn relays_within_the_error_are_in_order_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
         for (x_m, is_near) in [(97.0, false), (98.5, true), (101.0, true)] {
             let is_ordered = may_pass && is_near;
@@ -96,7 +96,7 @@ fn two_relays_nearer_than_the_error_are_in_order_only_if_they_may_pass() {
                 across: crate::place::CrossSection::on_line(50.0 + up_m),
                 ..told
             };
-            one.hears(Side::Downstream, 2, told);
+            one.receive(Side::Downstream, 2, told);
             let reason = one.guard.hold_reason(Side::Downstream);
             assert_eq!(
                 reason != Some(HoldReason::Order),
@@ -125,8 +125,8 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
         one.guard.commit(at(160.0));
         one.is_at(100.0);
         one.is_at(100.0);
-        one.hears(Side::Upstream, 1, fence(9, up_m, 50.0));
-        one.hears(Side::Downstream, 3, fence(9, down_m, 200.0));
+        one.receive(Side::Upstream, 1, fence(9, up_m, 50.0));
+        one.receive(Side::Downstream, 3, fence(9, down_m, 200.0));
         let told = core::iter::from_fn(|| one.guard.poll());
         let halted = told
             .filter(|(.., fence)| fence.has_flag(Fence::HALTS))
@@ -141,7 +141,7 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     for forgotten in [false, true] {
         let mut one = One::new([None, Some(2)], 100.0, 300.0);
         let told = answer(&mut one, Side::Downstream, 500.0, 0);
-        one.hears(Side::Downstream, 2, told);
+        one.receive(Side::Downstream, 2, told);
         assert!(one.setpoint() > 200.0);
         one.is_at(150.0);
         let goal_m = one.setpoint();
@@ -149,7 +149,7 @@ fn a_relay_that_halts_on_its_way_stops_there() {
             flags: Fence::HALTS,
             ..told
         };
-        one.hears(Side::Downstream, 2, halts);
+        one.receive(Side::Downstream, 2, halts);
         assert_eq!(one.setpoint().to_bits(), 150.0_f32.to_bits());
         assert_eq!(
             one.guard.hold_reason(Side::Downstream),
@@ -168,7 +168,7 @@ fn a_relay_that_halts_on_its_way_stops_there() {
             }
             one.guard.remind();
         } else {
-            one.hears(Side::Downstream, 2, told);
+            one.receive(Side::Downstream, 2, told);
         }
         assert_eq!(one.setpoint().to_bits(), goal_m.to_bits());
     }
@@ -177,7 +177,7 @@ fn a_relay_that_halts_on_its_way_stops_there() {
 /// A relay that halts on its way into the geofence stops outside, where it is. The nearest position inside may be a
 /// neighbour's.
 #[test]
-fn a_relay_that_halts_outside_the_box_stops_there() {
+fn a_relay_that_halts_outside_the_geofence_stops_there() {
     let mut one = One {
         guard: Guard::new(config(), [None, Some(2)], 7, Instant::ZERO),
         now: Instant::ZERO,
@@ -187,10 +187,10 @@ fn a_relay_that_halts_outside_the_box_stops_there() {
     one.is_at_place(high);
     one.is_at_place(high);
     let told = answer(&mut one, Side::Downstream, 150.0, 0);
-    one.hears(Side::Downstream, 2, told);
-    let fence = one.says(Side::Downstream);
+    one.receive(Side::Downstream, 2, told);
+    let fence = one.sent(Side::Downstream);
     let told = answer(&mut one, Side::Downstream, fence.x_m + 1.0, fence.number);
-    one.hears(Side::Downstream, 2, told);
+    one.receive(Side::Downstream, 2, told);
     assert_eq!(
         one.guard.setpoint(),
         Some(at(100.0)),
@@ -202,19 +202,19 @@ fn a_relay_that_halts_outside_the_box_stops_there() {
     };
     let midway = aside(100.0, 0.0, 150.0);
     one.guard.position(one.now, midway);
-    one.hears(Side::Downstream, 2, halts);
+    one.receive(Side::Downstream, 2, halts);
     assert_eq!(one.guard.setpoint(), Some(midway));
     // No report makes it go farther out than where it came from.
-    one.hears(Side::Downstream, 2, told);
+    one.receive(Side::Downstream, 2, told);
     one.guard.position(one.now, aside(100.0, 0.0, 190.0));
-    one.hears(Side::Downstream, 2, halts);
+    one.receive(Side::Downstream, 2, halts);
     assert_eq!(one.guard.setpoint(), Some(high));
 }
 
 /// A halt request outlasts a reboot of the neighbour that sent it. The rebooted neighbour does not know its earlier
 /// request, so its first messages do not withdraw it.
 #[test]
-fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
+fn a_halt_outlasts_a_reboot_of_its_requester() {
     for side in [Side::Upstream, Side::Downstream] {
         let (neighbours, node, x_m) = match side {
             Side::Upstream => ([Some(1), None], 1, 50.0),
@@ -225,7 +225,7 @@ fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
             flags: Fence::HALTS,
             ..fence(9, x_m, x_m)
         };
-        one.hears(side, node, halts);
+        one.receive(side, node, halts);
         assert_eq!(one.guard.hold_reason(side.other()), None);
         let is_halted = |one: &One| match side {
             Side::Upstream => one.guard.follower.association.has_halt_request(),
@@ -237,21 +237,21 @@ fn a_halt_outlasts_the_reboot_of_the_neighbour_that_requested_it() {
                 flags,
                 ..fence(77, x_m, x_m)
             };
-            one.hears(side, node, first);
+            one.receive(side, node, first);
             assert!(is_halted(&one), "{side:?} {flags}");
         }
         let placed = Fence {
             number: 1,
             ..fence(77, x_m, x_m)
         };
-        one.hears(side, node, placed);
+        one.receive(side, node, placed);
         assert!(!is_halted(&one), "{side:?}");
     }
 }
 
 /// A relay that is flown again on the wrong side of a known neighbour requests a halt at once.
 #[test]
-fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
+fn a_relay_flown_again_out_of_order_requests_a_halt() {
     for side in [Side::Upstream, Side::Downstream] {
         let (neighbours, node, x_m) = match side {
             Side::Upstream => ([Some(1), None], 1, 150.0),
@@ -264,7 +264,7 @@ fn a_relay_that_is_given_back_out_of_order_requests_a_halt_at_once() {
         one.guard.commit(at(100.0));
         one.guard.control(one.now, false);
         one.is_at(100.0);
-        one.hears(side, node, fence(9, x_m, x_m));
+        one.receive(side, node, fence(9, x_m, x_m));
         while one.guard.poll().is_some() {}
         one.guard.control(one.now, true);
         one.is_at(100.0);
@@ -286,7 +286,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
         flags: Fence::HALTS,
         ..fence(9, 150.0, 150.0)
     };
-    one.hears(Side::Downstream, 3, halts);
+    one.receive(Side::Downstream, 3, halts);
     let (side, node, told) = one.guard.poll().unwrap();
     assert_eq!((side, node), (Side::Upstream, 1));
     let flags = Fence::LEFT | Fence::UNPLACED | Fence::HALTS;
@@ -296,15 +296,15 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     // Its neighbour upstream, which is flown, halts because of that, and leaves no association for it.
     let mut before = One::new([None, Some(2)], 50.0, 60.0);
     let known = answer(&mut before, Side::Downstream, 100.0, 0);
-    before.hears(Side::Downstream, 2, known);
+    before.receive(Side::Downstream, 2, known);
     before.is_at(55.0);
-    before.hears(Side::Downstream, 2, told);
+    before.receive(Side::Downstream, 2, told);
     assert_eq!(before.setpoint().to_bits(), 55.0_f32.to_bits());
 }
 
 /// A relay in manual control reports if it is on the wrong side of a flown neighbour.
 #[test]
-fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
+fn an_unflown_relay_reports_that_it_is_out_of_order() {
     let mut one = One {
         guard: Guard::new(config(), [Some(1), Some(3)], 7, Instant::ZERO),
         now: Instant::ZERO,
@@ -318,18 +318,18 @@ fn a_relay_that_is_not_flown_says_that_it_is_out_of_order() {
         number: 0,
         ..fence(9, 120.0, 0.0)
     };
-    one.hears(Side::Upstream, 1, placed);
+    one.receive(Side::Upstream, 1, placed);
     assert_eq!(reasons(&one), [Some(HoldReason::Order), None]);
     one.guard.position(one.now, at(130.0));
     assert_eq!(reasons(&one), [None; 2]);
-    one.hears(Side::Downstream, 3, fence(9, 110.0, 0.0));
+    one.receive(Side::Downstream, 3, fence(9, 110.0, 0.0));
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
 /// A relay that started beside a silent one first moves away along x, then changes its altitude. It keeps the
 /// separation along x until an operator clears the silent one, and reports the reason meanwhile.
 #[test]
-fn a_relay_beside_a_silent_one_goes_off_before_it_moves_across() {
+fn a_relay_moves_away_from_a_silent_one_before_across() {
     let mut one = One {
         guard: Guard::new(config(), [Some(1), None], 7, Instant::ZERO),
         now: Instant::ZERO,
@@ -375,7 +375,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
             Side::Upstream => fence(9, x_m, x_m),
             Side::Downstream => answer(&mut one, side, x_m, 0),
         };
-        one.hears(side, node, told);
+        one.receive(side, node, told);
         assert_eq!(one.guard.hold_reason(side), Some(HoldReason::Order));
         one.guard.link(side, None);
         one.guard.link(side.other(), None);
@@ -393,7 +393,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
 
 /// A relay beside one without setpoints does not halt the chain if their positions are in order.
 #[test]
-fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
+fn a_reported_position_in_manual_flight_avoids_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
         let mut unflown = One {
             guard: Guard::new(config(), [Some(1), None], 9, Instant::ZERO),
@@ -405,15 +405,15 @@ fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
             unflown.guard.poll().unwrap().2
         });
         let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
-        one.hears(Side::Upstream, 1, fence(9, 50.0, 50.0));
+        one.receive(Side::Upstream, 1, fence(9, 50.0, 50.0));
         for _ in 0..5 {
             if let Some(told) = told {
-                one.hears(Side::Downstream, 3, told);
+                one.receive(Side::Downstream, 3, told);
             }
             one.is_at(100.0);
             one.guard.remind();
         }
-        let said = one.says(Side::Downstream);
+        let said = one.sent(Side::Downstream);
         assert_eq!(said.flags & Fence::HALTS != 0, halts, "{x_m:?}");
         assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits(), "{x_m:?}");
     }
@@ -422,7 +422,7 @@ fn a_place_that_is_told_by_hand_spares_the_chain_a_halt() {
 /// A fence plane from before a reboot does not show its owner on the wrong side. A message with a fence number
 /// contains the x of the fence plane, which may be far from the position of its owner.
 #[test]
-fn an_old_fence_says_nothing_of_where_its_owner_is() {
+fn an_old_fence_gives_no_position_of_its_owner() {
     for (number, is_wrong) in [(0, true), (7, false)] {
         let mut one = One {
             guard: Guard::new(config(), [Some(1), None], 7, Instant::ZERO),
@@ -430,7 +430,7 @@ fn an_old_fence_says_nothing_of_where_its_owner_is() {
         };
         one.guard.control(one.now, false);
         one.is_at(163.0);
-        one.hears(
+        one.receive(
             Side::Upstream,
             1,
             Fence {
@@ -484,7 +484,7 @@ fn gaps_that_are_negative_by_the_error_add_up() {
                 } else {
                     3
                 };
-                guards[usize::from(to) - 1].hear(side.other(), from, &fence);
+                guards[usize::from(to) - 1].handle_fence(side.other(), from, &fence);
             }
         }
     }
@@ -534,7 +534,7 @@ fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
                     fences[k] = fence.x_m;
                 }
                 let from = u16::try_from(k).unwrap_or(0) + 1;
-                guards[usize::from(to) - 1].hear(side.other(), from, &fence);
+                guards[usize::from(to) - 1].handle_fence(side.other(), from, &fence);
             }
         }
     }

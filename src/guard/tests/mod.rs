@@ -14,7 +14,7 @@ const APART: f32 = 10.0;
 
 fn config() -> GuardConfig {
     GuardConfig {
-        fence: Geofence {
+        geofence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,
             least_y_m: -50.0,
@@ -76,33 +76,33 @@ impl One {
         self.guard.steer(self.now).unwrap().x_m
     }
 
-    fn says(&mut self, side: Side) -> Fence {
+    fn sent(&mut self, side: Side) -> Fence {
         self.guard.steer(self.now);
         self.guard.follower.association.due = true;
         self.guard.owner.association.due = true;
-        let mut said = None;
+        let mut sent = None;
         while let Some((to, _, fence)) = self.guard.poll() {
             if to == side {
-                said = Some(fence);
+                sent = Some(fence);
             }
         }
-        said.unwrap()
+        sent.unwrap()
     }
 
-    fn hears(&mut self, side: Side, from: u16, fence: Fence) {
-        self.guard.hear(side, from, &fence);
+    fn receive(&mut self, side: Side, from: u16, fence: Fence) {
+        self.guard.handle_fence(side, from, &fence);
         self.guard.steer(self.now);
     }
 }
 
 #[test]
-fn it_is_small() {
+fn a_guard_is_at_most_424_bytes() {
     assert!(size_of::<Guard>() <= 424, "{}", size_of::<Guard>());
     assert_eq!(size_of::<Fence>(), 28);
 }
 
 #[test]
-fn there_is_no_setpoint_before_a_place_and_a_report() {
+fn no_setpoint_before_an_agreed_position_and_a_report() {
     let mut guard = Guard::new(config(), [None, None], 7, Instant::from_millis(1000));
     let now = Instant::from_millis(2000);
     assert_eq!(guard.steer(now), None);
@@ -118,7 +118,7 @@ fn there_is_no_setpoint_before_a_place_and_a_report() {
 }
 
 #[test]
-fn nothing_leaves_the_box_and_nonsense_is_counted() {
+fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
     let mut one = One::new([None, None], 100.0, 100.0);
     let far = Placement {
         x_m: 5000.0,
@@ -134,7 +134,8 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
     one.guard.commit(at(f32::NAN));
     one.guard.position(one.now, at(f32::INFINITY));
-    one.guard.hear(Side::Upstream, 1, &fence(1, 2e7, 0.0));
+    one.guard
+        .handle_fence(Side::Upstream, 1, &fence(1, 2e7, 0.0));
     assert_eq!(one.guard.refused(), 3);
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
@@ -143,20 +144,20 @@ fn nothing_leaves_the_box_and_nonsense_is_counted() {
 ///
 /// It does so even if the neighbour on the other side started too close.
 #[test]
-fn a_squeezed_relay_keeps_its_promise() {
+fn a_relay_between_two_fences_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
     for side in [Side::Downstream, Side::Upstream] {
         let handshake = fence(9, 0.0, 0.0);
         let from = if side == Side::Upstream { 1 } else { 3 };
-        one.hears(side, from, handshake);
-        let said = one.says(side);
+        one.receive(side, from, handshake);
+        let said = one.sent(side);
         let answer = Fence {
             echo: said.association,
             number: u16::from(side == Side::Upstream),
             x_m: if side == Side::Upstream { 98.0 } else { 104.0 },
             ..handshake
         };
-        one.hears(side, from, answer);
+        one.receive(side, from, answer);
     }
     assert_eq!(
         one.setpoint().to_bits(),
@@ -171,8 +172,8 @@ fn a_lost_relay_is_kept_clear_of() {
     let mut one = One::new([None, Some(2)], 100.0, 400.0);
     let mut lost = One::new([Some(1), None], 300.0, 300.0);
     for _ in 0..4 {
-        lost.hears(Side::Upstream, 1, one.says(Side::Downstream));
-        one.hears(Side::Downstream, 2, lost.says(Side::Upstream));
+        lost.receive(Side::Upstream, 1, one.sent(Side::Downstream));
+        one.receive(Side::Downstream, 2, lost.sent(Side::Upstream));
     }
     assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
     one.guard.link(Side::Downstream, None);
@@ -195,7 +196,7 @@ fn a_lost_relay_is_kept_clear_of() {
 
 /// A relay keeps clear of relays beyond a removed neighbour until it hears one of them.
 #[test]
-fn a_relay_keeps_clear_of_those_beyond_a_cleared_one_until_it_hears_them() {
+fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
     let mut next = One::new([None, Some(3)], 100.0, 100.0);
     one.guard.link(Side::Upstream, None);
@@ -213,15 +214,15 @@ fn a_relay_keeps_clear_of_those_beyond_a_cleared_one_until_it_hears_them() {
     one.is_at(310.0);
     one.guard.link(Side::Upstream, Some(1));
     for _ in 0..6 {
-        one.hears(Side::Upstream, 1, next.says(Side::Downstream));
-        next.hears(Side::Downstream, 3, one.says(Side::Upstream));
+        one.receive(Side::Upstream, 1, next.sent(Side::Downstream));
+        next.receive(Side::Downstream, 3, one.sent(Side::Upstream));
     }
     one.guard.commit(at(200.0));
     assert_eq!(one.setpoint().to_bits(), 200.0_f32.to_bits());
 }
 
 #[test]
-fn one_that_was_never_heard_may_be_anywhere() {
+fn a_relay_never_received_may_be_anywhere() {
     let mut guard = Guard::new(config(), [Some(1), Some(3)], 7, Instant::ZERO);
     guard.link(Side::Upstream, None);
     guard.link(Side::Downstream, Some(4));
@@ -238,7 +239,7 @@ fn one_that_was_never_heard_may_be_anywhere() {
 }
 
 #[test]
-fn a_relay_that_turns_flies_on_no_farther_than_it_was_told() {
+fn a_relay_that_turns_stays_within_its_earlier_setpoints() {
     let ms = Duration::from_millis;
     let slow = GuardConfig {
         lag: ms(4_000),
@@ -248,7 +249,7 @@ fn a_relay_that_turns_flies_on_no_farther_than_it_was_told() {
     let mut after = |wait, goes: &[f32], is_at| {
         let now = Instant::ZERO + ms(wait);
         for x_m in goes {
-            stretch.go(*x_m, now);
+            stretch.extend_to(*x_m, now);
         }
         stretch.report(now, is_at, &slow);
         (stretch.low_m, stretch.high_m)
@@ -290,13 +291,13 @@ impl Pair {
     }
 
     fn ask(&mut self) {
-        let fence = self.owner.says(Side::Downstream);
-        self.follower.hears(Side::Upstream, 1, fence);
+        let fence = self.owner.sent(Side::Downstream);
+        self.follower.receive(Side::Upstream, 1, fence);
     }
 
     fn answer(&mut self) {
-        let fence = self.follower.says(Side::Upstream);
-        self.owner.hears(Side::Downstream, 2, fence);
+        let fence = self.follower.sent(Side::Upstream);
+        self.owner.receive(Side::Downstream, 2, fence);
     }
 
     /// Exchanges all messages until nothing changes.
@@ -314,7 +315,7 @@ impl Pair {
 
 /// Rule 8: neither of two neighbours moves before it has received a message of the other.
 #[test]
-fn nobody_moves_before_the_other_one_was_heard() {
+fn no_relay_moves_before_its_neighbour_is_received() {
     let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);
     assert_eq!(pair.setpoints(), Both(100.0, 300.0));
     pair.ask();
@@ -333,7 +334,7 @@ fn nobody_moves_before_the_other_one_was_heard() {
 
 /// Rules 3, 4 and 6: the owner requests a fence toward Rx, and advances as the follower clears it.
 #[test]
-fn the_keeper_follows_the_kept_relay() {
+fn the_owner_follows_the_follower() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
     pair.talk();
     assert_eq!(
@@ -348,7 +349,7 @@ fn the_keeper_follows_the_kept_relay() {
     pair.talk();
     assert_eq!(pair.setpoints(), Both(200.0, 300.0));
     pair.owner.is_at(200.0);
-    assert!(pair.owner.guard.is_there() && pair.follower.guard.is_there());
+    assert!(pair.owner.guard.has_arrived() && pair.follower.guard.has_arrived());
     assert!(
         !pair.owner.guard.remind() && !pair.follower.guard.remind(),
         "nothing is left to say"
@@ -357,7 +358,7 @@ fn the_keeper_follows_the_kept_relay() {
 
 /// Rules 1 and 5: toward Tx the owner moves first, the fence follows it, and the follower the fence.
 #[test]
-fn the_kept_relay_follows_the_keeper() {
+fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
     pair.talk();
     assert_eq!(pair.setpoints(), Both(100.0, 210.0));
@@ -374,28 +375,28 @@ fn the_kept_relay_follows_the_keeper() {
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
-    let high = pair.follower.says(Side::Upstream);
+    let high = pair.follower.sent(Side::Upstream);
     // The fence is lowered to (20 + 120 + 10) / 2, but the follower has not received that yet.
     pair.owner.guard.commit(at(20.0));
     pair.follower.guard.commit(at(120.0));
     pair.answer();
     pair.owner.is_at(20.0);
-    let low = pair.owner.says(Side::Downstream);
+    let low = pair.owner.sent(Side::Downstream);
     assert_eq!(low.x_m.to_bits(), 75.0_f32.to_bits());
     pair.owner.guard.commit(at(290.0));
-    pair.owner.hears(Side::Downstream, 2, high);
+    pair.owner.receive(Side::Downstream, 2, high);
     assert_eq!(
         pair.owner.setpoint().to_bits(),
         65.0_f32.to_bits(),
         "the fence under way counts"
     );
-    pair.follower.hears(Side::Upstream, 1, low);
+    pair.follower.receive(Side::Upstream, 1, low);
     assert_eq!(pair.follower.setpoint().to_bits(), 120.0_f32.to_bits());
     pair.talk();
-    let raised = pair.owner.says(Side::Downstream);
+    let raised = pair.owner.sent(Side::Downstream);
     assert!(raised.x_m > low.x_m);
     pair.follower.guard.commit(at(80.0));
-    pair.follower.hears(Side::Upstream, 1, low);
+    pair.follower.receive(Side::Upstream, 1, low);
     assert!(
         pair.follower.setpoint() >= raised.x_m,
         "the old fence is over"
@@ -464,11 +465,11 @@ fn relays_in_the_wrong_order_stay() {
 /// A restarted owner does not know the fence that it announced. The follower keeps that fence until it has exchanged
 /// messages with the restarted owner, and ignores old messages afterwards.
 #[test]
-fn a_new_life_is_told_from_an_old_one() {
+fn a_restart_is_distinguished_from_late_messages() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
     pair.talk();
-    let old = pair.owner.says(Side::Downstream);
-    let told = pair.follower.says(Side::Upstream);
+    let old = pair.owner.sent(Side::Downstream);
+    let told = pair.follower.sent(Side::Upstream);
     pair.owner = One::new([None, Some(2)], 100.0, 280.0);
     // Another seed, as required.
     pair.owner.guard = {
@@ -478,7 +479,7 @@ fn a_new_life_is_told_from_an_old_one() {
     };
     pair.owner.is_at(100.0);
     pair.owner.is_at(100.0);
-    pair.owner.hears(Side::Downstream, 2, told);
+    pair.owner.receive(Side::Downstream, 2, told);
     assert_eq!(
         pair.setpoints(),
         Both(100.0, 300.0),
@@ -488,11 +489,11 @@ fn a_new_life_is_told_from_an_old_one() {
     assert_eq!(pair.setpoints(), Both(280.0, 300.0));
     pair.follower.guard.commit(at(110.0));
     for _ in 0..2 {
-        pair.follower.hears(Side::Upstream, 1, old);
+        pair.follower.receive(Side::Upstream, 1, old);
     }
     assert_eq!(pair.follower.setpoint().to_bits(), 295.0_f32.to_bits());
     // Three in a row look like another restart, but grant nothing either.
-    pair.follower.hears(Side::Upstream, 1, old);
+    pair.follower.receive(Side::Upstream, 1, old);
     assert!(pair.follower.setpoint() >= 295.0);
     pair.talk();
     assert_eq!(
@@ -508,59 +509,59 @@ fn a_new_life_is_told_from_an_old_one() {
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
     let heard = fence(9, 50.0, 50.0);
-    one.hears(Side::Upstream, 1, heard);
+    one.receive(Side::Upstream, 1, heard);
     one.is_at(100.0);
     while let Some((side, ..)) = one.guard.poll() {
         assert_eq!(side, Side::Downstream);
     }
-    let said = one.says(Side::Downstream);
+    let said = one.sent(Side::Downstream);
     let mut beyond = Fence {
         echo: said.association,
         x_m: 90.0,
         ..heard
     };
-    one.hears(Side::Downstream, 3, beyond);
+    one.receive(Side::Downstream, 3, beyond);
     one.is_at(100.0);
-    let upward = one.says(Side::Upstream);
+    let upward = one.sent(Side::Upstream);
     assert_eq!(
         upward.flags & (Fence::HALTS | Fence::UNPLACED | Fence::AGREES),
         Fence::HALTS | Fence::UNPLACED,
         "its neighbour downstream stands before it"
     );
-    assert!(one.says(Side::Downstream).flags & Fence::HALTS != 0);
+    assert!(one.sent(Side::Downstream).flags & Fence::HALTS != 0);
     assert_eq!(
         one.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Order)
     );
     // That message grants nothing to the neighbour upstream.
     let mut owner = One::new([None, Some(2)], 50.0, 60.0);
-    let association = owner.says(Side::Downstream).association;
+    let association = owner.sent(Side::Downstream).association;
     let told = Fence {
         echo: association,
         ..upward
     };
-    owner.hears(Side::Downstream, 2, told);
+    owner.receive(Side::Downstream, 2, told);
     owner.is_at(50.0);
     assert_eq!(owner.setpoint().to_bits(), 50.0_f32.to_bits());
     assert_eq!(
-        owner.says(Side::Downstream).number,
+        owner.sent(Side::Downstream).number,
         0,
         "no fence is announced"
     );
     beyond.x_m = 120.0;
-    one.hears(Side::Downstream, 3, beyond);
+    one.receive(Side::Downstream, 3, beyond);
     // Now its x counts; but it sends no fence downstream before it has received one from upstream.
-    assert_eq!(one.says(Side::Upstream).flags & Fence::UNPLACED, 0);
-    assert_eq!(one.says(Side::Upstream).x_m.to_bits(), 100.0_f32.to_bits());
-    assert_eq!(one.says(Side::Downstream).number, 0);
+    assert_eq!(one.sent(Side::Upstream).flags & Fence::UNPLACED, 0);
+    assert_eq!(one.sent(Side::Upstream).x_m.to_bits(), 100.0_f32.to_bits());
+    assert_eq!(one.sent(Side::Downstream).number, 0);
     assert_eq!(one.setpoint().to_bits(), 100.0_f32.to_bits());
     let upstream = Fence {
-        echo: one.says(Side::Upstream).association,
+        echo: one.sent(Side::Upstream).association,
         number: 1,
         x_m: 60.0,
         ..heard
     };
-    one.hears(Side::Upstream, 1, upstream);
-    assert_ne!(one.says(Side::Downstream).number, 0);
+    one.receive(Side::Upstream, 1, upstream);
+    assert_ne!(one.sent(Side::Downstream).number, 0);
     assert_ne!(one.setpoint().to_bits(), 100.0_f32.to_bits());
 }

@@ -31,7 +31,7 @@ impl Row {
             }),
         };
         row.talk();
-        assert!(row.all.iter().all(|one| one.guard.is_there()));
+        assert!(row.all.iter().all(|one| one.guard.has_arrived()));
         row
     }
 
@@ -49,7 +49,7 @@ impl Row {
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;
-        self.all[usize::from(to) - 1].hears(side.other(), from, fence);
+        self.all[usize::from(to) - 1].receive(side.other(), from, fence);
         Some(fence)
     }
 
@@ -72,7 +72,7 @@ impl Row {
 
 /// Rule 15: the neighbours of a drone in manual control come no nearer to it.
 #[test]
-fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
+fn no_relay_comes_nearer_to_one_in_manual_flight() {
     let mut row = Row::new();
     row.take();
     assert_eq!(row.setpoint(1), None);
@@ -112,7 +112,7 @@ fn nobody_comes_nearer_to_a_relay_that_its_pilot_has() {
 
 /// Rule 15: neighbours do not fly through a drone in manual control that hovers in their way.
 #[test]
-fn nobody_flies_through_a_drone_that_its_pilot_hovers_in_the_way() {
+fn no_relay_flies_through_a_drone_in_manual_flight() {
     for (y_m, expected_m) in [(0.0, 80.0), (6.0, 80.0), (20.0, 20.0)] {
         let mut row = Row::new();
         row.take();
@@ -155,7 +155,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
 ///
 /// Beside means within the separation along x.
 #[test]
-fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
+fn no_relay_moves_across_toward_a_drone_beside_it() {
     for (y_m, moves) in [(-30.0, true), (30.0, false)] {
         let mut row = Row::new();
         row.take();
@@ -176,7 +176,7 @@ fn nobody_moves_across_the_line_toward_a_drone_beside_it() {
 
 /// A neighbour that sent its position without an association, and then became silent, is lost.
 #[test]
-fn one_that_began_and_fell_silent_is_lost() {
+fn a_relay_that_fell_silent_after_its_start_is_lost() {
     let mut row = Row::new();
     let now = row.all[1].now;
     row.all[1].guard = Guard::new(config(), [Some(1), Some(3)], 99, now);
@@ -191,7 +191,7 @@ fn one_that_began_and_fell_silent_is_lost() {
 
 /// Checks that a late message from a drone's manual flight does not make the drone an obstacle again.
 #[test]
-fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
+fn a_late_position_of_a_drone_flown_again_is_no_obstacle() {
     let mut row = Row::new();
     row.take();
     row.talk();
@@ -209,7 +209,7 @@ fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
     row.all[1].is_at(200.0);
     row.all[1].is_at(200.0);
     row.talk();
-    row.all[0].hears(Side::Downstream, 2, late);
+    row.all[0].receive(Side::Downstream, 2, late);
     row.all[0].guard.commit(at(140.0));
     assert_eq!(row.setpoint(0), Some(140.0));
 }
@@ -217,7 +217,7 @@ fn a_late_place_of_a_drone_that_is_flown_again_bars_nothing() {
 /// The companion of the neighbour restarted, and its pilot has not engaged setpoint control again. The limit of the
 /// neighbour's old association still holds, and the hold reason names the unflown neighbour.
 #[test]
-fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
+fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     let mut row = Row::new();
     let neighbours = [Some(1), Some(3)];
     let now = row.all[1].now;
@@ -236,7 +236,7 @@ fn a_relay_that_waits_for_one_that_was_not_engaged_again_says_so() {
 /// A neighbour that follows setpoints but is silent makes no room. This is reported after five reminders, and not
 /// while the relay moves.
 #[test]
-fn a_relay_that_stands_for_long_says_that_it_waits_for_room() {
+fn a_relay_that_stands_for_long_reports_pending() {
     let mut row = Row::new();
     row.all[0].guard.commit(at(180.0));
     let _ = row.setpoint(0);
@@ -261,7 +261,7 @@ fn a_relay_that_stands_for_long_says_that_it_waits_for_room() {
 }
 
 #[test]
-fn given_back_it_begins_as_after_a_start() {
+fn a_relay_flown_again_begins_as_after_a_start() {
     let mut row = Row::new();
     row.take();
     row.talk();
@@ -285,7 +285,7 @@ fn given_back_it_begins_as_after_a_start() {
 /// The leave notice is repeated until the neighbour has started a new association. That holds even if the pilot has
 /// given the drone back.
 #[test]
-fn what_is_lost_is_told_again() {
+fn lost_messages_are_repeated() {
     let mut row = Row::new();
     row.take();
     let mut said = 0;
@@ -305,15 +305,15 @@ fn what_is_lost_is_told_again() {
     let first = row.speak(1).map(|fence| fence.flags);
     assert_eq!(first, Some(Fence::LEFT));
     row.talk();
-    assert!(row.all.iter().all(|one| one.guard.is_there()));
+    assert!(row.all.iter().all(|one| one.guard.has_arrived()));
 }
 
 /// Late messages from before the pilot took over do not make the drone count as flown. After it is flown again, late
 /// leave notices do not make it count as released.
 #[test]
-fn late_messages_say_nothing_of_who_flies() {
+fn late_messages_do_not_change_who_is_flown() {
     let mut row = Row::new();
-    let old = [Side::Upstream, Side::Downstream].map(|side| row.all[1].says(side));
+    let old = [Side::Upstream, Side::Downstream].map(|side| row.all[1].sent(side));
     row.take();
     let mut left = [None; 2];
     while let Some((side, _, fence)) = row.all[1].guard.poll() {
@@ -321,10 +321,10 @@ fn late_messages_say_nothing_of_who_flies() {
     }
     let left = left.map(|fence| fence.expect("both are told"));
     for _ in 0..5 {
-        row.all[0].hears(Side::Downstream, 2, left[0]);
-        row.all[2].hears(Side::Upstream, 2, left[1]);
-        row.all[0].hears(Side::Downstream, 2, old[0]);
-        row.all[2].hears(Side::Upstream, 2, old[1]);
+        row.all[0].receive(Side::Downstream, 2, left[0]);
+        row.all[2].receive(Side::Upstream, 2, left[1]);
+        row.all[0].receive(Side::Downstream, 2, old[0]);
+        row.all[2].receive(Side::Upstream, 2, old[1]);
     }
     row.all[0].guard.commit(at(80.0));
     row.all[2].guard.commit(at(320.0));
@@ -336,8 +336,8 @@ fn late_messages_say_nothing_of_who_flies() {
     row.all[1].is_at(200.0);
     row.talk();
     for _ in 0..5 {
-        row.all[0].hears(Side::Downstream, 2, left[0]);
-        row.all[2].hears(Side::Upstream, 2, left[1]);
+        row.all[0].receive(Side::Downstream, 2, left[0]);
+        row.all[2].receive(Side::Upstream, 2, left[1]);
     }
     row.all[0].guard.commit(at(200.0 - APART));
     row.all[0].guard.steer(row.all[0].now);
@@ -347,7 +347,7 @@ fn late_messages_say_nothing_of_who_flies() {
 
 /// Two neighbouring relays are flown by hand and then by setpoints again. Both associate with each other again.
 #[test]
-fn two_in_a_row_are_taken_and_given_back() {
+fn two_neighbours_are_released_and_flown_again() {
     let mut row = Row::new();
     row.take();
     let now = row.all[2].now;
@@ -369,7 +369,7 @@ fn two_in_a_row_are_taken_and_given_back() {
 }
 
 #[test]
-fn nobody_flies_before_the_pilot_lends_it() {
+fn no_relay_flies_before_it_is_engaged() {
     let mut guard = Guard::new(config(), [None, None], 7, Instant::ZERO);
     assert!(!guard.control(Instant::ZERO, true), "it is flown at first");
     assert!(guard.control(Instant::ZERO, false));

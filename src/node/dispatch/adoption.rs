@@ -16,7 +16,7 @@ impl Node {
         let Some(proposed) = self.layers.view.proposed() else {
             return;
         };
-        let (place, id) = (proposed.place, proposed.mission_id);
+        let (place, id) = (proposed.rank, proposed.mission_id);
         let leads = place == 1;
         let (relays, usable_in) = match decided {
             ProposalOutcome::Granted { relays, usable_in } => (relays, usable_in),

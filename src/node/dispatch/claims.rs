@@ -1,7 +1,7 @@
 //! Claims to this relay's node number, which another node may use too.
 
 use super::Node;
-use crate::event::{About, Event};
+use crate::event::{Event, NodeEvent};
 use crate::node::duplicate::{Duplicated, Sender};
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -23,18 +23,18 @@ impl Node {
                 .should_report(now, Duplicated::Own, &settings)
         {
             let node = self.member.node;
-            self.raise_about(About::Index, Side::Upstream, node);
+            self.raise_node_event(NodeEvent::Index, Side::Upstream, node);
             if let Sender::Rival(rival) = sender
                 && rival.newer_epoch
             {
                 // The other node may be this relay itself, before its epoch went back.
-                self.raise_about(About::Epoch, Side::Upstream, node);
+                self.raise_node_event(NodeEvent::Epoch, Side::Upstream, node);
             }
         }
         let placed = self.setpoint().is_some();
         // The relay keeps its claim to the position during a view change, which a duplicate may have requested.
         let lease = &self.layers.lease;
-        let leased = lease.is_open() || lease.until().is_some_and(|until| until > now);
+        let leased = lease.is_pending() || lease.until().is_some_and(|until| until > now);
         let has_lease = placed && leased;
         if self
             .duplicate

@@ -1,7 +1,7 @@
 //! Pending hellos, and received ones, by which the neighbours are selected.
 
 use super::Node;
-use crate::event::About;
+use crate::event::NodeEvent;
 use crate::node::mission_update::accepts_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::node::neighbour::state::Candidate;
@@ -13,10 +13,10 @@ use crate::wire::upload::UPLOAD;
 
 /// Mission state that a hello reports.
 struct MissionState {
-    holds: MissionId,
-    flies: bool,
-    whole: bool,
-    refused: bool,
+    latest: MissionId,
+    is_active: bool,
+    is_active_in_view: bool,
+    is_refused: bool,
 }
 
 impl Node {
@@ -54,7 +54,7 @@ impl Node {
     }
 
     pub(super) fn hello(&self, now: Instant, side: Side, ask: bool, offer_number: u16) -> Hello {
-        let said = self.mission_state();
+        let state = self.mission_state();
         Hello {
             mission: self.member.digest,
             latest_view: self.layers.view.latest_view(),
@@ -63,16 +63,16 @@ impl Node {
             requests_view: self.layers.view.request.is_pending() && side == self.back(),
             fresh: self.layers.round.is_fresh(),
             ready: false,
-            behind: self.behind(side.other()),
+            behind: self.relays_through(side.other()),
             hears: self
                 .layers
                 .neighbours
                 .at(side)
                 .received_nodes(now, &self.member.settings),
-            latest_mission: said.holds,
-            active: said.flies,
-            active_in_view: said.whole,
-            refused: said.refused,
+            latest_mission: state.latest,
+            active: state.is_active,
+            active_in_view: state.is_active_in_view,
+            refused: state.is_refused,
             offer_number,
         }
     }
@@ -82,19 +82,19 @@ impl Node {
         let (active, latest) = (self.member.active, self.layers.update.latest());
         if let Some(refused) = self.layers.update.refused_mission(active) {
             return MissionState {
-                holds: refused,
-                flies: false,
-                whole: false,
-                refused: true,
+                latest: refused,
+                is_active: false,
+                is_active_in_view: false,
+                is_refused: true,
             };
         }
         let flies = active == latest;
         let whole = UPLOAD && flies && latest.version > 0 && self.layers.lease.is_whole();
         MissionState {
-            holds: latest,
-            flies,
-            whole,
-            refused: false,
+            latest,
+            is_active: flies,
+            is_active_in_view: whole,
+            is_refused: false,
         }
     }
 
@@ -109,7 +109,7 @@ impl Node {
             .neighbours
             .at(side)
             .selected_by(other.abs_diff(own));
-        let there = match side {
+        let fits = match side {
             Side::Upstream => beyond > own,
             Side::Downstream => beyond != 0 && beyond < own,
         };
@@ -118,30 +118,30 @@ impl Node {
         let distance = beyond.abs_diff(own);
         // If two links cross, the one whose end is nearer to Rx is replaced.
         let crosses = side == Side::Downstream && far.has_link_beyond(distance);
-        there && (far.is_two_way(distance, now, settings) || far.joins_with(distance) || crosses)
+        fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
 
     /// Returns the number of relays that a neighbour reaches through this relay. `far` is the opposite side.
-    fn behind(&self, far: Side) -> u16 {
+    fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.
         if self.layers.round.is_fresh() || !self.layers.neighbours.at(far).is_mutual() {
             1
         } else {
-            self.beyond(far).saturating_add(1)
+            self.relays_on(far).saturating_add(1)
         }
     }
 
     /// Returns the number of relays on `side` in this connected part of the chain, as counted last.
-    pub(super) fn beyond(&self, side: Side) -> u16 {
+    pub(super) fn relays_on(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;
         }
         let (place, all) = self
             .layers
             .view
-            .place_and_count()
-            .unwrap_or_else(|| self.member.place_in_all());
+            .rank_and_count()
+            .unwrap_or_else(|| self.member.rank_in_all());
         if side == self.back() {
             place.saturating_sub(1)
         } else {
@@ -178,7 +178,7 @@ impl Node {
             } else {
                 self.compare_missions(side, from, hello.latest_mission);
             }
-            self.layers.neighbours.at_mut(side).holds = Some(hello.latest_mission);
+            self.layers.neighbours.at_mut(side).latest_mission = Some(hello.latest_mission);
             if self.searches() {
                 let two_way = hello.is_heard(from, own);
                 // A few lost frames do not end a link; the neighbour's silence has its own timer.
@@ -216,14 +216,14 @@ impl Node {
             .at_mut(side)
             .record_reception(distance, heard)
         {
-            self.raise_about(About::NotHeard, side, from);
+            self.raise_node_event(NodeEvent::NotHeard, side, from);
         }
     }
 
     /// Considers node `from` as the new neighbour on `side`; one-way links are ignored.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
-        let there = self.beyond(side);
+        let there = self.relays_on(side);
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
         neighbour.record_unselected(now, settings);
@@ -247,14 +247,14 @@ impl Node {
         };
         if neighbour.consider_candidate(candidate, now, settings) {
             let tells = neighbour.should_report_found();
-            neighbour.holds = Some(hello.latest_mission);
+            neighbour.latest_mission = Some(hello.latest_mission);
             layers
                 .update
                 .record_hello_number(side, hello.offer_number, now);
             layers.update.reset_offers(side);
             self.steering.link(side, Some(from));
             if tells {
-                self.raise_about(About::Back, side, from);
+                self.raise_node_event(NodeEvent::Back, side, from);
             }
             self.schedule_hello(side, from, true);
             self.on_mutual(now, side, pairs);

@@ -1,7 +1,7 @@
 //! Received messages: which are accepted, on which side their sender is, and which layer handles each.
 
 use super::Node;
-use crate::event::About;
+use crate::event::NodeEvent;
 use crate::node::context::Effects;
 use crate::node::duplicate::Duplicated;
 use crate::node::mission_update::accepts_uploads;
@@ -102,7 +102,7 @@ impl Node {
             bump(&mut self.telemetry.stats.view);
             self.schedule_hello(side, from, true);
             // The sender has the same mission, so only the view differs.
-            let of_mission = self.layers.neighbours.at(side).holds.is_some();
+            let of_mission = self.layers.neighbours.at(side).latest_mission.is_some();
             if of_mission && message.belongs_to_view() && message.is_onward() {
                 self.layers.view.request.start(now);
             }
@@ -113,7 +113,7 @@ impl Node {
     /// Returns true if `from` measures its positions along the same line: between the same Tx and Rx sites.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.layers.update.line_digest(&self.member);
-        if !same && self.layers.neighbours.at(side).holds.is_some() {
+        if !same && self.layers.neighbours.at(side).latest_mission.is_some() {
             bump(&mut self.telemetry.stats.stale);
         } else if !same {
             self.refuse_mission(now, side, from);
@@ -135,7 +135,7 @@ impl Node {
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.should_report_mismatch(distance, now) {
-            self.raise_about(About::Mission, side, from);
+            self.raise_node_event(NodeEvent::Mission, side, from);
         }
     }
 
@@ -208,7 +208,7 @@ impl Node {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {
             let node = neighbour.node();
-            self.raise_about(About::Back, side, node);
+            self.raise_node_event(NodeEvent::Back, side, node);
         }
     }
 }
@@ -249,7 +249,7 @@ impl Node {
             .at_mut(side)
             .should_report_forged(distance)
         {
-            self.raise_about(About::Key, side, from);
+            self.raise_node_event(NodeEvent::Key, side, from);
         }
     }
 
@@ -261,7 +261,7 @@ impl Node {
 
     /// Reports that node `from` at `side` uses an older epoch than before.
     pub(crate) fn on_epoch_went_back(&mut self, side: Side, from: u16) {
-        self.raise_about(About::Epoch, side, from);
+        self.raise_node_event(NodeEvent::Epoch, side, from);
     }
 }
 
@@ -324,7 +324,7 @@ impl Node {
                 .duplicate
                 .should_report(now, Duplicated::Neighbour, &settings)
         {
-            self.raise_about(About::Index, side, from);
+            self.raise_node_event(NodeEvent::Index, side, from);
         }
     }
 }

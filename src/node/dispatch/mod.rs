@@ -18,7 +18,7 @@
 //! such as 1 - 3 - 5 and 2 - 4, or a part that has not selected the node toward the rest of the chain, would keep their links
 //! forever. A part without a quorum loses nothing by it.
 
-use crate::event::{About, Event, Pending};
+use crate::event::{Event, NodeEvent, Pending};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 use crate::node::context::{Context, Effects, Ignored, LayerEvent, Member, Peer, first_pass};
@@ -138,8 +138,8 @@ impl Node {
     }
 
     #[inline(never)] // called from many places
-    pub(super) fn raise_about(&mut self, about: About, side: Side, node: u16) {
-        self.telemetry.events.raise_about(about, side, node);
+    pub(super) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
+        self.telemetry.events.raise_node_event(kind, side, node);
     }
 
     /// Applies the effects of one protocol layer to the other layers, the events and the counters.
@@ -175,7 +175,7 @@ impl Node {
         if effects.view_needed {
             self.layers.view.request.start(now);
         }
-        match effects.news {
+        match effects.event {
             Some(LayerEvent::Lapsed)
                 if core::mem::replace(&mut self.telemetry.lapse_reported, true) => {}
             Some(LayerEvent::Lapsed) => self.raise(Event::LeaseLapsed),
@@ -202,8 +202,8 @@ impl Node {
         if sensed.unclear {
             self.raise(Event::InterfererUnclear);
         }
-        if let Some(node) = sensed.off {
-            self.raise_about(About::Sensor, onward, node);
+        if let Some(node) = sensed.faulty_sensor {
+            self.raise_node_event(NodeEvent::Sensor, onward, node);
         }
     }
 
@@ -340,7 +340,7 @@ impl Layers {
     /// Returns true if a view proposal from `side` leaves out relays that are about to be linked. Its sender was
     /// linked a moment ago.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
-        let place = self.view.place_and_count().map_or(0, |(place, _)| place);
+        let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
@@ -362,23 +362,23 @@ pub(super) struct Telemetry {
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time for which a part of the chain without a quorum first keeps its links, in `dead_after`. `MOST` is the same for
+/// Time for which a part of the chain without a quorum first keeps its links, in `dead_after`. `LATER_RETENTION` is the same for
 /// every later time.
-const FIRST: u32 = 3;
-const MOST: u32 = 4;
+const FIRST_RETENTION: u32 = 3;
+const LATER_RETENTION: u32 = 4;
 
 /// Timer after which a part of the chain without a quorum drops its links and searches again.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NoQuorumTimer {
     /// Expiry of the timer; `None` while there is a quorum.
     at: Option<Instant>,
-    again: bool,
+    has_expired: bool,
 }
 
 impl NoQuorumTimer {
     pub(super) const NONE: Self = Self {
         at: None,
-        again: false,
+        has_expired: false,
     };
 
     pub(super) const fn next_timeout(&self) -> Option<Instant> {
@@ -399,10 +399,10 @@ impl Node {
     /// Returns the time for which links to neighbours are kept without a quorum.
     fn link_retention(&self) -> Duration {
         let settings = &self.member.settings;
-        let times = if self.no_quorum_timer.again {
-            MOST
+        let times = if self.no_quorum_timer.has_expired {
+            LATER_RETENTION
         } else {
-            FIRST
+            FIRST_RETENTION
         };
         let pass = first_pass(settings, self.member.all);
         settings.dead_after.times(times).max(pass)
@@ -413,7 +413,7 @@ impl Node {
         if self.no_quorum_timer.at.is_none_or(|at| now < at) {
             return;
         }
-        self.no_quorum_timer.again = true;
+        self.no_quorum_timer.has_expired = true;
         self.no_quorum_timer.at = Some(now + self.link_retention());
         for side in [Side::Upstream, Side::Downstream] {
             self.layers.neighbours.at_mut(side).drop_link(now);

@@ -114,7 +114,7 @@ impl Node {
         let id = upload.id();
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.node() == from {
-            neighbour.holds = neighbour.holds.max(Some(id));
+            neighbour.latest_mission = neighbour.latest_mission.max(Some(id));
         }
         self.store_upload(now, upload);
         let refused = self.layers.update.refused_mission(self.member.active);
@@ -201,7 +201,7 @@ impl Node {
             self.schedule_hello(side, from, false);
         } else if holds < latest {
             self.layers.update.schedule_offer(side);
-        } else if self.layers.neighbours.at(side).holds != Some(latest)
+        } else if self.layers.neighbours.at(side).latest_mission != Some(latest)
             && side == self.onward()
             && self
                 .layers
@@ -218,7 +218,7 @@ impl Node {
     /// requests one.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
-        let (to, holds) = (neighbour.node(), neighbour.holds);
+        let (to, holds) = (neighbour.node(), neighbour.latest_mission);
         let update = &mut self.layers.update;
         let (upload, offer_number) = update.poll_offer((side, to), holds, now, &self.member)?;
         let message = if let Some(offer_number) = offer_number {

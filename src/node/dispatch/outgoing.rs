@@ -67,7 +67,7 @@ impl Node {
         if let Some((to, _)) = next
             && let Some(message) = layers.view.poll_onward(&context, to)
         {
-            let holds = layers.neighbours.at(onward).holds;
+            let holds = layers.neighbours.at(onward).latest_mission;
             if layers.update.offer_for(holds).is_some() {
                 layers.update.schedule_offer(onward);
                 layers.update.reset_offers(onward);

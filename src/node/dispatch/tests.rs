@@ -55,11 +55,11 @@ pub(super) fn relay_of(mission: Mission, index: u16, signs: bool) -> Node {
     node.begin(identity, 1, Instant::ZERO);
     // Discards the first messages, which the relay sends by itself.
     node.handle_timeout(NOW);
-    said(&mut node);
+    sent_messages(&mut node);
     node
 }
 
-pub(super) fn said(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
+pub(super) fn sent_messages(node: &mut Node) -> heapless::Vec<(u16, Message), 8> {
     let mut said = heapless::Vec::new();
     while let Some((_, to, message)) = node.poll_message(NOW) {
         if let Message::Claim(_) = message {
@@ -137,15 +137,15 @@ fn offered(upload: Upload, offer_number: u16) -> Message {
 }
 
 #[test]
-fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
+fn a_relay_without_the_mission_forwards_no_proposal() {
     let mut node = relay(true);
     let held = node.layers.update.latest();
     let known = hello(&node, held);
     node.handle_message(NOW, Side::Upstream, 1, &known);
-    assert_eq!(said(&mut node), []);
+    assert_eq!(sent_messages(&mut node), []);
     node.handle_message(NOW, Side::Upstream, 1, &proposal(upload(1).id()));
     assert_eq!((node.stats().view, node.stats().mission), (1, 0));
-    let said = said(&mut node);
+    let said = sent_messages(&mut node);
     assert!(
         matches!(said[..], [(1, Message::Hello(Hello { latest_mission: holds, .. }))] if holds == held),
         "{said:?}"
@@ -153,7 +153,7 @@ fn who_does_not_hold_the_mission_hands_no_proposal_on_and_says_what_it_holds() {
 }
 
 #[test]
-fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
+fn the_mission_is_offered_before_the_proposal() {
     let mut node = relay(true);
     let (old, new) = (node.layers.update.latest(), upload(1));
     let said_now = offer(&mut node, new);
@@ -161,7 +161,7 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     assert_eq!(node.layers.update.latest(), new.id());
     assert_ne!(node.member.active, new.id());
     // An offer answers a hello, so relay 2 requests one.
-    let told = said(&mut node);
+    let told = sent_messages(&mut node);
     assert!(
         matches!(
             told[..],
@@ -174,14 +174,14 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
     );
     let behind = hello(&node, old);
     node.handle_message(NOW, Side::Downstream, 3, &behind);
-    assert_eq!(said(&mut node), [(3, offered(new, 9))]);
+    assert_eq!(sent_messages(&mut node), [(3, offered(new, 9))]);
     // A proposal waits for the offer too.
     node.handle_message(NOW, Side::Upstream, 1, &proposal(new.id()));
-    assert_eq!(said(&mut node), [(3, offered(new, 9))]);
+    assert_eq!(sent_messages(&mut node), [(3, offered(new, 9))]);
     // Relay 3 reports the mission.
     let holds = hello(&node, new.id());
     node.handle_message(NOW, Side::Downstream, 3, &holds);
-    let told = said(&mut node);
+    let told = sent_messages(&mut node);
     assert!(
         matches!(told[..], [(3, Message::Proposal(Proposal { mission_id, place: 2, .. }))] if mission_id == new.id()),
         "{told:?}"
@@ -189,12 +189,12 @@ fn the_next_relay_is_offered_the_mission_before_the_proposal_comes_to_it() {
 }
 
 #[test]
-fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one_is_told() {
+fn a_relay_offers_a_newer_mission_or_reports_its_own() {
     let mut node = relay(true);
     let (older, newer) = (node.layers.update.latest(), upload(2).id());
     let ahead = hello(&node, newer);
     node.handle_message(NOW, Side::Downstream, 3, &ahead);
-    let told = said(&mut node);
+    let told = sent_messages(&mut node);
     assert!(
         matches!(told[..], [(3, Message::Hello(Hello { latest_mission: holds, .. }))] if holds == older),
         "{told:?}"
@@ -202,7 +202,7 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     let new = upload(1);
     node.handle_upload(NOW, &new).unwrap();
     // A neighbour without a known mission is at once requested to send a hello, which an offer can answer.
-    let told = said(&mut node);
+    let told = sent_messages(&mut node);
     assert!(
         matches!(
             told[..],
@@ -231,11 +231,11 @@ fn who_holds_an_older_mission_is_offered_the_newer_one_and_who_holds_a_newer_one
     assert!((240..=271).contains(&(at[4] - at[3])), "{at:?}");
     let behind = hello(&node, older);
     node.handle_message(NOW, Side::Downstream, 3, &behind);
-    assert_eq!(said(&mut node), [(3, offered(new, 9))]);
+    assert_eq!(sent_messages(&mut node), [(3, offered(new, 9))]);
 }
 
 #[test]
-fn without_a_key_nothing_is_taken() {
+fn without_a_key_no_upload_is_accepted() {
     let mut node = relay(false);
     let held = node.layers.update.latest();
     let said_now = offer(&mut node, upload(1));
@@ -245,7 +245,7 @@ fn without_a_key_nothing_is_taken() {
         (1, held)
     );
     assert_eq!(node.upload(), None);
-    assert_eq!(said(&mut node), []);
+    assert_eq!(sent_messages(&mut node), []);
     // Messages of the ground are not accepted either.
     assert_eq!((node.side_of(0), node.side_of(4)), (None, None));
     let signed = relay(true);
@@ -278,7 +278,7 @@ fn an_offer_for_other_relays_is_refused() {
 
 /// Checks that offers and hellos between two nodes end if only one node has selected the other one.
 #[test]
-fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
+fn an_offer_of_an_unselected_node_is_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();
     let mut node = relay_of(five, 3, true);
     let new = upload_to(&five, 1);
@@ -291,7 +291,7 @@ fn an_offer_of_a_node_that_is_not_taken_is_held_and_answered_once() {
         ),
         (new.id(), 2)
     );
-    let told = said(&mut node);
+    let told = sent_messages(&mut node);
     let hellos = told.iter().filter(|(to, _)| *to == 1);
     let hellos: heapless::Vec<_, 8> = hellos.collect();
     assert!(
@@ -352,7 +352,7 @@ fn an_offer_that_was_withheld_is_refused_and_counted() {
 }
 
 #[test]
-fn what_is_stored_of_an_upload_does_not_depend_on_what_it_answers() {
+fn a_stored_upload_does_not_contain_the_offer_number() {
     let mut bodies = [[0; LENGTH + 2]; 2];
     for (body, answer) in bodies.iter_mut().zip([1, 0xFFFF]) {
         assert_eq!(offered(upload(3), answer).encode(body), Some(LENGTH + 2));
@@ -384,7 +384,7 @@ fn events(node: &mut Node) -> heapless::Vec<Event, 16> {
 }
 
 #[test]
-fn a_node_that_does_not_hear_this_relay_is_told_of_once_until_it_does() {
+fn a_node_that_does_not_receive_is_reported_once() {
     let mut node = relay(false);
     events(&mut node);
     let deaf = hello_of(&node, 0);
@@ -400,7 +400,7 @@ fn a_node_that_does_not_hear_this_relay_is_told_of_once_until_it_does() {
 }
 
 #[test]
-fn a_loss_and_a_mission_that_differs_are_told_with_the_node() {
+fn a_loss_and_a_mission_mismatch_name_the_node() {
     let mut node = relay(false);
     let lost = events(&mut node);
     let Message::Hello(hello) = hello_of(&node, 1) else {

@@ -1,7 +1,7 @@
 //! Expired timers of all layers: silent neighbours, view requests, wait for the first pass.
 
 use super::Node;
-use crate::event::About;
+use crate::event::NodeEvent;
 use crate::node::context::first_pass;
 use crate::node::neighbour::liveness::patient_tick;
 use crate::settings::Wiring;
@@ -79,14 +79,14 @@ impl Node {
         let ended = neighbour.has_no_peer();
         let dead = layers.lease.span(settings);
         // Until the first lease many relays may search on the channel at the same time.
-        let is_crowded = settings.wiring == Wiring::Shared && layers.lease.is_open();
+        let is_crowded = settings.wiring == Wiring::Shared && layers.lease.is_pending();
         let asking = is_crowded.then(|| patient_tick(settings, self.member.all));
         let lost = neighbour.handle_timeout(now, settings, dead, searches, asking);
         let ends = neighbour.has_no_peer() && !ended;
         self.steering
             .link(side, Some(neighbour.node()).filter(|node| *node != 0));
         if lost {
-            self.raise_about(About::Lost, side, node);
+            self.raise_node_event(NodeEvent::Lost, side, node);
         }
         if ends {
             self.layers.view.request.repeat_now(now);

@@ -23,16 +23,16 @@ use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum number of doublings of a flapping link's hold-down, the time for which it is not used. `LONGEST` is the
+/// Maximum number of doublings of a flapping link's hold-down, the time for which it is not used. `MAX_HOLD_DOWN` is the
 /// longest hold-down, in units of `dead_after`.
-const DOUBLINGS: u8 = 3;
-const LONGEST: u32 = 6;
+const MAX_DOUBLINGS: u8 = 3;
+const MAX_HOLD_DOWN: u32 = 6;
 
 /// Maximum number of losses of a link that does not count as flapping yet.
-const FORGIVEN: u8 = 2;
+const MAX_FORGIVEN: u8 = 2;
 
 /// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
-const SLOW: u32 = 10;
+const SLOW_INTERVAL: u32 = 10;
 
 /// Time after the last loss at which losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
@@ -48,7 +48,7 @@ struct Heard {
 impl Heard {
     /// Returns the record after a frame at `now` from the node at `distance`. A silence of more than `gap`, or
     /// another node, starts the record again.
-    fn again(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
+    fn updated(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
             Some(known) if known.distance == distance && now.since(known.last) <= gap => {
                 known.since
@@ -76,7 +76,7 @@ struct Link {
     /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
     was_down: bool,
     /// Time between the last two losses of the link.
-    apart: Duration,
+    interval: Duration,
 }
 
 impl Link {
@@ -87,7 +87,7 @@ impl Link {
             losses: 0,
             excused: false,
             was_down: false,
-            apart: Duration::from_micros(0),
+            interval: Duration::from_micros(0),
         }
     }
 
@@ -103,10 +103,10 @@ impl Link {
 
     /// Returns true if the link may not be used yet (hold-down), because it was lost repeatedly.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
-        let Some(more) = self.losses.checked_sub(FORGIVEN + 1) else {
+        let Some(more) = self.losses.checked_sub(MAX_FORGIVEN + 1) else {
             return false;
         };
-        let times = (1 << more.min(DOUBLINGS)).min(LONGEST);
+        let times = (1 << more.min(MAX_DOUBLINGS)).min(MAX_HOLD_DOWN);
         let span = settings.dead_after.times(times);
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
@@ -119,7 +119,7 @@ impl Link {
             losses: losses.saturating_add(u8::from(counted)),
             excused: !counted,
             was_down: false,
-            apart: if self.losses == 0 {
+            interval: if self.losses == 0 {
                 Duration::from_micros(0)
             } else {
                 now.since(self.lost_at)
@@ -170,10 +170,10 @@ impl Damping {
         settings: &Settings,
     ) {
         let most = self.links.iter().map(|link| link.recent(now, settings));
-        let most = most.max().filter(|most| *most > FORGIVEN).unwrap_or(0);
+        let most = most.max().filter(|most| *most > MAX_FORGIVEN).unwrap_or(0);
         if let Some(link) = self.link_mut(distance) {
             let known = link.recent(now, settings).max(most);
-            link.record_loss(known, counts || known > FORGIVEN, now);
+            link.record_loss(known, counts || known > MAX_FORGIVEN, now);
         }
     }
 
@@ -182,13 +182,13 @@ impl Damping {
     pub(super) fn record_hello(
         &mut self,
         distance: u16,
-        asks: Option<Instant>,
+        searching_since: Option<Instant>,
         gap: Duration,
         now: Instant,
         settings: &Settings,
     ) {
-        if asks.is_some_and(|asks| self.is_gap(asks, now, settings)) {
-            self.share(now, settings);
+        if searching_since.is_some_and(|asks| self.is_unanswered(asks, now, settings)) {
+            self.equalise_losses(now, settings);
         }
         let Some(link) = self.link_mut(distance) else {
             return;
@@ -196,7 +196,7 @@ impl Damping {
         let last = link.back.map_or(link.lost_at, |back| back.last);
         let silence = now.since(last);
         if link.back.is_some() {
-            if silence > gap && asks.is_some_and(|asks| last >= asks) {
+            if silence > gap && searching_since.is_some_and(|asks| last >= asks) {
                 link.record_loss(link.recent(now, settings), true, now);
                 link.was_down = true;
             }
@@ -205,26 +205,26 @@ impl Damping {
             link.losses = link.losses.saturating_add(u8::from(link.excused));
             link.excused = false;
         }
-        link.back = Some(Heard::again(link.back, distance, now, gap));
+        link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
     /// Returns true if no node has answered the search for a neighbour since `since`, when it began. The search must
     /// have begun at least `probe_after` ago.
-    fn is_gap(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
+    fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
     /// Raises the number of losses of every link to that of the link that was lost last. The cause is the same,
     /// because all links cross the same gap in the chain.
-    fn share(&mut self, now: Instant, settings: &Settings) {
+    fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
         if let Some(last) = lost.max_by_key(|link| link.lost_at).copied() {
             for link in &mut self.links {
                 link.losses = link.losses.max(last.losses);
                 link.lost_at = last.lost_at;
-                link.apart = last.apart;
+                link.interval = last.interval;
                 link.back = None;
             }
         }
@@ -238,9 +238,10 @@ impl Damping {
 
     /// Returns true if a link on this side flaps slowly, so that its next loss should be noticed early. Such a link
     /// has been lost more often than is forgiven, and stays up for long each time.
-    pub(super) fn is_slow(&self, now: Instant, settings: &Settings) -> bool {
-        let slow = settings.dead_after.times(SLOW);
-        let is_slow = |link: &Link| link.recent(now, settings) > FORGIVEN && link.apart >= slow;
+    pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
+        let slow = settings.dead_after.times(SLOW_INTERVAL);
+        let is_slow =
+            |link: &Link| link.recent(now, settings) > MAX_FORGIVEN && link.interval >= slow;
         self.links.iter().any(is_slow)
     }
 
@@ -277,7 +278,7 @@ impl Damping {
         {
             return false;
         }
-        let heard = Heard::again(self.candidate, distance, now, settings.dead_after);
+        let heard = Heard::updated(self.candidate, distance, now, settings.dead_after);
         self.candidate = Some(heard);
         now.since(heard.since) >= settings.probe_after.max(more)
     }
@@ -358,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn an_outage_during_which_another_candidate_answers_holds_one_link_down() {
+    fn an_outage_of_one_candidate_holds_one_link_down() {
         let (mut side, mut now, settings) = begun();
         for _ in 0..3 {
             outage(&mut side, &mut now, &[2, 3, 4], &settings);

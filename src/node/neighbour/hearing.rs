@@ -16,14 +16,14 @@ pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 impl ConsecutiveCounts {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// Counts an event of the node `distance` relays away, or resets its count if `so` is false. Returns true if it
-    /// is exactly the `most`-th event in a row.
-    pub(super) fn count(&mut self, distance: u16, so: bool, most: u8) -> bool {
+    /// Counts an event of the node `distance` relays away, or resets its count if `occurred` is false. Returns true if it
+    /// is exactly the `limit`-th event in a row.
+    pub(super) fn count(&mut self, distance: u16, occurred: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {
             return false;
         };
-        if !so {
+        if !occurred {
             *times = 0;
             return false;
         }
@@ -113,36 +113,36 @@ impl Hearing {
 /// Hellos due to the nearest nodes on one side, and those of them that request an answer. Bit 0 is the nearest node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
-    owed: u8,
-    asks: u8,
+    due: u8,
+    reply: u8,
 }
 
 impl Hellos {
-    pub(super) const NONE: Self = Self { owed: 0, asks: 0 };
+    pub(super) const NONE: Self = Self { due: 0, reply: 0 };
 
     /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.
     pub(super) const fn schedule(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
-        self.owed |= bit;
+        self.due |= bit;
         if ask {
-            self.asks |= bit;
+            self.reply |= bit;
         }
     }
 
     /// Schedules hellos that request an answer, to the four nearest nodes on this side.
     pub(super) const fn schedule_all(&mut self) {
-        self.owed = 0x0F;
-        self.asks = 0x0F;
+        self.due = 0x0F;
+        self.reply = 0x0F;
     }
 
     /// Returns the distance of the nearest node with a pending hello, in relays. The second value is true if the
     /// hello requests an answer.
     pub(super) fn poll(&mut self) -> Option<(u16, bool)> {
-        let distance = (1..=CANDIDATES).find(|distance| self.owed & mask(*distance) != 0)?;
+        let distance = (1..=CANDIDATES).find(|distance| self.due & mask(*distance) != 0)?;
         let bit = mask(distance);
-        self.owed &= !bit;
-        let ask = self.asks & bit != 0;
-        self.asks &= !bit;
+        self.due &= !bit;
+        let ask = self.reply & bit != 0;
+        self.reply &= !bit;
         Some((distance, ask))
     }
 }

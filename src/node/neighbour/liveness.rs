@@ -19,7 +19,7 @@ use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
 /// Minimum number of unanswered heartbeat requests (questions) before a neighbour is lost.
-const QUESTIONS: u16 = 16;
+const MIN_REQUESTS: u16 = 16;
 
 /// Factor on the recent maximum of unanswered heartbeat requests. A neighbour is lost only after a run that is that
 /// much longer.
@@ -28,7 +28,7 @@ const MARGIN: u16 = 3;
 /// Returns the interval between heartbeat requests to a silent neighbour. Sixteen or more fit before `dead_after`.
 /// The interval is as short as one channel allows for all of a chain of `all` relays.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
-    paced(settings, all, waiting(settings) / u64::from(QUESTIONS))
+    paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
 
 /// Returns the interval between heartbeat requests while many relays have no agreement yet. They share one channel.
@@ -74,22 +74,22 @@ pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
 }
 
 /// Number of past heartbeat requests whose answers are accepted.
-const OPEN: usize = 4;
+const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
     /// Time of the neighbour's last sign of life, or of this relay's start.
-    heard: Instant,
+    last_sign: Instant,
     lost: bool,
     /// True once a frame of the neighbour has been received since the start or its last loss.
-    met: bool,
+    was_received: bool,
     /// Number of the last heartbeat request (question) to the neighbour, 0 before any.
-    question: u16,
+    request_number: u16,
     /// Times of the last heartbeat requests, latest first.
-    asked: [Instant; OPEN],
+    request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour's last sign of life.
     unanswered: u16,
-    /// Recent maximum of `unanswered` at an answer, which shows how bad the channel is. It starts at [`QUESTIONS`],
+    /// Recent maximum of `unanswered` at an answer, which shows how bad the channel is. It starts at [`MIN_REQUESTS`],
     /// so that a channel that is not known yet counts as a bad one, and decays with each answer.
     longest: u16,
 }
@@ -100,7 +100,7 @@ pub(crate) struct Silence {
     /// True if the neighbour is lost from this moment on.
     pub(crate) lost: bool,
     /// Time of the next check, later than now.
-    pub(crate) look_again: Instant,
+    pub(crate) next_check: Instant,
 }
 
 impl Liveness {
@@ -112,13 +112,13 @@ impl Liveness {
 
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
-            heard: now,
+            last_sign: now,
             lost: false,
-            met: false,
-            question: 0,
-            asked: [now; OPEN],
+            was_received: false,
+            request_number: 0,
+            request_times: [now; REMEMBERED_REQUESTS],
             unanswered: 0,
-            longest: QUESTIONS,
+            longest: MIN_REQUESTS,
         }
     }
 
@@ -128,31 +128,31 @@ impl Liveness {
     /// are dropped, too.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
-            QUESTIONS
+            MIN_REQUESTS
         } else if was_down {
             self.longest
         } else {
             self.longest.max(self.unanswered)
         };
         *self = Self {
-            met: true,
+            was_received: true,
             longest,
             ..Self::new(now)
         };
     }
 
     pub(crate) const fn last_sign_of_life(&self) -> Instant {
-        self.heard
+        self.last_sign
     }
 
     /// Returns true if the neighbour has been heard and is not lost.
     pub(crate) const fn is_present(&self) -> bool {
-        self.met && !self.lost
+        self.was_received && !self.lost
     }
 
     /// Returns true if the neighbour is lost and has not been received again.
     pub(crate) const fn is_silent(&self) -> bool {
-        self.lost && !self.met
+        self.lost && !self.was_received
     }
 
     /// Returns the longest silence that lost frames alone plausibly cause, with a request every `tick`.
@@ -162,18 +162,18 @@ impl Liveness {
 
     /// Returns true if few frames were lost on the channel recently.
     pub(crate) const fn loses_few_frames(&self) -> bool {
-        self.longest <= QUESTIONS
+        self.longest <= MIN_REQUESTS
     }
 
     /// Records that a frame of the neighbour has been received.
     pub(crate) const fn record_frame(&mut self) {
-        self.met = true;
+        self.was_received = true;
     }
 
     /// Records that the neighbour was alive at time `at`. Returns true if it had been lost until now.
     pub(crate) fn record_sign_of_life(&mut self, at: Instant) -> bool {
-        self.heard = self.heard.max(at);
-        self.met = true;
+        self.last_sign = self.last_sign.max(at);
+        self.was_received = true;
         let lately = self.longest.saturating_sub(self.longest.div_ceil(8));
         self.longest = self.unanswered.max(lately);
         self.unanswered = 0;
@@ -182,29 +182,29 @@ impl Liveness {
 
     /// Records a heartbeat request (question) sent at `now`, and returns its number.
     pub(crate) const fn next_request(&mut self, now: Instant) -> u16 {
-        self.question = match self.question.wrapping_add(1) {
+        self.request_number = match self.request_number.wrapping_add(1) {
             0 => 1,
             number => number,
         };
-        let [first, second, third, _] = self.asked;
-        self.asked = [now, first, second, third];
+        let [first, second, third, _] = self.request_times;
+        self.request_times = [now, first, second, third];
         self.unanswered = self.unanswered.saturating_add(1);
-        self.question
+        self.request_number
     }
 
     /// Returns the time at which heartbeat request `number` was sent, if it is one of the last four.
     pub(crate) fn requested_at(&self, number: u16) -> Option<Instant> {
-        if number == 0 || self.question == 0 {
+        if number == 0 || self.request_number == 0 {
             return None;
         }
-        let before = self.question.wrapping_sub(number);
-        self.asked.get(usize::from(before)).copied()
+        let before = self.request_number.wrapping_sub(number);
+        self.request_times.get(usize::from(before)).copied()
     }
 
     /// Measures the neighbour's silence from `now` on. Returns true if the neighbour is not lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
-            self.heard = now;
+            self.last_sign = now;
         }
         !self.lost
     }
@@ -218,19 +218,19 @@ impl Liveness {
         tick: Duration,
         settings: &Settings,
     ) -> Silence {
-        let silent = now.since(self.heard);
-        let run = if self.met { self.longest } else { 0 };
-        let enough = self.unanswered >= run.saturating_mul(MARGIN).max(QUESTIONS);
+        let silent = now.since(self.last_sign);
+        let run = if self.was_received { self.longest } else { 0 };
+        let enough = self.unanswered >= run.saturating_mul(MARGIN).max(MIN_REQUESTS);
         let gone = silent >= dead && (enough || silent >= longest_lease(settings));
         let lost = gone && !self.lost;
         self.lost |= gone;
-        self.met &= !lost;
-        let look_again = if self.lost {
+        self.was_received &= !lost;
+        let next_check = if self.lost {
             now + settings.probe_after
         } else {
             now + tick
         };
-        Silence { lost, look_again }
+        Silence { lost, next_check }
     }
 }
 

@@ -62,7 +62,7 @@ pub(crate) struct Neighbour {
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
     /// Node whose link was dropped last for want of a quorum, until another is selected; 0 for none.
-    given_up: u16,
+    dropped: u16,
     /// Farther node that was replaced by the selected node; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
@@ -70,18 +70,18 @@ pub(crate) struct Neighbour {
     /// Distance to the selected node, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
     /// Nodes on this side that have recently reported that they receive this relay.
-    pub(super) both_ways: Hearing,
+    pub(super) two_way: Hearing,
     /// Neighbour that each node on this side has selected toward this relay, nearest node first. 0 for none.
-    pub(super) taken_by: [u16; CANDIDATES as usize],
+    pub(super) selection: [u16; CANDIDATES as usize],
     /// Time of the last frame from a node on this side that is not selected.
-    near: Option<Instant>,
+    unselected_at: Option<Instant>,
     /// Nodes that were heard recently.
     pub(super) hearing: Hearing,
     /// Number of consecutive reports of each node on this side that it does not receive this relay.
-    pub(super) unheard: ConsecutiveCounts,
+    pub(super) not_received: ConsecutiveCounts,
     /// Nodes that were reported to the firmware as found since another node was linked or lost. Bit 0 is the nearest
     /// node.
-    found: u8,
+    reported_found: u8,
     /// Limiter of reports about nodes on this side that have another mission.
     pub(super) mismatches: ReportLimiter,
     /// Consecutive handshakes with each node's index that were signed with another key.
@@ -91,11 +91,11 @@ pub(crate) struct Neighbour {
     /// Silence of the neighbour after which a heartbeat is requested.
     patience: Duration,
     jitter: Jitter,
-    pub(super) signs: Signs,
+    pub(super) heartbeat: PendingHeartbeat,
     /// Newest mission that the selected node has reported to hold; `None` if it has not.
-    pub(crate) holds: Option<MissionId>,
+    pub(crate) latest_mission: Option<MissionId>,
     /// Time of the next check of the neighbour's silence, or of the next step of the search.
-    look_at: Option<Instant>,
+    check_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
 
@@ -108,24 +108,24 @@ impl Neighbour {
         state: NeighbourState::NoPeer,
         liveness: Liveness::NONE,
         damping: Damping::new(Instant::ZERO),
-        given_up: 0,
+        dropped: 0,
         replaced: 0,
         searches_since: Instant::ZERO,
         distance: 0,
-        both_ways: Hearing::new(Instant::ZERO),
-        taken_by: [0; CANDIDATES as usize],
-        near: None,
+        two_way: Hearing::new(Instant::ZERO),
+        selection: [0; CANDIDATES as usize],
+        unselected_at: None,
         hearing: Hearing::new(Instant::ZERO),
-        unheard: ConsecutiveCounts::NONE,
-        found: 0,
+        not_received: ConsecutiveCounts::NONE,
+        reported_found: 0,
         mismatches: ReportLimiter::NONE,
         forged: ConsecutiveCounts::NONE,
         tick: Duration::from_micros(0),
         patience: Duration::from_micros(0),
         jitter: Jitter::NONE,
-        signs: Signs::NONE,
-        holds: None,
-        look_at: None,
+        heartbeat: PendingHeartbeat::NONE,
+        latest_mission: None,
+        check_at: None,
         hellos: Hellos::NONE,
     };
 
@@ -141,11 +141,11 @@ impl Neighbour {
     ) {
         self.liveness = Liveness::new(now);
         self.damping.begin(now);
-        self.both_ways = Hearing::new(now);
+        self.two_way = Hearing::new(now);
         self.hearing = Hearing::new(now);
         self.jitter = Jitter::new(seed);
         self.distance = 1;
-        self.found = mask(1);
+        self.reported_found = mask(1);
         self.grace = now;
         self.tick = tick(settings, all);
         self.patience = patience(settings, all);
@@ -162,7 +162,7 @@ impl Neighbour {
             Wiring::Pair => self.patience.max(first_pass(settings, all)),
             Wiring::Shared => soon,
         };
-        self.look_at = Some(now + wait);
+        self.check_at = Some(now + wait);
     }
 
     pub(crate) const fn node(&self) -> u16 {
@@ -195,10 +195,10 @@ impl Neighbour {
         if self.is_mutual() {
             let next = (self.liveness.last_sign_of_life() + self.patience).max(now + self.tick);
             // An answer to an old message does not advance the next check.
-            let next = self.look_at.map_or(next, |at| at.max(next));
+            let next = self.check_at.map_or(next, |at| at.max(next));
             // A new neighbour triggers a view request at the end of its grace period.
             let waits = self.node != self.agreed.counted() && now < self.grace;
-            self.look_at = Some(if waits { next.min(self.grace) } else { next });
+            self.check_at = Some(if waits { next.min(self.grace) } else { next });
         }
         back
     }
@@ -217,17 +217,17 @@ impl Neighbour {
         };
         self.state = next;
         if mutual {
-            self.found &= mask(self.distance);
+            self.reported_found &= mask(self.distance);
         }
-        self.look_at = Some(now + wait);
+        self.check_at = Some(now + wait);
         true
     }
 
     /// Returns true if the selected node has not been reported as found yet, and marks it as reported.
     pub(crate) const fn should_report_found(&mut self) -> bool {
-        let told = self.found;
-        self.found |= mask(self.distance);
-        self.found != told
+        let before = self.reported_found;
+        self.reported_found |= mask(self.distance);
+        self.reported_found != before
     }
 
     /// Measures the silence of a neighbour in the same view from `now` on. Returns true if there is such a neighbour
@@ -237,32 +237,32 @@ impl Neighbour {
             && self.is_agreed()
             && self.liveness.excuse_silence(now);
         if excused {
-            self.look_at = Some(now + settings.probe_after);
+            self.check_at = Some(now + settings.probe_after);
         }
         excused
     }
 
     /// Returns true if the check of the neighbour's silence, or the next step of the search, is due.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
-        self.look_at.is_some_and(|at| at <= now)
+        self.check_at.is_some_and(|at| at <= now)
     }
 
     pub(crate) const fn next_timeout(&self) -> Option<Instant> {
-        self.look_at
+        self.check_at
     }
 
     /// Handles the timer of this side; returns true if the neighbour is lost from now on. It is not lost before a
-    /// silence of `dead`. `searches` is true if other nodes can be heard here. `asking` replaces the usual interval
+    /// silence of `dead`. `can_search` is true if other nodes can be heard here. `interval` replaces the usual interval
     /// between questions.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
         settings: &Settings,
         dead: Duration,
-        searches: bool,
-        asking: Option<Duration>,
+        can_search: bool,
+        interval: Option<Duration>,
     ) -> bool {
-        let step = self.jitter.spread(asking.unwrap_or(self.tick));
+        let step = self.jitter.spread(interval.unwrap_or(self.tick));
         let span = settings
             .dead_after
             .as_micros()
@@ -274,19 +274,19 @@ impl Neighbour {
         let span = run.max(Duration::from_micros(span));
         let is_over = |since: Instant| now.since(since) >= span;
         let mut lost = false;
-        let mut look_again = now + step;
+        let mut next_check = now + step;
         match self.state {
             NeighbourState::Linked => {
                 let silence = self.liveness.review_silence(now, dead, step, settings);
                 lost = silence.lost;
-                self.signs.ask = true;
-                if lost && searches {
+                self.heartbeat.request = true;
+                if lost && can_search {
                     let counts = self.liveness.loses_few_frames();
                     self.damping
                         .record_loss(self.distance, counts, now, settings);
                     self.search(now);
                 } else {
-                    look_again = silence.look_again;
+                    next_check = silence.next_check;
                 }
             }
             NeighbourState::Pairing { since } => {
@@ -308,18 +308,18 @@ impl Neighbour {
             NeighbourState::NoPeer => {
                 self.hellos.schedule_all();
                 let often = Duration::from_micros((settings.probe_after.as_micros() / 2).max(1));
-                let wait = if self.is_near(now, settings) {
+                let wait = if self.has_recent_unselected(now, settings) {
                     often
                 } else {
                     settings.dead_after
                 };
-                look_again = now + self.jitter.spread(wait);
+                next_check = now + self.jitter.spread(wait);
             }
         }
         if lost {
-            self.found = 0;
+            self.reported_found = 0;
         }
-        self.look_at = Some(look_again);
+        self.check_at = Some(next_check);
         lost
     }
 
@@ -329,24 +329,24 @@ impl Neighbour {
     /// frames then make a silence that is several times as long, so the link counts as down after the longest silence
     /// of any neighbour.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
-        if self.has_no_peer() && !self.is_near(now, settings) {
+        if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
             longest_lease(settings)
         } else {
             settings.dead_after
         }
     }
 
-    fn is_near(&self, now: Instant, settings: &Settings) -> bool {
-        self.near
+    fn has_recent_unselected(&self, now: Instant, settings: &Settings) -> bool {
+        self.unselected_at
             .is_some_and(|near| now.since(near) <= settings.dead_after)
     }
 
     /// Records a frame of a node that is not selected. If this side has no neighbour, it sends its next hellos soon.
     pub(crate) fn record_unselected(&mut self, now: Instant, settings: &Settings) {
-        if self.has_no_peer() && !self.is_near(now, settings) {
-            self.look_at = Some(now + self.tick);
+        if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
+            self.check_at = Some(now + self.tick);
         }
-        self.near = Some(now);
+        self.unselected_at = Some(now);
     }
 
     /// Returns the start of the search while this side has no neighbour, else `None`. It then sends hellos to all
@@ -368,7 +368,7 @@ impl Neighbour {
 
     /// Returns true if `node` was given up for want of a quorum and no other node has been selected since.
     const fn was_dropped(&self, node: u16) -> bool {
-        node != 0 && self.given_up == node
+        node != 0 && self.dropped == node
     }
 
     /// Drops the selected node and searches again, because this part of the chain has no quorum.
@@ -377,9 +377,9 @@ impl Neighbour {
             self.state,
             NeighbourState::Linked | NeighbourState::Pairing { .. }
         ) {
-            self.given_up = self.node;
+            self.dropped = self.node;
             self.search(now);
-            self.look_at = Some(now + self.tick);
+            self.check_at = Some(now + self.tick);
         }
     }
 
@@ -398,7 +398,7 @@ impl Neighbour {
         if self.damping.is_held_down(distance, now, settings) {
             return false;
         }
-        let takes = match self.state {
+        let is_selected = match self.state {
             NeighbourState::Searching { since } => {
                 // A nearer node may be heard soon, or any other node than the one that was given up.
                 let wait = if self.was_dropped(node) {
@@ -424,23 +424,23 @@ impl Neighbour {
                     && (is_known || self.damping.has_waited(distance, more, now, settings))
             }
         };
-        if !takes {
+        if !is_selected {
             return false;
         }
         if !matches!(self.state, NeighbourState::Searching { .. }) {
             self.grace = now + settings.probe_after;
         }
-        self.signs = Signs::NONE;
-        self.given_up = 0;
+        self.heartbeat = PendingHeartbeat::NONE;
+        self.dropped = 0;
         self.replaced = if candidate.nearer { self.node } else { 0 };
         self.node = node;
         self.distance = candidate.distance;
         self.state = NeighbourState::Pairing { since: now };
-        let flaps = self.damping.is_slow(now, settings);
+        let flaps = self.damping.has_slow_flapping(now, settings);
         let was_down = self.damping.was_down(self.distance);
         self.liveness.renew(now, was_down, flaps);
         self.damping.clear();
-        self.look_at = Some(now + self.tick);
+        self.check_at = Some(now + self.tick);
         true
     }
 }
@@ -571,24 +571,24 @@ impl AgreedNodes {
 
 /// Pending heartbeat to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Signs {
+pub(super) struct PendingHeartbeat {
     /// True if a heartbeat request (question) to the neighbour is pending.
-    pub(super) ask: bool,
+    pub(super) request: bool,
     /// Number of the neighbour's heartbeat request that is to be answered, 0 for none.
-    pub(super) answer: u16,
+    pub(super) reply: u16,
 }
 
-impl Signs {
+impl PendingHeartbeat {
     pub(super) const NONE: Self = Self {
-        ask: false,
-        answer: 0,
+        request: false,
+        reply: 0,
     };
 }
 
 /// Number of consecutive hellos without reception of this relay after which their sender is reported.
 ///
 /// Fewer may be due to a lost answer or two.
-const UNHEARD: u8 = 8;
+const NOT_RECEIVED: u8 = 8;
 
 /// Number of consecutive handshakes of a node with another key after which the node is reported.
 const FORGED: u8 = 3;
@@ -601,12 +601,12 @@ impl Neighbour {
         let is_in = |nodes: u8| mask(distance) & nodes != 0;
         // A linked neighbour that is silent may be about to be lost.
         let is_linked = self.is_mutual() && self.distance == distance;
-        is_in(self.both_ways.recent(now, settings) & !held)
+        is_in(self.two_way.recent(now, settings) & !held)
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
     /// Returns true if the neighbour on this side is linked and less than `distance` relays away.
-    pub(crate) fn joins_with(&self, distance: u16) -> bool {
+    pub(crate) fn links_within(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
@@ -627,17 +627,20 @@ impl Neighbour {
         now: Instant,
         settings: &Settings,
     ) {
-        if let Some(taken) = self.taken_by.get_mut(usize::from(distance).wrapping_sub(1)) {
+        if let Some(taken) = self
+            .selection
+            .get_mut(usize::from(distance).wrapping_sub(1))
+        {
             *taken = neighbour;
         }
         if hears {
-            self.both_ways.add(distance, now, settings);
+            self.two_way.add(distance, now, settings);
         }
     }
 
     /// Returns the neighbour that the node `distance` relays away has selected toward this relay. 0 for none.
     pub(crate) fn selected_by(&self, distance: u16) -> u16 {
-        let known = self.taken_by.get(usize::from(distance).wrapping_sub(1));
+        let known = self.selection.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
@@ -666,9 +669,9 @@ impl Neighbour {
     }
 
     /// Counts the reports of the node `distance` relays away that it does not receive this relay. Returns true at
-    /// exactly [`UNHEARD`] such reports in a row.
-    pub(crate) fn record_reception(&mut self, distance: u16, heard: bool) -> bool {
-        self.unheard.count(distance, !heard, UNHEARD)
+    /// exactly [`NOT_RECEIVED`] such reports in a row.
+    pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
+        self.not_received.count(distance, !received, NOT_RECEIVED)
     }
 
     /// Returns true if the node `distance` relays away has to be reported for having another mission.
@@ -694,7 +697,7 @@ impl Neighbour {
     /// Records the number of the neighbour's heartbeat request, which a heartbeat will answer; 0 is none.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
-            self.signs.answer = number;
+            self.heartbeat.reply = number;
         }
     }
 
@@ -706,16 +709,16 @@ impl Neighbour {
     /// Returns the pending heartbeat as (destination, own number, answered number). The own number is that of its
     /// question, the answered number that of the neighbour's question; 0 for none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
-        let Signs { ask, answer } = core::mem::take(&mut self.signs);
-        if !(ask || answer != 0) || self.node == 0 {
+        let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
+        if !(request || reply != 0) || self.node == 0 {
             return None;
         }
-        let question = if ask {
+        let number = if request {
             self.liveness.next_request(now)
         } else {
             0
         };
-        Some((self.node, question, answer))
+        Some((self.node, number, reply))
     }
 
     /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.

@@ -20,7 +20,7 @@ use crate::optimiser::search::{Infeasible, Schedule, Search};
 use crate::place::{CrossSection, Placement, Station};
 use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
-use crate::wire::message::{AdjustStep, Answer, Message, Moved, Roster, Sweep, Token};
+use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 
 /// Maximum number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. The rest of a grid
 /// row, up to 24 more, may be added.
@@ -245,7 +245,7 @@ impl Computation {
         }
         let (number, mission) = (self.state.number(), context.digest());
         match &self.pass {
-            PassKind::Sweep(sweep_pass) => Some(Message::Verdict(Answer {
+            PassKind::Sweep(sweep_pass) => Some(Message::Verdict(SweepVerdict {
                 number,
                 view_digest: mission,
                 verdict: sweep_pass.verdict.clone(),

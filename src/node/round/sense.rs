@@ -567,7 +567,7 @@ impl Findings {
         Sensed {
             new_estimate: self.estimate != before.estimate,
             unclear: self.unfit.is_some() && self.unfit != before.unfit,
-            off,
+            faulty_sensor: off,
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::optimiser::pass::{Behind, Link, Verdict, close};
 use crate::optimiser::spacing::RequiredPosition;
 use crate::place::Station;
 use crate::settings::Method;
-use crate::wire::message::{Answer, Sweep};
+use crate::wire::message::{Sweep, SweepVerdict};
 
 impl Computation {
     /// Handles a sweep of target SIRs from the previous relay.
@@ -90,7 +90,7 @@ impl Computation {
     }
 
     /// Handles a verdict, the result of a sweep of target SIRs, from the next relay.
-    pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &Answer) -> Action {
+    pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &SweepVerdict) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         let link = self.link(context, is_chosen);
         if let PassKind::Sweep(sweep_pass) = &mut self.pass
@@ -249,7 +249,7 @@ impl SweepPass {
 
     /// Accepts a verdict, the result of a sweep, if this relay can meet the committed target. Returns true if the
     /// verdict was accepted.
-    pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &Answer) -> bool {
+    pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
         let met = |target: u8| {

@@ -61,7 +61,7 @@ impl Line {
             other_leases: OtherLeases {
                 lease_left: Duration::from_micros(0),
                 view: ViewId::LOADED,
-                rest: None,
+                earlier_lease_left: None,
             },
         };
         call(&mut self.rounds[at], &context)

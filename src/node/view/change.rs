@@ -29,7 +29,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
 /// Maximum number by which one message may advance the latest known view.
-const LEAP: u32 = 4096;
+const MAX_ADVANCE: u32 = 4096;
 
 /// State of the view change (agreement on the chain's members) at one relay.
 #[derive(Clone, Debug)]
@@ -100,12 +100,12 @@ impl ViewChange {
         self.newest
     }
 
-    /// Records that another relay knows `view`; this advances the latest view by at most [`LEAP`] numbers. One
+    /// Records that another relay knows `view`; this advances the latest view by at most [`MAX_ADVANCE`] numbers. One
     /// message could otherwise use up all view numbers; a relay that was away for long repeats its view often enough.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
-            self.newest = self.newest.toward(view, LEAP);
+            self.newest = self.newest.toward(view, MAX_ADVANCE);
         }
     }
 
@@ -128,9 +128,9 @@ impl ViewChange {
 
     /// Returns this relay's rank and the number of relays, as of the last view proposal. Ranks count from 1 at the
     /// leader.
-    pub(crate) fn place_and_count(&self) -> Option<(u16, u16)> {
+    pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
-        Some((proposed.place, proposed.reached.max(proposed.place)))
+        Some((proposed.rank, proposed.reached.max(proposed.rank)))
     }
 
     /// Returns true while this relay's part of the chain has no quorum.
@@ -177,12 +177,12 @@ impl ViewChange {
 
     fn on_proposal(&mut self, context: &Context<'_>, proposal: &Proposal) -> Effects {
         self.observe_view(proposal.proposed_view);
-        let again = self.proposed.is_some_and(|known| {
+        let is_duplicate = self.proposed.is_some_and(|known| {
             known.view == proposal.proposed_view
                 && known.mission_id == proposal.mission_id
-                && known.place == proposal.place.saturating_add(1)
+                && known.rank == proposal.place.saturating_add(1)
         });
-        if again {
+        if is_duplicate {
             let path = context.path(proposal.place);
             self.circulation.on_duplicate(context.now, path);
             return Effects::DUPLICATE.by(Proposer::Neighbour);
@@ -229,7 +229,7 @@ impl ViewChange {
         self.proposed = Some(Proposed {
             view,
             mission_id,
-            place: place.saturating_add(1),
+            rank: place.saturating_add(1),
             poll,
             forwarded_to: None,
             base: poll.agreed,
@@ -259,23 +259,23 @@ impl ViewChange {
             return Effects::NONE;
         }
         let Proposed {
-            view, place, poll, ..
+            view, rank, poll, ..
         } = proposed;
         let accepted = if context.member.settings.quorum {
-            electorate::decide(&poll, view, place, context.member.all)
+            electorate::decide(&poll, view, rank, context.member.all)
         } else {
             Some(View {
                 id: view,
-                relays: place,
+                relays: rank,
             })
         };
-        let usable_in = if place == context.member.all {
+        let usable_in = if rank == context.member.all {
             0
         } else {
-            electorate::rest(&poll, context.longest_lease())
+            electorate::remaining_wait(&poll, context.longest_lease())
         };
         let verdict = ViewVerdict {
-            reached: place,
+            reached: rank,
             base: poll.agreed,
             accepted,
             usable_in,
@@ -294,10 +294,10 @@ impl ViewChange {
             Some(proposed)
                 if proposed.view == decision.proposed_view
                     && proposed.mission_id == decision.mission_id
-                    && proposed.place.saturating_add(1) == decision.place
-                    && decision.reached > proposed.place
+                    && proposed.rank.saturating_add(1) == decision.place
+                    && decision.reached > proposed.rank
                     && decision.accepted.is_none_or(|view| {
-                        view.id != proposed.view || view.relays > proposed.place
+                        view.id != proposed.view || view.relays > proposed.rank
                     }) =>
             {
                 let verdict = ViewVerdict {
@@ -333,23 +333,23 @@ impl ViewChange {
             self.request_later_view(context, proposal);
             return Effects::STALE;
         }
-        let taught = base.id > proposed.poll.agreed.id;
+        let has_newer_base = base.id > proposed.poll.agreed.id;
         proposed.base = base;
         proposed.reached = reached;
         proposed.accepted = accepted;
         proposed.usable_in = usable_in;
-        let leads = proposed.place == 1;
+        let leads = proposed.rank == 1;
         if leads && accepted.is_some() {
             // All other members have accepted it before.
             self.electorate.commit();
         }
         self.refused = accepted.is_none();
-        let path = context.path(proposed.place.saturating_sub(1));
+        let path = context.path(proposed.rank.saturating_sub(1));
         self.circulation.complete(context.now, path);
         self.request.stop();
         if leads && accepted.is_none() {
             // Relays that have learned of a newer view by this decision can vote on the next proposal at once.
-            if taught {
+            if has_newer_base {
                 self.request.request_now(context.now);
             } else {
                 self.retry_after_refusal(context);
@@ -389,7 +389,7 @@ impl ViewChange {
         Some(Message::Proposal(Proposal {
             mission_id: proposed.mission_id,
             proposed_view: proposed.view,
-            place: proposed.place,
+            place: proposed.rank,
             poll: proposed.poll,
         }))
     }
@@ -401,7 +401,7 @@ impl ViewChange {
             Reply::Result => Message::Decision(Decision {
                 mission_id: proposed.mission_id,
                 proposed_view: proposed.view,
-                place: proposed.place,
+                place: proposed.rank,
                 reached: proposed.reached,
                 base: proposed.base,
                 accepted: proposed.accepted,
@@ -465,11 +465,11 @@ impl ViewChange {
         };
         // Without a chance of success no proposal is made, because each one uses up a view number.
         let Member { node, all, .. } = *context.member;
-        let alone = self.refused && context.end && context.settings().quorum;
-        if alone
+        let is_alone = self.refused && context.end && context.settings().quorum;
+        if is_alone
             && self
                 .electorate
-                .is_refused_alone(node, view, all, context.other_leases)
+                .lacks_quorum_alone(node, view, all, context.other_leases)
         {
             self.retry_after_refusal(context);
             return Effects::NONE;
@@ -496,7 +496,7 @@ pub(crate) struct Proposed {
     /// Identifier of the mission that the proposed view is to fly.
     pub(crate) mission_id: MissionId,
     /// Rank of this relay on the way of the proposal: 1 for the proposer.
-    pub(crate) place: u16,
+    pub(crate) rank: u16,
     /// Votes on the proposal, including that of this relay.
     pub(super) poll: Poll,
     /// Node to which the proposal was forwarded; `None` before. With a second one, two views with the same identifier
@@ -523,14 +523,14 @@ pub(super) struct ViewVerdict {
 /// State of this relay's request for a new view, and the time at which it is repeated.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewRequest {
-    asks: bool,
+    pending: bool,
     /// Number of view requests sent without a result.
     tries: u8,
     at: Option<Instant>,
     /// Number of consecutive view proposals that were refused.
     refusals: u8,
     /// Earliest time of the next view request if anything changes; `None` except after a refusal.
-    soon: Option<Instant>,
+    not_before: Option<Instant>,
     jitter: Jitter,
 }
 
@@ -540,24 +540,24 @@ const DOUBLINGS: u8 = 3;
 impl ViewRequest {
     pub(super) const fn new(seed: u32) -> Self {
         Self {
-            asks: false,
+            pending: false,
             tries: 0,
             at: None,
             refusals: 0,
-            soon: None,
+            not_before: None,
             jitter: Jitter::new(seed),
         }
     }
 
     pub(crate) const fn is_pending(&self) -> bool {
-        self.asks
+        self.pending
     }
 
     /// Requests a view, repeatedly until one is accepted. After a refusal, a change shortens the wait.
     pub(crate) fn start(&mut self, now: Instant) {
-        if !self.asks {
+        if !self.pending {
             self.request_now(now);
-        } else if let Some(soon) = self.soon.take() {
+        } else if let Some(soon) = self.not_before.take() {
             self.refusals = 0;
             let soon = soon.max(now + PAUSE);
             self.at = Some(self.at.map_or(soon, |at| at.min(soon)));
@@ -567,16 +567,16 @@ impl ViewRequest {
     /// Requests a view at once and resets all waits, because new information is available.
     #[inline(never)] // called from many places
     pub(crate) fn request_now(&mut self, now: Instant) {
-        self.asks = true;
+        self.pending = true;
         self.tries = 0;
         self.refusals = 0;
-        self.soon = None;
+        self.not_before = None;
         self.at = Some(now + PAUSE);
     }
 
     /// Repeats a pending view request at once, because the neighbours are now certain.
     pub(crate) fn repeat_now(&mut self, now: Instant) {
-        if self.asks {
+        if self.pending {
             self.request_now(now);
         }
     }
@@ -585,18 +585,18 @@ impl ViewRequest {
     ///
     /// [`request_now`](Self::request_now) ends the doubling.
     pub(super) fn request_after_refusal(&mut self, now: Instant, wait: Duration) {
-        self.asks = true;
+        self.pending = true;
         let wait = self.jitter.spread(wait);
-        self.soon = Some(now + wait);
+        self.not_before = Some(now + wait);
         self.at = Some(now + wait.times(1 << self.refusals.min(DOUBLINGS)));
         self.refusals = self.refusals.saturating_add(1);
     }
 
     /// Ends the view request, because a view has been decided.
     pub(super) const fn stop(&mut self) {
-        self.asks = false;
+        self.pending = false;
         self.at = None;
-        self.soon = None;
+        self.not_before = None;
     }
 
     /// Starts the timer for the first pass: if none is received by `at`, a view is requested.
@@ -613,14 +613,14 @@ impl ViewRequest {
     /// since the start; then a request is due, too.
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
-        if !self.asks {
+        if !self.pending {
             if !fresh {
                 return false;
             }
-            self.asks = true;
+            self.pending = true;
             self.tries = 0;
         }
-        self.soon = None;
+        self.not_before = None;
         self.at = Some(now + self.patience(settings));
         true
     }
@@ -640,7 +640,7 @@ impl ViewRequest {
     #[cfg(test)]
     pub(super) const fn due(at: Instant) -> Self {
         Self {
-            asks: true,
+            pending: true,
             at: Some(at),
             ..Self::new(1)
         }

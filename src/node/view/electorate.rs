@@ -132,21 +132,21 @@ impl Electorate {
             poll.lease_left = poll.lease_left.min(tenths(other_leases.lease_left));
             poll.earlier_lease_left = poll
                 .earlier_lease_left
-                .min(other_leases.rest_of(self.agreed.id));
+                .min(other_leases.earlier_lease_tenths(self.agreed.id));
         }
         Some(poll)
     }
 
     /// Returns true if this relay's vote alone would be no quorum for `proposal` of `node`. Casts no vote.
-    pub(super) fn is_refused_alone(
+    pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
         proposal: ViewId,
         all: u16,
         other_leases: OtherLeases,
     ) -> bool {
-        let mut asked = *self;
-        let poll = asked.vote(node, proposal, None, other_leases);
+        let mut copy = *self;
+        let poll = copy.vote(node, proposal, None, other_leases);
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
@@ -169,10 +169,10 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Removes the votes on proposals for which `over` returns true: they can no longer become views.
-    fn forget(&mut self, over: impl Fn(ViewId) -> bool) {
+    /// Removes the votes on proposals for which `is_decided` returns true: they can no longer become views.
+    fn forget(&mut self, is_decided: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
-        let voted = self.voted.iter().filter(|voted| !over(**voted));
+        let voted = self.voted.iter().filter(|voted| !is_decided(**voted));
         for (kept, voted) in kept.iter_mut().zip(voted) {
             *kept = *voted;
         }
@@ -214,7 +214,7 @@ impl Electorate {
 
 /// Returns the time until positions of the next view may be used, tenths of a second, at most `most`. An unknown time counts as
 /// `most`.
-pub(crate) fn rest(poll: &Poll, most: u16) -> u16 {
+pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
     poll.earlier_lease_left.max(lease_left).min(most)
@@ -231,8 +231,8 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
         return Some(whole);
     }
     // Of two equal halves, the one with the view's proposer counts as the larger.
-    let there = 2 * u32::from(poll.votes) + u32::from(poll.proposer);
-    if there <= u32::from(poll.agreed.relays) {
+    let weight = 2 * u32::from(poll.votes) + u32::from(poll.proposer);
+    if weight <= u32::from(poll.agreed.relays) {
         return None;
     }
     let successor = poll.successor.map(|successor| successor.view);

@@ -53,7 +53,7 @@ fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool)
 }
 
 #[test]
-fn chains_of_three_and_four_have_one_view_after_the_other_and_settle_once_healed() {
+fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(3, (2, 3, 1), true);
     all_holds(4, (2, 2, 1), true);
     all_holds(4, (2, 3, 0), false);
@@ -62,7 +62,7 @@ fn chains_of_three_and_four_have_one_view_after_the_other_and_settle_once_healed
 /// Searches more events than the usual test; takes some minutes.
 #[test]
 #[ignore = "minutes"]
-fn chains_of_three_and_four_hold_through_more() {
+fn chains_of_three_and_four_in_more_states() {
     all_holds(3, (3, 3, 1), true);
     all_holds(3, (3, 4, 1), false);
     all_holds(4, (2, 3, 0), true);
@@ -72,7 +72,7 @@ fn chains_of_three_and_four_hold_through_more() {
 
 /// Shows that the model check finds faults: if all relays present vote, two views are in force at once.
 #[test]
-fn a_rule_that_counts_everybody_is_found_to_break() {
+fn the_check_finds_the_fault_of_counting_all_votes() {
     for relays in [3, 4] {
         let check = Check {
             rule: Rule::Everybody,
@@ -85,7 +85,7 @@ fn a_rule_that_counts_everybody_is_found_to_break() {
 
 /// Shows that relays must store their votes: a relay that loses them breaks its promises.
 #[test]
-fn one_that_forgets_what_it_has_said_is_found_to_break_it() {
+fn the_check_finds_the_fault_of_a_lost_record() {
     let check = Check {
         losses: 1,
         ..Check::of(3)
@@ -94,7 +94,7 @@ fn one_that_forgets_what_it_has_said_is_found_to_break_it() {
 }
 
 /// View and its number of members, as a sortable pair.
-pub(super) type Sized = (ViewId, u16);
+pub(super) type SizedView = (ViewId, u16);
 
 /// Content of a frame in the model.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -102,17 +102,17 @@ pub(super) enum Body {
     Proposal {
         proposed_view: ViewId,
         place: u16,
-        agreed: Sized,
+        agreed: SizedView,
         votes: u16,
         proposer: bool,
-        successor: Option<(ViewId, Sized)>,
+        successor: Option<(ViewId, SizedView)>,
     },
     Decision {
         proposed_view: ViewId,
         place: u16,
         reached: u16,
-        base: Sized,
-        accepted: Option<Sized>,
+        base: SizedView,
+        accepted: Option<SizedView>,
     },
 }
 
@@ -125,13 +125,13 @@ pub(super) struct Frame {
 
 /// State of one relay in the model.
 #[derive(Clone, Debug)]
-pub(super) struct Unit {
+pub(super) struct RelayState {
     pub(super) change: ViewChange,
     /// Last accepted view, this relay's rank in it, and its number of members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
-impl Unit {
+impl RelayState {
     fn key(&self) -> impl Eq + core::hash::Hash + use<> {
         let change = &self.change;
         (
@@ -143,15 +143,15 @@ impl Unit {
     }
 }
 
-impl PartialEq for Unit {
+impl PartialEq for RelayState {
     fn eq(&self, other: &Self) -> bool {
         self.key() == other.key()
     }
 }
 
-impl Eq for Unit {}
+impl Eq for RelayState {}
 
-impl core::hash::Hash for Unit {
+impl core::hash::Hash for RelayState {
     fn hash<H: core::hash::Hasher>(&self, hasher: &mut H) {
         self.key().hash(hasher);
     }
@@ -159,8 +159,8 @@ impl core::hash::Hash for Unit {
 
 /// New view that was decided on: its size, the view that it follows, and the voters.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub(super) struct Decree {
-    pub(super) view: Sized,
+pub(super) struct DecidedView {
+    pub(super) view: SizedView,
     pub(super) follows: ViewId,
     /// Relays that voted on the proposal, bit 0 for the first relay.
     pub(super) members: u8,
@@ -168,14 +168,14 @@ pub(super) struct Decree {
 
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Chain {
-    pub(super) units: Vec<Unit>,
+    pub(super) relays: Vec<RelayState>,
     /// Part of the partitioned chain in which each relay is: relays with equal numbers reach each other.
     pub(super) parts: Vec<u8>,
     /// Frames in the air, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
     /// List of all views that were ever decided on; `agreed` lists all that were ever agreed on.
-    pub(super) decrees: Vec<Decree>,
-    pub(super) agreed: Vec<Sized>,
+    pub(super) decided: Vec<DecidedView>,
+    pub(super) agreed: Vec<SizedView>,
     pub(super) cuts: u8,
     pub(super) proposals: u8,
     pub(super) reboots: u8,
@@ -184,7 +184,7 @@ pub(super) struct Chain {
 
 /// Event that the model check may let happen next.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) enum Happens {
+pub(super) enum ModelEvent {
     Part(usize),
     Arrives(Frame),
     Proposes(usize),
@@ -196,7 +196,7 @@ pub(super) enum Happens {
 }
 
 /// Inserts `one` into the sorted list `all`, unless the list contains it.
-pub(super) fn put<T: Ord>(all: &mut Vec<T>, one: T) {
+pub(super) fn insert_sorted<T: Ord>(all: &mut Vec<T>, one: T) {
     if let Err(at) = all.binary_search(&one) {
         all.insert(at, one);
     }
@@ -344,9 +344,9 @@ impl Check {
         }
     }
 
-    pub(super) fn unit(&self) -> Unit {
+    pub(super) fn new_relay(&self) -> RelayState {
         let relays = self.members.len() as u16;
-        Unit {
+        RelayState {
             change: ViewChange::new(relays, 1, 1),
             flies: (ViewId::LOADED, 0, relays),
         }
@@ -364,8 +364,8 @@ impl Check {
     }
 
     /// Returns the relays that have voted on the view proposal `proposal`, as a bit mask.
-    pub(super) fn asked(chain: &Chain, proposal: ViewId) -> u8 {
-        let voters = chain.units.iter().zip(0..);
+    pub(super) fn voters(chain: &Chain, proposal: ViewId) -> u8 {
+        let voters = chain.relays.iter().zip(0..);
         let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
         let known = voters.fold(0, |members, (_, at)| members | 1 << at);
         let handed = chain
@@ -376,15 +376,15 @@ impl Check {
     }
 
     /// Sends the pending messages of relay `at`, and records a decision contained in `effects`.
-    pub(super) fn settle(&self, chain: &mut Chain, at: usize, effects: Effects) {
+    pub(super) fn apply_effects(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
-        let decides = chain.units[at].change.proposed;
-        let members = decides.map_or(0, |proposed| Self::asked(chain, proposed.view));
+        let decides = chain.relays[at].change.proposed;
+        let members = decides.map_or(0, |proposed| Self::voters(chain, proposed.view));
         let Chain {
-            units,
+            relays: units,
             air,
-            decrees,
+            decided: decrees,
             agreed,
             ..
         } = chain;
@@ -392,7 +392,7 @@ impl Check {
         let mut send = |to: usize, message: &Message| {
             if let Some(body) = Body::of(message) {
                 let from = at;
-                put(air, Frame { from, to, body });
+                insert_sorted(air, Frame { from, to, body });
             }
         };
         if let Some(to) = after
@@ -406,24 +406,24 @@ impl Check {
             }
         }
         if let Some(proposed) = unit.change.proposed
-            && let Some(LayerEvent::ProposalDecided(decided)) = effects.news
+            && let Some(LayerEvent::ProposalDecided(decided)) = effects.event
         {
             if let ProposalOutcome::Granted { relays, .. } = decided {
-                unit.flies = (proposed.view, proposed.place, relays);
+                unit.flies = (proposed.view, proposed.rank, relays);
             }
             if let Some(view) = proposed.accepted {
-                if view.id == proposed.view && view.relays == proposed.place {
-                    put(
+                if view.id == proposed.view && view.relays == proposed.rank {
+                    insert_sorted(
                         decrees,
-                        Decree {
+                        DecidedView {
                             view: (view.id, view.relays),
                             follows: proposed.poll.agreed.id,
                             members,
                         },
                     );
                 }
-                if proposed.place == 1 {
-                    put(agreed, (view.id, view.relays));
+                if proposed.rank == 1 {
+                    insert_sorted(agreed, (view.id, view.relays));
                 }
             }
         }
@@ -440,20 +440,20 @@ impl Check {
     }
 
     pub(super) fn propose(&self, chain: &mut Chain, at: usize) {
-        let newest = (0..chain.units.len())
+        let newest = (0..chain.relays.len())
             .filter(|&other| chain.parts[other] == chain.parts[at])
-            .map(|other| chain.units[other].change.electorate.promised())
+            .map(|other| chain.relays[other].change.electorate.promised())
             .max()
             .unwrap();
         let context = self.context(chain, at);
-        let change = &mut chain.units[at].change;
+        let change = &mut chain.relays[at].change;
         change.observe_view(newest);
         if change.outstanding().is_some() {
             change.observe_view(newest.next_by(self.members[at].node).unwrap());
         }
         change.request = ViewRequest::due(Instant::ZERO);
         let effects = change.handle_timeout(&context, true, false);
-        self.settle(chain, at, effects);
+        self.apply_effects(chain, at, effects);
     }
 
     pub(super) fn arrive(&self, chain: &mut Chain, frame: &Frame) {
@@ -467,31 +467,31 @@ impl Check {
         }
         let context = self.context(chain, at);
         let message = frame.body.message(self.members[0].active);
-        let effects = chain.units[at].change.handle(&context, &message);
-        self.settle(chain, at, effects);
+        let effects = chain.relays[at].change.handle(&context, &message);
+        self.apply_effects(chain, at, effects);
     }
 
     pub(super) fn end(&self, chain: &mut Chain, at: usize) {
         if chain.after(at).is_none() {
             let context = self.context(chain, at);
-            let effects = chain.units[at].change.decide(&context);
-            self.settle(chain, at, effects);
+            let effects = chain.relays[at].change.decide(&context);
+            self.apply_effects(chain, at, effects);
         }
     }
 
     pub(super) fn repeat(&self, chain: &mut Chain, at: usize) {
-        chain.units[at].change.resend();
-        self.settle(chain, at, Effects::NONE);
+        chain.relays[at].change.resend();
+        self.apply_effects(chain, at, Effects::NONE);
     }
 
     pub(super) fn pass(chain: &mut Chain, at: usize) {
         let Some(to) = chain.after(at) else {
             return;
         };
-        let Unit { change, flies } = &chain.units[at];
+        let RelayState { change, flies } = &chain.relays[at];
         let (view, place, _) = *flies;
         let knows = change.electorate.agreed().id == view && change.outstanding().is_none();
-        let next = &mut chain.units[to];
+        let next = &mut chain.relays[to];
         if knows
             && next.change.outstanding().is_none()
             && next.flies.0 == view
@@ -502,20 +502,20 @@ impl Check {
     }
 
     pub(super) fn reboot(&self, chain: &mut Chain, at: usize, remembers: bool) {
-        let electorate = chain.units[at].change.electorate;
-        chain.units[at] = self.unit();
+        let electorate = chain.relays[at].change.electorate;
+        chain.relays[at] = self.new_relay();
         if remembers {
-            chain.units[at].change.electorate = electorate;
+            chain.relays[at].change.electorate = electorate;
         }
-        self.settle(chain, at, Effects::NONE);
+        self.apply_effects(chain, at, Effects::NONE);
     }
 }
 
 impl Check {
     /// Returns true if every agreed view follows an agreed view, and no two follow the same one.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
-        let follows = |(id, _): &Sized| {
-            let decree = chain.decrees.iter().find(|decree| decree.view.0 == *id);
+        let follows = |(id, _): &SizedView| {
+            let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
             decree.map(|decree| decree.follows)
         };
         let mut before: Vec<_> = chain.agreed.iter().map(follows).collect();
@@ -532,7 +532,7 @@ impl Check {
 
     pub(super) fn has_one_size(chain: &Chain) -> bool {
         let twice = |all: &[ViewId]| all.windows(2).any(|pair| pair[0] == pair[1]);
-        let decrees: Vec<_> = chain.decrees.iter().map(|decree| decree.view.0).collect();
+        let decrees: Vec<_> = chain.decided.iter().map(|decree| decree.view.0).collect();
         let agreed: Vec<_> = chain.agreed.iter().map(|view| view.0).collect();
         !twice(&decrees) && !twice(&agreed)
     }
@@ -540,9 +540,9 @@ impl Check {
     /// Returns true if every relay's agreed view was agreed on, and has no more members than its size.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
-            || chain.units.iter().all(|unit| {
+            || chain.relays.iter().all(|unit| {
                 let view = unit.change.electorate.agreed();
-                let members = chain.units.iter().filter(|unit| {
+                let members = chain.relays.iter().filter(|unit| {
                     let electorate = unit.change.electorate;
                     electorate.agreed() == view && electorate.member
                 });
@@ -554,14 +554,14 @@ impl Check {
 }
 
 /// Maximum number of proposals that a healed chain needs.
-pub(super) const MOST: u8 = 3;
+pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {
     /// Delivers all frames among the relays in the bit mask `there`, until nothing changes any more.
     pub(super) fn drain(&self, chain: &mut Chain, there: u8) {
         loop {
             let before = chain.clone();
-            for at in (0..chain.units.len()).filter(|at| there >> at & 1 == 1) {
+            for at in (0..chain.relays.len()).filter(|at| there >> at & 1 == 1) {
                 self.end(chain, at);
                 self.repeat(chain, at);
                 Self::pass(chain, at);
@@ -579,24 +579,24 @@ impl Check {
     /// also be a quorum of all views decided on since.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
-        let agreed = (0..chain.units.len()).filter(known);
-        let agreed = agreed.map(|at| chain.units[at].change.electorate.agreed().id);
+        let agreed = (0..chain.relays.len()).filter(known);
+        let agreed = agreed.map(|at| chain.relays[at].change.electorate.agreed().id);
         let newest = agreed.max().unwrap_or(ViewId::LOADED);
         let has_most = |members: u8, proposer: u16| {
             let has_proposer = there & members & 1 << (proposer - 1) != 0;
             2 * (there & members).count_ones() + u32::from(has_proposer) > members.count_ones()
         };
-        let all = ((1_u16 << chain.units.len()) - 1) as u8;
+        let all = ((1_u16 << chain.relays.len()) - 1) as u8;
         (newest > ViewId::LOADED || has_most(all, 1))
-            && chain.decrees.iter().all(|decree| {
+            && chain.decided.iter().all(|decree| {
                 decree.view.0 < newest || has_most(decree.members, decree.view.0.proposer())
             })
     }
 
     /// Returns the number of proposals until the relays in the bit mask `there` are in one view. It is a view of them
     /// all, and they know it to be agreed on. Links between these relays are restored, all others are cut. Without a
-    /// quorum the number is 0; `None` if [`MOST`] are not enough.
-    pub(super) fn settles(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
+    /// quorum the number is 0; `None` if [`MAX_PROPOSALS`] are not enough.
+    pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {
             *part = if there >> at & 1 == 1 { 0 } else { at + 1 };
@@ -609,12 +609,12 @@ impl Check {
         if !Self::is_quorum(&chain, there) {
             return Some(0);
         }
-        for proposals in 0..=MOST {
-            let agreed = chain.units[first].change.electorate.agreed();
-            let settled = (0..chain.units.len())
+        for proposals in 0..=MAX_PROPOSALS {
+            let agreed = chain.relays[first].change.electorate.agreed();
+            let settled = (0..chain.relays.len())
                 .filter(|at| there >> at & 1 == 1)
                 .all(|at| {
-                    let Unit { change, flies } = &chain.units[at];
+                    let RelayState { change, flies } = &chain.relays[at];
                     let knows = change.electorate.agreed() == agreed && change.electorate.member;
                     knows
                         && change.circulation.stage() != Stage::Outstanding
@@ -632,11 +632,11 @@ impl Check {
 
     /// Returns true if every set of relays that is a quorum comes to one view once it is healed.
     pub(super) fn is_alive(&self, chain: &Chain) -> bool {
-        let all = ((1_u16 << chain.units.len()) - 1) as u8;
+        let all = ((1_u16 << chain.relays.len()) - 1) as u8;
         (1..=all).all(|there| {
             [true, false]
                 .iter()
-                .all(|keeps_air| self.settles(chain, there, *keeps_air).is_some())
+                .all(|keeps_air| self.proposals_needed(chain, there, *keeps_air).is_some())
         })
     }
 }
@@ -646,15 +646,15 @@ pub(super) const ONE_CHAIN: &str = "agreed views follow each other one by one";
 
 impl Model for Check {
     type State = Chain;
-    type Action = Happens;
+    type Action = ModelEvent;
 
     fn init_states(&self) -> Vec<Chain> {
         let relays = self.members.len();
         let mut chain = Chain {
-            units: vec![self.unit(); relays],
+            relays: vec![self.new_relay(); relays],
             parts: vec![0; relays],
             air: vec![],
-            decrees: vec![],
+            decided: vec![],
             agreed: vec![],
             cuts: self.cuts,
             proposals: self.proposals,
@@ -662,55 +662,55 @@ impl Model for Check {
             losses: self.losses,
         };
         for at in 0..relays {
-            self.settle(&mut chain, at, Effects::NONE);
+            self.apply_effects(&mut chain, at, Effects::NONE);
         }
         vec![chain]
     }
 
-    fn actions(&self, chain: &Chain, actions: &mut Vec<Happens>) {
-        actions.extend(chain.air.iter().copied().map(Happens::Arrives));
-        let relays = 0..chain.units.len();
+    fn actions(&self, chain: &Chain, actions: &mut Vec<ModelEvent>) {
+        actions.extend(chain.air.iter().copied().map(ModelEvent::Arrives));
+        let relays = 0..chain.relays.len();
         for at in relays {
             if chain.proposals > 0 && chain.before(at).is_none() {
-                actions.push(Happens::Proposes(at));
+                actions.push(ModelEvent::Proposes(at));
             }
             actions.extend([
-                Happens::EndsAt(at),
-                Happens::Repeats(at),
-                Happens::Passes(at),
+                ModelEvent::EndsAt(at),
+                ModelEvent::Repeats(at),
+                ModelEvent::Passes(at),
             ]);
             if chain.reboots > 0 {
-                actions.push(Happens::Reboots(at));
+                actions.push(ModelEvent::Reboots(at));
             }
             if chain.losses > 0 {
-                actions.push(Happens::Forgets(at));
+                actions.push(ModelEvent::Forgets(at));
             }
         }
         if chain.cuts > 0 {
-            actions.extend((0..self.partitions.len()).map(Happens::Part));
+            actions.extend((0..self.partitions.len()).map(ModelEvent::Part));
         }
     }
 
-    fn next_state(&self, before: &Chain, action: Happens) -> Option<Chain> {
+    fn next_state(&self, before: &Chain, action: ModelEvent) -> Option<Chain> {
         let mut chain = before.clone();
         match action {
-            Happens::Part(number) => chain.parts.clone_from(&self.partitions[number]),
-            Happens::Arrives(frame) => self.arrive(&mut chain, &frame),
-            Happens::Proposes(at) => self.propose(&mut chain, at),
-            Happens::EndsAt(at) => self.end(&mut chain, at),
-            Happens::Repeats(at) => self.repeat(&mut chain, at),
-            Happens::Passes(at) => Self::pass(&mut chain, at),
-            Happens::Reboots(at) => self.reboot(&mut chain, at, true),
-            Happens::Forgets(at) => self.reboot(&mut chain, at, false),
+            ModelEvent::Part(number) => chain.parts.clone_from(&self.partitions[number]),
+            ModelEvent::Arrives(frame) => self.arrive(&mut chain, &frame),
+            ModelEvent::Proposes(at) => self.propose(&mut chain, at),
+            ModelEvent::EndsAt(at) => self.end(&mut chain, at),
+            ModelEvent::Repeats(at) => self.repeat(&mut chain, at),
+            ModelEvent::Passes(at) => Self::pass(&mut chain, at),
+            ModelEvent::Reboots(at) => self.reboot(&mut chain, at, true),
+            ModelEvent::Forgets(at) => self.reboot(&mut chain, at, false),
         }
         if chain == *before {
             return None;
         }
         match action {
-            Happens::Part(_) => chain.cuts -= 1,
-            Happens::Proposes(_) => chain.proposals -= 1,
-            Happens::Reboots(_) => chain.reboots -= 1,
-            Happens::Forgets(_) => chain.losses -= 1,
+            ModelEvent::Part(_) => chain.cuts -= 1,
+            ModelEvent::Proposes(_) => chain.proposals -= 1,
+            ModelEvent::Reboots(_) => chain.reboots -= 1,
+            ModelEvent::Forgets(_) => chain.losses -= 1,
             _ => {}
         }
         Some(chain)

@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_back_is_what_was_stored() {
+    fn a_record_is_read_back_unchanged() {
         let mut later = busy();
         later.commit();
         for electorate in [Electorate::new(1000, 1), busy(), later] {
@@ -287,7 +287,7 @@ mod tests {
 
     /// Tries every byte with every other value: a record that is accepted encodes to the same bytes.
     #[test]
-    fn nothing_is_read_that_could_not_have_been_said() {
+    fn impossible_votes_are_not_read() {
         let mut taken = 0;
         for at in 0..ViewRecord::LENGTH {
             for value in 0..=u8::MAX {
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_relay_that_is_switched_on_again_has_said_what_it_had_said() {
+    fn a_restarted_relay_has_its_stored_votes() {
         let mut first = relay(3);
         assert_eq!(first.unpersisted(), None);
         let record = ViewRecord::new(digest(first.mission()), busy());
@@ -367,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_is_for_a_relay_of_its_mission_that_has_not_begun() {
+    fn a_record_restores_only_an_unstarted_relay_of_its_mission() {
         let record = fresh();
         let mut other = relay(4);
         assert_eq!(

@@ -139,7 +139,7 @@ pub(super) const REPEATED: Effects = Effects::DUPLICATE.by(Proposer::Neighbour);
 pub(super) const LATE: Effects = Effects::STALE.by(Proposer::Neighbour);
 
 #[test]
-fn a_proposal_is_handed_on_with_one_voice_more() {
+fn a_proposal_is_forwarded_with_one_more_vote() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     assert_eq!(relay.handle(&proposal), PROPOSED);
@@ -153,7 +153,7 @@ fn a_proposal_is_handed_on_with_one_voice_more() {
 }
 
 #[test]
-fn the_same_again_is_answered_by_what_is_known_of_it() {
+fn a_duplicate_proposal_is_answered_by_its_state() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     relay.handle(&proposal);
@@ -181,7 +181,7 @@ fn the_same_again_is_answered_by_what_is_known_of_it() {
 }
 
 #[test]
-fn a_newer_one_takes_the_place_of_one_that_is_not_decided() {
+fn a_newer_proposal_replaces_an_outstanding_one() {
     let mut relay = Relay::second();
     for view in [id(1, 1), id(1, 3), id(2, 1)] {
         let proposal = relay.proposal(view);
@@ -205,7 +205,7 @@ fn a_proposal_of_the_same_view_with_another_mission_is_another() {
 }
 
 #[test]
-fn what_is_promised_keeps_an_earlier_decision_from_being_accepted() {
+fn a_later_promise_excludes_an_earlier_decision() {
     let mut relay = Relay::second();
     for view in [id(1, 1), id(2, 1)] {
         let proposal = relay.proposal(view);
@@ -218,7 +218,7 @@ fn what_is_promised_keeps_an_earlier_decision_from_being_accepted() {
 }
 
 #[test]
-fn a_decision_is_of_the_relay_that_the_proposal_went_on_to() {
+fn a_decision_counts_only_from_the_next_relay() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     relay.handle(&proposal);
@@ -255,7 +255,7 @@ fn a_decision_is_of_the_relay_that_the_proposal_went_on_to() {
 }
 
 #[test]
-fn the_last_one_decides() {
+fn the_last_relay_decides() {
     let mut relay = Relay::new(4);
     let Message::Proposal(mut proposal) = relay.proposal(id(1, 1)) else {
         return;
@@ -263,7 +263,7 @@ fn the_last_one_decides() {
     proposal.place = 3;
     proposal.poll.votes = 3;
     let granted = Effects {
-        news: Some(LayerEvent::ProposalDecided(ProposalOutcome::Granted {
+        event: Some(LayerEvent::ProposalDecided(ProposalOutcome::Granted {
             relays: 4,
             usable_in: 0,
         })),
@@ -279,7 +279,7 @@ fn the_last_one_decides() {
 }
 
 #[test]
-fn an_earlier_view_is_accepted_and_the_leader_proposes_anew_from_there() {
+fn the_leader_proposes_again_after_a_superseded_proposal() {
     let mut relay = Relay::new(1);
     relay.leads();
     relay.onward(2).unwrap();
@@ -305,7 +305,7 @@ fn an_earlier_view_is_accepted_and_the_leader_proposes_anew_from_there() {
 
 /// Regression test: relays near the leader that did not know the newest view were refused for good.
 #[test]
-fn a_refusal_says_which_view_was_agreed_on() {
+fn a_refusal_names_the_agreed_view() {
     let view = View {
         id: id(1, 1),
         relays: 3,
@@ -332,11 +332,11 @@ fn a_refusal_says_which_view_was_agreed_on() {
         let Some(Message::Decision(back)) = third.view.poll_back() else {
             panic!("nothing is handed back")
         };
-        if effects.news == Some(LayerEvent::ProposalDecided(ProposalOutcome::NoQuorum)) {
+        if effects.event == Some(LayerEvent::ProposalDecided(ProposalOutcome::NoQuorum)) {
             refused += 1;
             assert_eq!((back.base, back.accepted), (view, None));
         }
-        let decided = second.handle(&Message::Decision(back)).news;
+        let decided = second.handle(&Message::Decision(back)).event;
         if round == 0 {
             assert_eq!(
                 decided,
@@ -358,7 +358,7 @@ fn a_refusal_says_which_view_was_agreed_on() {
 }
 
 #[test]
-fn a_decision_is_of_the_mission_that_was_proposed() {
+fn a_decision_counts_only_for_its_mission() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     relay.handle(&proposal);
@@ -377,7 +377,7 @@ fn a_decision_is_of_the_mission_that_was_proposed() {
 
 /// Checks that a decision is ignored if the relay has replaced the proposed mission by a newer one.
 #[test]
-fn who_has_lost_the_mission_has_no_part_in_its_view() {
+fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     relay.handle(&proposal);
@@ -393,7 +393,7 @@ fn who_has_lost_the_mission_has_no_part_in_its_view() {
 }
 
 #[test]
-fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
+fn an_accepted_successor_is_reported_and_decided_again() {
     let mut relay = Relay::new(4);
     let first = all(id(1, 1));
     relay
@@ -408,7 +408,7 @@ fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
     };
     proposal.place = 2;
     proposal.poll.votes = 2;
-    let decided = relay.handle(&Message::Proposal(proposal)).news;
+    let decided = relay.handle(&Message::Proposal(proposal)).event;
     assert_eq!(
         decided,
         Some(LayerEvent::ProposalDecided(ProposalOutcome::Superseded))
@@ -425,7 +425,7 @@ fn a_successor_that_was_accepted_is_told_of_and_decided_on_again() {
 }
 
 #[test]
-fn who_has_lost_the_one_after_it_decides_what_nobody_was_handed() {
+fn a_relay_without_a_next_one_decides_an_unsent_proposal() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     relay.handle(&proposal);
@@ -438,7 +438,7 @@ fn who_has_lost_the_one_after_it_decides_what_nobody_was_handed() {
 }
 
 #[test]
-fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
+fn a_forwarded_proposal_without_a_next_relay_is_abandoned() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(1, 1));
     relay.handle(&proposal);
@@ -450,7 +450,7 @@ fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
     }
     // A later proposal may end here.
     let later = relay.proposal(id(3, 1));
-    assert!(relay.handle(&later).news.is_some());
+    assert!(relay.handle(&later).event.is_some());
 }
 
 /// Regression test: a relay forwards a view proposal to one node only.
@@ -458,7 +458,7 @@ fn what_was_handed_on_is_given_up_where_nobody_is_after_it_any_more() {
 /// When only relay 1 had lost relay 2, views of different members had the same identifier: one of relays 1 to 3, one
 /// of 1 and 4.
 #[test]
-fn a_proposal_is_handed_to_one_node_alone() {
+fn a_proposal_is_forwarded_to_only_one_node() {
     let mut relay = Relay::new(1);
     let began = relay.leads();
     assert!(began.began && began.view_proposed);
@@ -483,10 +483,10 @@ fn a_proposal_is_handed_to_one_node_alone() {
 }
 
 #[test]
-fn a_leader_that_is_refused_stays_and_asks_again_later() {
+fn a_refused_leader_proposes_again_later() {
     let mut relay = Relay::second();
     relay.end = true;
-    assert_eq!(relay.leads().news, came(ProposalOutcome::NoQuorum).news);
+    assert_eq!(relay.leads().event, came(ProposalOutcome::NoQuorum).event);
     assert!(relay.view.has_no_quorum() && relay.view.request.is_pending());
     assert!(!relay.view.electorate.has_voted(relay.view.latest_view()));
     let again = relay.view.request.next_timeout().unwrap();
@@ -494,7 +494,7 @@ fn a_leader_that_is_refused_stays_and_asks_again_later() {
 }
 
 #[test]
-fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
+fn a_leader_proposes_later_views_one_at_a_time() {
     let mut relay = Relay::new(1);
     relay.view.observe_view(id(7, 3));
     assert!(relay.leads().began);
@@ -512,10 +512,10 @@ fn a_leader_proposes_after_all_it_has_heard_of_and_one_at_a_time() {
 
 /// Checks that a relay alone for hours does not use up a view number every five seconds.
 #[test]
-fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again() {
+fn a_refused_lone_leader_proposes_only_with_a_quorum() {
     let mut relay = Relay::second();
     relay.end = true;
-    assert_eq!(relay.leads().news, came(ProposalOutcome::NoQuorum).news);
+    assert_eq!(relay.leads().event, came(ProposalOutcome::NoQuorum).event);
     let newest = relay.view.latest_view();
     for _ in 0..1_000 {
         assert_eq!(relay.leads(), Effects::NONE);
@@ -529,7 +529,7 @@ fn a_leader_that_is_alone_and_was_refused_asks_itself_before_it_proposes_again()
 }
 
 #[test]
-fn who_has_missed_something_is_told_after_some_late_proposals() {
+fn late_proposals_cause_a_request_for_a_view() {
     let mut relay = Relay::second();
     let proposal = relay.proposal(id(3, 1));
     relay.handle(&proposal);

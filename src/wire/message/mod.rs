@@ -15,7 +15,7 @@ mod view;
 pub use self::link::{Claim, Hello};
 pub use self::parts::MessageError;
 pub use self::round::{
-    AdjustStep, Answer, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, Token,
+    AdjustStep, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, SweepVerdict, Token,
 };
 pub use self::view::{Decision, Poll, Proposal, Pulse, Pulsed, Successor};
 
@@ -52,7 +52,7 @@ pub enum Message {
     /// Message to the next relay of a pass: target SIRs, and the sender's reach (farthest x) for each.
     Sweep(Sweep),
     /// Reply to a sweep: its verdict, the result for each target. It acknowledges the sweep of the same number.
-    Verdict(Answer),
+    Verdict(SweepVerdict),
     /// Reply to a repeated pass message: it was received before, and its result is not known yet.
     Busy {
         /// Number of the pass along the chain that is in progress.
@@ -245,7 +245,7 @@ impl Message {
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
                 Sweep::decode(tag, body).map(Self::Sweep)
             }
-            tag::VERDICT => Answer::decode(body).map(Self::Verdict),
+            tag::VERDICT => SweepVerdict::decode(body).map(Self::Verdict),
             tag::BUSY => Ok(Self::Busy {
                 number: read::<Word>(body)?.number(),
             }),

@@ -131,7 +131,7 @@ fn checked(
 
 /// Reply to a sweep message: result for each target, and the position that the destination must take.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Answer {
+pub struct SweepVerdict {
     /// Number of the pass along the chain, as in the sweep message that is answered.
     pub number: u16,
     /// Digest of the sender's mission and view.
@@ -145,7 +145,7 @@ pub struct Answer {
     pub own: bool,
 }
 
-impl Answer {
+impl SweepVerdict {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
         let Verdict { commit, slacks } = &self.verdict;

@@ -104,7 +104,7 @@ fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Ses
 }
 
 #[test]
-fn three_handshakes_make_a_link_known_and_four_where_they_cross() {
+fn a_link_is_proven_by_three_handshakes_or_four_if_crossed() {
     for crossing in [false, true] {
         let (mut one, mut other) = (session(), session());
         one.greet(2);
@@ -121,7 +121,7 @@ fn three_handshakes_make_a_link_known_and_four_where_they_cross() {
 
 /// Checks that a lost handshake does no lasting harm. The node without a proof requests again, and receives a reply.
 #[test]
-fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
+fn one_lost_handshake_leaves_both_ends_proven() {
     for lost in 0..4 {
         let (mut one, mut other) = (session(), session());
         one.greet(2);
@@ -154,7 +154,7 @@ fn a_lost_handshake_leaves_nobody_in_doubt_for_good() {
 }
 
 #[test]
-fn a_body_of_a_handshake_says_who_is_known() {
+fn a_handshake_body_contains_the_known_nonces() {
     let mut own = session();
     assert_eq!(own.handshake(2), [0; HANDSHAKE_LENGTH]);
     own.greet(2);
@@ -176,7 +176,7 @@ fn a_body_of_a_handshake_says_who_is_known() {
 
 /// Checks that a full table keeps pinned entries and the last used one. Recorded frames are rejected.
 #[test]
-fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
+fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     let mut own = session();
     own.pin([Some(2), Some(3)]);
     let mut counters = [0; 2];
@@ -220,7 +220,7 @@ fn who_was_forgotten_is_met_anew_and_nothing_recorded_is_taken_again() {
 
 /// Checks that replayed handshakes of many nodes replace only entries of unproven nodes.
 #[test]
-fn recorded_handshakes_do_not_drive_out_who_is_known() {
+fn recorded_handshakes_do_not_replace_known_nodes() {
     let mut handshakes = Vec::new();
     for node in 100..200 {
         let mut stranger = Session::new(Auth { key: KEY, epoch: 1 }, 0, GONE);
@@ -248,7 +248,7 @@ fn recorded_handshakes_do_not_drive_out_who_is_known() {
 /// Checks that `greet` starts a session again after one node has forgotten the other. Before that, the restarted node
 /// cannot verify any frame.
 #[test]
-fn a_greeting_mends_what_only_one_end_knows() {
+fn a_handshake_repairs_a_link_known_at_one_end() {
     let mut own = session();
     let mut counters = [0; 2];
     met(&mut own, 2, 1, &mut counters);
@@ -285,9 +285,9 @@ fn a_handshake_of_another_length_is_forged() {
 }
 
 #[test]
-fn after_the_last_nonce_nobody_new_is_met() {
+fn after_the_last_nonce_no_new_node_is_accepted() {
     let mut own = session();
-    own.made = u32::MAX - 1;
+    own.last_number = u32::MAX - 1;
     own.greet(2);
     own.greet(3);
     assert_eq!(own.take_handshake(), Some(2));
@@ -297,7 +297,7 @@ fn after_the_last_nonce_nobody_new_is_met() {
 
 /// Checks that handshakes of an older or reused epoch are reported once. A replayed recording is not reported.
 #[test]
-fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not() {
+fn an_epoch_that_went_back_is_reported_once_a_replay_never() {
     for epoch in [1, 7] {
         let mut own = session();
         let mut counters = [0; 2];
@@ -319,7 +319,7 @@ fn an_epoch_that_went_back_is_told_once_and_a_frame_that_is_played_again_is_not(
 }
 
 #[test]
-fn what_the_node_itself_says_in_between_keeps_old_handshakes_from_being_told() {
+fn frames_in_between_prevent_the_report_of_old_handshakes() {
     let mut own = session();
     let mut counters = [0; 2];
     let mut other = met(&mut own, 2, 7, &mut counters);
@@ -367,7 +367,7 @@ fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
 
 /// Checks that the relay recognises the echo of its own frames, a handshake and a message.
 #[test]
-fn frames_of_its_own_are_recognised() {
+fn own_frames_are_recognised() {
     let mut counters = [0; 2];
     let mut own = session();
     met(&mut own, 2, 7, &mut counters);
@@ -380,7 +380,7 @@ fn frames_of_its_own_are_recognised() {
 /// Checks that of two nodes with one number, the one with the smaller claim learns of the other. Node 1 accepts the
 /// larger claim and shows it to the node with the smaller one.
 #[test]
-fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
+fn the_smaller_claim_receives_the_larger_one() {
     const FAR: u32 = 1 << 20;
     let auth = Auth { key: KEY, epoch: 7 };
     for first_is_larger in [false, true] {
@@ -425,7 +425,7 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_shown_the_larger() {
 /// Checks that the smaller claim is accepted once the node with the larger one is silent. Recordings of the larger
 /// one are rejected until that node itself is received.
 #[test]
-fn of_two_nodes_of_one_epoch_the_smaller_claim_is_believed_once_the_larger_is_silent() {
+fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;
     let auth = Auth { key: KEY, epoch: 7 };
     let mut counters = [0; 2];
@@ -460,7 +460,7 @@ fn of_two_nodes_of_one_epoch_the_smaller_claim_is_believed_once_the_larger_is_si
         Checked::Fresh { first: true }
     );
     assert_eq!(check_at(&mut one, 26, &later), Checked::Forged);
-    large.ask(1);
+    large.request_reply(1);
     let again = frame(&mut large, (2, 1), true, counters[1] + 2);
     assert_eq!(check_at(&mut one, 27, &again), Checked::Unproven);
 }

@@ -24,12 +24,12 @@ const POSITION_ERROR_M: f32 = 1.5;
 
 /// Static storage of the relay and its field points, to save stack.
 #[derive(Debug)]
-pub struct Room {
-    field: config::Room,
+pub struct DroneStorage {
+    field: config::FieldStorage,
     relay: Option<Relay>,
 }
 
-impl Room {
+impl DroneStorage {
     /// Creates empty storage for a relay and its field points.
     pub const fn new() -> Self {
         Self {
@@ -39,7 +39,7 @@ impl Room {
     }
 }
 
-impl Default for Room {
+impl Default for DroneStorage {
     fn default() -> Self {
         Self::new()
     }
@@ -71,22 +71,22 @@ pub(crate) struct Drone<F> {
     pub(crate) autopilot: Option<AsyncAutopilot>,
 }
 
-/// Creates the drone of a board, and stores its relay in `room`. `flies` is true if there is a port to an autopilot.
+/// Creates the drone of a board, and stores its relay in `storage`. `flies` is true if there is a port to an autopilot.
 pub(crate) fn begin<F: NorFlash>(
-    room: &'static mut Room,
+    storage: &'static mut DroneStorage,
     mut board: Board<F>,
     wiring: Wiring,
     flies: bool,
     now: Instant,
 ) -> Result<Drone<F>, Refused> {
     log::started(board.reset);
-    let said = config::read(&board.block, &mut room.field).map_err(Refused::Block)?;
-    log::begins(&said);
+    let parsed = config::read(&board.block, &mut storage.field).map_err(Refused::Block)?;
+    log::begins(&parsed);
     let auth = sign(&mut board)?;
-    let autopilot = match &said.sites {
+    let autopilot = match &parsed.sites {
         Some(_) if !flies => return Err(Refused::NoAutopilot),
         Some(sites) => {
-            let course = Course::try_new(sites.on_earth(), sites.speed_m_s, &said.mission);
+            let course = Course::try_new(sites.on_earth(), sites.speed_m_s, &parsed.mission);
             let Course { axis, pace } = course.map_err(Refused::Course)?;
             log::flies(axis.distance_m(), pace.speed_m_s);
             let mut link = Autopilot::new(axis, pace, now);
@@ -98,7 +98,7 @@ pub(crate) fn begin<F: NorFlash>(
             }
             if board.reset == Reset::Watchdog {
                 // The empty queue has room for the line.
-                let _ = link.say("relay: restarted by its watchdog");
+                let _ = link.send_text("relay: restarted by its watchdog");
             }
             Some(AsyncAutopilot::new(link))
         }
@@ -109,15 +109,15 @@ pub(crate) fn begin<F: NorFlash>(
     };
     let settings = Settings {
         auth,
-        guard: said.sites.map(|sites| GuardConfig {
+        guard: parsed.sites.map(|sites| GuardConfig {
             hover_m: POSITION_ERROR_M,
             lag: Pace::of_speed(sites.speed_m_s).stopping_time(),
-            ..GuardConfig::of(&said.mission, said.profile)
+            ..GuardConfig::of(&parsed.mission, parsed.profile)
         }),
-        ..said.settings(wiring)
+        ..parsed.settings(wiring)
     };
-    let (slot, identity) = (&mut room.relay, said.identity);
-    let relay = Relay::new_in(slot, &said.mission, identity, &settings, board.seed, now);
+    let (slot, identity) = (&mut storage.relay, parsed.identity);
+    let relay = Relay::new_in(slot, &parsed.mission, identity, &settings, board.seed, now);
     let relay = relay.map_err(Refused::Setup)?;
     let votes = (board.storage).map(|storage| Votes::resume(storage, &board.block, relay, now));
     Ok(Drone {

@@ -34,7 +34,7 @@ use uav_relay::{Instant, Relay, ViewRecord, Wiring};
 use uav_relay_chip::watchdog;
 
 use board::Board;
-use drone::{Drone, Refused, Room};
+use drone::{Drone, DroneStorage, Refused};
 
 /// Bit rate of every port, bit/s, 8N1.
 pub use uav_relay_block::BAUD;
@@ -118,7 +118,7 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
 /// # Errors
 /// The reason why the drone does not join the chain, which is logged, too.
 pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read, AW: Write>(
-    room: &'static mut Room,
+    store: &'static mut DroneStorage,
     board: Board<F>,
     (up_rx, up_tx): (UR, UW),
     (down_rx, down_tx): (DR, DW),
@@ -130,7 +130,7 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
         AsyncLink::new(down_rx, down_tx, BAUD),
     );
     fly_over(
-        room,
+        store,
         board,
         Wiring::Pair,
         autopilot,
@@ -145,7 +145,7 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
 /// # Errors
 /// Those of [`fly`].
 pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, AW: Write>(
-    room: &'static mut Room,
+    store: &'static mut DroneStorage,
     board: Board<F>,
     (rx, tx): (R, W),
     pin: D,
@@ -154,7 +154,7 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
 ) -> Result<Infallible, Refused> {
     let mut ports = AsyncShared::new(AsyncLink::half_duplex(rx, tx, BAUD, pin));
     fly_over(
-        room,
+        store,
         board,
         Wiring::Shared,
         autopilot,
@@ -166,14 +166,20 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
 
 /// Runs the relay of `board` over the ports that `run` serves. It stores changed votes before it sends.
 async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
-    room: &'static mut Room,
+    store: &'static mut DroneStorage,
     board: Board<F>,
     wiring: Wiring,
     autopilot: Option<(AR, AW)>,
     feed: &mut dyn FnMut(),
     run: impl AsyncFnOnce(&AsyncRelay<'_>, &mut dyn FnMut(&ViewRecord) -> bool) -> Infallible,
 ) -> Result<Infallible, Refused> {
-    let drone = drone::begin(room, board, wiring, autopilot.is_some(), EmbassyClock.now());
+    let drone = drone::begin(
+        store,
+        board,
+        wiring,
+        autopilot.is_some(),
+        EmbassyClock.now(),
+    );
     let Drone {
         relay,
         mut votes,

@@ -33,9 +33,9 @@ pub(crate) fn unsigned() {
     warn!("no key: frames are not signed, and anybody in range can send frames");
 }
 
-/// Logs the signing epoch; `kept` is true if it was stored.
-pub(crate) fn signs(epoch: u32, kept: bool) {
-    if kept {
+/// Logs the signing epoch; `is_stored` is true if it was stored.
+pub(crate) fn signs(epoch: u32, is_stored: bool) {
+    if is_stored {
         info!("frames are signed, epoch {}", epoch);
     } else {
         error!(
@@ -63,18 +63,18 @@ pub(crate) fn signs_to_autopilot() {
     );
 }
 
-/// Logs the votes restored after a reboot; `taken` is true if the relay accepts them.
-pub(crate) fn stands_by(taken: bool) {
-    if taken {
+/// Logs the votes restored after a reboot; `accepted` is true if the relay accepts them.
+pub(crate) fn votes_restored(accepted: bool) {
+    if accepted {
         info!("votes on views restored from flash");
     } else {
         error!("votes on views in flash are of another firmware, and ignored");
     }
 }
 
-/// Logs that storing the relay's votes works again (`kept` is true) or fails (`kept` is false).
-pub(crate) fn votes(kept: bool) {
-    if kept {
+/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (`is_stored` is false).
+pub(crate) fn votes(is_stored: bool) {
+    if is_stored {
         info!("votes on views can be stored again");
     } else {
         error!("votes on views cannot be stored: a reboot in flight loses them");

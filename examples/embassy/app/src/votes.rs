@@ -15,7 +15,7 @@ pub(crate) struct Votes<F> {
     flash: Nor<F>,
     /// CRC of the configuration block. Votes stored under another block are ignored.
     block: u32,
-    said: Views,
+    view: Views,
 }
 
 impl<F: NorFlash> Votes<F> {
@@ -28,16 +28,16 @@ impl<F: NorFlash> Votes<F> {
     ) -> Self {
         let block = (block.last_chunk()).map_or(0, |bytes| u32::from_le_bytes(*bytes));
         let mut flash = Nor::new(storage.flash, storage.views);
-        let kept = journal(&mut flash, block);
-        let said = Views::resume(relay, now, kept, log::stands_by);
-        Self { flash, block, said }
+        let stored = journal(&mut flash, block);
+        let view = Views::resume(relay, now, stored, log::votes_restored);
+        Self { flash, block, view }
     }
 
     /// Stores the relay's changed votes, `record`. If the write fails, the relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) {
-        let Self { flash, block, said } = self;
-        if let Some(kept) = said.store(record, journal(flash, *block)) {
-            log::votes(kept);
+        let Self { flash, block, view } = self;
+        if let Some(stored) = view.store(record, journal(flash, *block)) {
+            log::votes(stored);
         }
     }
 }

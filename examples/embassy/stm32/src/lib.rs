@@ -13,21 +13,21 @@ use embassy_stm32::usart::{
 use embassy_stm32::{Peri, Peripherals};
 use panic_probe as _;
 use relay_app::{BAUD, Buffers};
-use uav_relay_chip::clock::{self, Clocks, Plan, Source};
+use uav_relay_chip::clock::{self, ClockHardware, Clocks, Source};
 use uav_relay_chip::registers::Chip;
 use uav_relay_chip::reset::Reset;
 use uav_relay_chip::watchdog;
 
-/// Starts the watchdog and the clocks of `plan`. Returns the peripherals and the cause of the last reset.
+/// Starts the watchdog and the clocks of `hardware`. Returns the peripherals and the cause of the last reset.
 ///
 /// Embassy waits for its clocks without a limit, so we first probe the clock tree with bounded waits; if a clock stops in
 /// between, the watchdog restarts the chip.
-pub fn init(plan: &Plan) -> (Peripherals, Reset) {
+pub fn init(hardware: &ClockHardware) -> (Peripherals, Reset) {
     let reset = Reset::take(&mut Chip);
     watchdog::start(&mut Chip);
-    let clocks = clock::probe(&mut Chip, plan);
+    let clocks = clock::probe(&mut Chip, hardware);
     let mut config = embassy_stm32::Config::default();
-    config.rcc = tree(plan, clocks);
+    config.rcc = tree(hardware, clocks);
     let peripherals = embassy_stm32::init(config);
     clock::cache_flash(&mut Chip);
     defmt::info!("clock {} MHz", clocks.core_hz / 1_000_000);
@@ -40,9 +40,9 @@ pub fn feed() {
 }
 
 /// Returns Embassy's clock settings for the frequencies that the probe has reached.
-fn tree(plan: &Plan, clocks: Clocks) -> rcc::Config {
+fn tree(hardware: &ClockHardware, clocks: Clocks) -> rcc::Config {
     let mut config = rcc::Config::new();
-    let (Some(source), Some(crystal)) = (clocks.pll, plan.crystal) else {
+    let (Some(source), Some(crystal)) = (clocks.pll, hardware.crystal) else {
         return config;
     };
     let prediv = match source {

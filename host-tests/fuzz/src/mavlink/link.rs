@@ -154,7 +154,7 @@ impl Link {
             }
             13 => {
                 let text = String::from_utf8_lossy(input.piece()).into_owned();
-                without_allocation(|| self.autopilot.say(&text));
+                without(|| self.autopilot.send_text(&text));
             }
             14 => {
                 self.rx = if input.flag() { MOVED } else { RX };

@@ -12,7 +12,7 @@ use uav_relay_sim::command;
 use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
 use uav_relay_tools::plan::flown::{Flown, flown, is_current};
 use uav_relay_tools::provision::block::Flight;
-use uav_relay_tools::provision::config::{ADDRESS, LEN, MOST_PROBE_AFTER_MS, Secret};
+use uav_relay_tools::provision::config::{ADDRESS, LEN, MAX_PROBE_AFTER_MS, Secret};
 use uav_relay_tools::provision::folder::{Heading, summary};
 use uav_relay_tools::provision::{block, folder};
 
@@ -389,7 +389,7 @@ struct Options {
     baud: u32,
     /// Milliseconds of silence after which a relay probes a neighbour, 1 to 1200000. After three times as many the neighbour counts
     /// as lost. By default those of the scenario's section `network`, or 5000. Larger values let a slow channel carry more relays
-    #[arg(long, value_name = "MS", value_parser = whole(1, MOST_PROBE_AFTER_MS))]
+    #[arg(long, value_name = "MS", value_parser = whole(1, MAX_PROBE_AFTER_MS))]
     probe_after_ms: Option<u32>,
     /// Number of relays within range of each other on the channel, 1 to 1000; by default all of them
     #[arg(long, value_name = "K", value_parser = whole::<u16>(1, 1000))]

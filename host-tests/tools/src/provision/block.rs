@@ -11,7 +11,7 @@ use uav_relay_scenario::mission::Refusal;
 use uav_relay_scenario::{AirGround, ChannelSpec, Scenario, mission};
 
 use super::config::{
-    BAUD, Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, MOST_PROBE_AFTER_MS,
+    BAUD, Block, ChannelNumbers, Config, ConfigError, EMPTY, MAX_POINTS, MAX_PROBE_AFTER_MS,
     Secret, Sites, autopilot_key, read, secret, write,
 };
 
@@ -296,9 +296,9 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
         return Err(format!("{line}; a radio's own data rate is --baud"));
     }
     let probe_after_ms = given_ms.or(section.probe_after_ms).unwrap_or(0);
-    if probe_after_ms > MOST_PROBE_AFTER_MS {
+    if probe_after_ms > MAX_PROBE_AFTER_MS {
         return Err(format!(
-            "{name}: network.probe_after_ms = {probe_after_ms}: must be within 1 to {MOST_PROBE_AFTER_MS}"
+            "{name}: network.probe_after_ms = {probe_after_ms}: must be within 1 to {MAX_PROBE_AFTER_MS}"
         ));
     }
     let [_, dead_after] = silence(probe_after_ms);

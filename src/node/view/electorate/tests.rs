@@ -82,7 +82,7 @@ const fn granted(id: ViewId, relays: u16) -> View {
 /// Checks all parts of chains of up to seven relays: a part decides on a view if it is a quorum. That is more than
 /// half of the relays, or half with the initial leader.
 #[test]
-fn more_than_half_decide_or_half_with_the_elder() {
+fn more_than_half_or_half_with_the_initial_leader_decide() {
     for relays in 1..=7_u16 {
         for part in 1..1_u32 << relays {
             let nodes: Vec<u16> = (1..=relays)
@@ -109,7 +109,7 @@ fn more_than_half_decide_or_half_with_the_elder() {
 }
 
 #[test]
-fn the_members_of_the_view_decide_and_not_those_who_are_there() {
+fn only_members_of_the_view_decide() {
     let mut chain = Chain::of(5);
     let first = chain.propose(&[1, 2, 3], id(1, 1), 3);
     assert_eq!(first, Some(granted(id(1, 1), 3)));
@@ -128,7 +128,7 @@ fn the_members_of_the_view_decide_and_not_those_who_are_there() {
 }
 
 #[test]
-fn of_a_split_view_the_half_of_its_proposer_goes_on() {
+fn of_a_split_view_the_half_with_its_proposer_decides() {
     for (part, goes_on) in [(&[3, 4][..], true), (&[1, 2], false), (&[2, 3], true)] {
         let mut chain = Chain::of(4);
         // Node 3 proposes, and the other nodes receive the decision in two ways.
@@ -147,7 +147,7 @@ fn of_a_split_view_the_half_of_its_proposer_goes_on() {
 }
 
 #[test]
-fn what_may_be_agreed_on_is_decided_on_again() {
+fn a_view_that_may_be_agreed_on_is_decided_again() {
     let mut chain = Chain::of(3);
     // Only the last relay has received the decision.
     assert_eq!(
@@ -173,7 +173,7 @@ fn what_may_be_agreed_on_is_decided_on_again() {
 /// Checks that a view of all relays is accepted even if most of them have lost their votes. Otherwise a chain with
 /// most relays restarted would never fly again.
 #[test]
-fn all_of_the_mission_are_a_view_whatever_they_remember() {
+fn all_relays_of_the_mission_are_always_a_view() {
     let mut chain = Chain::of(3);
     assert_eq!(
         chain.propose(&[1, 2, 3], id(1, 1), 1),
@@ -193,7 +193,7 @@ fn all_of_the_mission_are_a_view_whatever_they_remember() {
 }
 
 #[test]
-fn of_two_that_were_accepted_the_later_proposal_is_decided_on_again() {
+fn of_two_accepted_proposals_the_later_is_decided_again() {
     for accepted_first in [1, 3] {
         let mut chain = Chain::of(4);
         let early = Successor {
@@ -223,7 +223,7 @@ fn of_two_that_were_accepted_the_later_proposal_is_decided_on_again() {
 }
 
 #[test]
-fn a_promise_keeps_what_was_decided_before_from_being_accepted() {
+fn a_promise_excludes_earlier_decisions() {
     let mut chain = Chain::of(3);
     assert_eq!(
         chain.propose(&[1, 2, 3], id(2, 1), 0),
@@ -244,7 +244,7 @@ fn a_promise_keeps_what_was_decided_before_from_being_accepted() {
 }
 
 #[test]
-fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
+fn the_next_proposal_spreads_the_agreed_view() {
     let mut chain = Chain::of(4);
     chain.propose(&[1, 2, 3], id(1, 1), 3);
     let poll = chain.poll(&[1, 2, 3, 4], id(2, 1));
@@ -261,7 +261,7 @@ fn all_know_by_the_next_proposal_what_one_knows_to_be_agreed_on() {
 
 /// A relay that votes before one that knows the newer view votes in the older view. Its vote does not count.
 #[test]
-fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
+fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);
     chain.propose(&[1, 2, 3], id(1, 1), 3);
     chain.0[2].commit();
@@ -271,7 +271,7 @@ fn who_does_not_know_the_view_has_no_voice_in_it_yet() {
 }
 
 #[test]
-fn commit_is_of_what_was_accepted_last() {
+fn commit_applies_to_the_last_accepted_view() {
     let mut chain = Chain::of(3);
     assert_eq!(
         chain.propose(&[1, 2, 3], id(1, 1), 2),
@@ -290,7 +290,7 @@ fn commit_is_of_what_was_accepted_last() {
 }
 
 #[test]
-fn others_may_rely_on_members_alone() {
+fn only_members_may_be_relied_on() {
     let mut chain = Chain::of(3);
     let poll = chain.0[1].vote(2, id(1, 1), None, left(70)).unwrap();
     let poll = chain.0[2].vote(3, id(1, 1), Some(poll), left(40)).unwrap();
@@ -303,7 +303,7 @@ fn others_may_rely_on_members_alone() {
 /// A refused proposal needs no room in the list of votes. The list holds a limited number of proposals without a
 /// known decision.
 #[test]
-fn votes_are_remembered_until_what_came_of_them_is_known() {
+fn votes_are_kept_until_their_result_is_known() {
     let mut relay = Electorate::new(3, 1);
     let view = View {
         id: id(1, 1),
@@ -343,7 +343,7 @@ fn votes_are_remembered_until_what_came_of_them_is_known() {
 /// Shows that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
 /// view, forgets it, and votes in the initial view.
 #[test]
-fn one_that_forgets_what_it_said_may_decide_beside_the_view() {
+fn a_relay_without_its_record_may_decide_a_second_view() {
     let mut chain = Chain::of(5);
     assert_eq!(
         chain.propose(&[3, 4, 5], id(1, 3), 3),

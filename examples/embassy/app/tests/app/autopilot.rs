@@ -22,24 +22,24 @@ fn a_drone_with_sites_is_flown_to_its_place_and_released() {
     let mut bench = Bench::with(Vehicle::new(start));
     bench.boot(Ram::blank().board(&block_alone(SITES), 1));
     bench.run(5_000);
-    assert!(bench.vehicle().told.is_empty(), "on the ground");
+    assert!(bench.vehicle().targets.is_empty(), "on the ground");
 
     bench.vehicle().flies = true;
     bench.run(5_000);
-    let told = std::mem::take(&mut bench.vehicle().told);
-    assert!(told.len() > 10, "{told:?}");
-    assert!(told.iter().all(|place| apart(*place, start) < 0.1));
+    let targets = std::mem::take(&mut bench.vehicle().targets);
+    assert!(targets.len() > 10, "{targets:?}");
+    assert!(targets.iter().all(|place| apart(*place, start) < 0.1));
 
     bench.vehicle().granted = true;
     let mut before = start;
     for _ in 0..150 {
         bench.run(1_000);
         // Speed limit 5 m/s.
-        for place in std::mem::take(&mut bench.vehicle().told) {
+        for place in std::mem::take(&mut bench.vehicle().targets) {
             assert!(apart(place, before) < 1.2, "{before:?}, then {place:?}");
             before = place;
         }
-        bench.vehicle().told.push(before);
+        bench.vehicle().targets.push(before);
     }
     let expected = alone(SITES);
     let place = bench.vehicle().place;
@@ -52,11 +52,11 @@ fn a_drone_with_sites_is_flown_to_its_place_and_released() {
     bench.run(2_000);
     bench.vehicle().place.x_m += 60.0;
     bench.run(2_000);
-    bench.vehicle().told.clear();
+    bench.vehicle().targets.clear();
     bench.run(5_000);
     let place = bench.vehicle().place;
-    let told = &bench.vehicle().told;
-    assert!(told.len() > 10 && told.iter().all(|to| apart(*to, place) < 0.1));
+    let targets = &bench.vehicle().targets;
+    assert!(targets.len() > 10 && targets.iter().all(|to| apart(*to, place) < 0.1));
 }
 
 #[test]

@@ -14,7 +14,7 @@ use embedded_hal::digital::{ErrorType as PinType, OutputPin};
 use embedded_io_async::{ErrorType, Read, Write};
 use relay_app::EmbassyClock;
 use relay_app::board::Board;
-use relay_app::drone::{Refused, Room};
+use relay_app::drone::{DroneStorage, Refused};
 use uav_relay::MAX_FRAME;
 use uav_relay::asynch::Clock as _;
 use uav_relay::channel::AirGround;
@@ -181,9 +181,10 @@ pub(crate) fn block_alone(sites: Sites) -> Block {
 
 /// Returns the position that the only relay of a chain chooses between these sites.
 pub(crate) fn alone(sites: Sites) -> Placement {
-    let said = config(1, 1, Some(sites));
+    let parsed = config(1, 1, Some(sites));
     let now = Instant::ZERO;
-    let mut relay = Relay::new(said.mission, said.identity, Settings::default(), 1, now).unwrap();
+    let mut relay =
+        Relay::new(parsed.mission, parsed.identity, Settings::default(), 1, now).unwrap();
     for millis in (0..30_000).step_by(10) {
         relay.handle_timeout(Instant::from_millis(millis));
     }
@@ -231,11 +232,11 @@ fn feed() -> impl FnMut() {
 }
 
 fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)>) -> Running {
-    let room = Box::leak(Box::new(Room::new()));
+    let storage = Box::leak(Box::new(DroneStorage::new()));
     let nobody = (Pipe::default(), Pipe::default());
     Box::pin(async move {
         let mut feed = feed();
-        relay_app::fly(room, board, nobody, (rx, tx), autopilot, &mut feed).await
+        relay_app::fly(storage, board, nobody, (rx, tx), autopilot, &mut feed).await
     })
 }
 
@@ -262,8 +263,8 @@ impl Bench {
         };
         let now = EmbassyClock.now();
         let other = |index| {
-            let said = config(relays, index, None);
-            Relay::new(said.mission, said.identity, settings, index.into(), now).unwrap()
+            let parsed = config(relays, index, None);
+            Relay::new(parsed.mission, parsed.identity, settings, index.into(), now).unwrap()
         };
         Self {
             wiring,
@@ -286,11 +287,11 @@ impl Bench {
         self.drone = Some(match self.wiring {
             Wiring::Pair => running(board, back, there, autopilot),
             Wiring::Shared => {
-                let room = Box::leak(Box::new(Room::new()));
+                let storage = Box::leak(Box::new(DroneStorage::new()));
                 let radio = (back, there);
                 Box::pin(async move {
                     let mut feed = feed();
-                    relay_app::fly_shared(room, board, radio, Enable, autopilot, &mut feed).await
+                    relay_app::fly_shared(storage, board, radio, Enable, autopilot, &mut feed).await
                 })
             }
         });
@@ -373,7 +374,7 @@ impl Bench {
     }
 
     /// Returns the number of frames that relay 2 rejected for their signature.
-    pub(crate) fn disbelieved(&self) -> u32 {
+    pub(crate) fn signature_rejections(&self) -> u32 {
         let stats = self.others[0].stats();
         stats.unsigned + stats.forged + stats.replayed
     }

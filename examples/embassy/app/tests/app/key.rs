@@ -22,39 +22,39 @@ fn epoch(flash: &Ram) -> Option<u32> {
 }
 
 #[test]
-fn its_epoch_rises_at_every_start_and_its_neighbour_believes_it_each_time() {
+fn neighbours_accept_the_epoch_of_every_start() {
     let flash = Ram::blank();
     let mut bench = Bench::new();
     for start in 1..=4 {
         bench.boot(flash.board(&block(Some(1), None), start));
         // A relay that returns often is observed for longer before it is readmitted.
-        let told = bench.run(60_000);
-        assert!(told.contains(&Event::Converged), "start {start}: {told:?}");
+        let seen = bench.run(60_000);
+        assert!(seen.contains(&Event::Converged), "start {start}: {seen:?}");
         assert_eq!(epoch(&flash), Some(start));
         bench.switch_off();
-        let told = bench.run(LOST);
+        let seen = bench.run(LOST);
         let lost = |event: &Event| matches!(event, Event::NeighbourLost { .. });
-        assert!(told.iter().any(lost), "start {start}: {told:?}");
+        assert!(seen.iter().any(lost), "start {start}: {seen:?}");
     }
-    assert_eq!(bench.disbelieved(), 0);
+    assert_eq!(bench.signature_rejections(), 0);
 }
 
 /// Restarts a relay with an older epoch, or with the same epoch and seed. Its neighbour rejects it, because it may be
 /// a replay. (The same epoch with another seed is a duplicate index, which the library's tests cover.)
 #[test]
-fn one_that_forgets_its_epoch_is_not_believed() {
+fn frames_with_a_forgotten_epoch_are_rejected() {
     for (epoch, seed) in [(1, 2), (2, 1)] {
         let mut bench = Bench::new();
         bench.boot(Ram::blank().board(&block(Some(2), None), 1));
-        let told = bench.run(10_000);
-        assert!(told.contains(&Event::Converged), "{told:?}");
+        let seen = bench.run(10_000);
+        assert!(seen.contains(&Event::Converged), "{seen:?}");
         bench.switch_off();
         bench.run(LOST);
         bench.boot(Ram::blank().board(&block(Some(epoch), None), seed));
-        let told = bench.run(10_000);
-        assert!(!told.contains(&Event::Converged), "{epoch}: {told:?}");
+        let seen = bench.run(10_000);
+        assert!(!seen.contains(&Event::Converged), "{epoch}: {seen:?}");
         let went_back = Event::EpochWentBack { node: 1 };
-        assert!(told.contains(&went_back), "{epoch}: {told:?}");
+        assert!(seen.contains(&went_back), "{epoch}: {seen:?}");
     }
 }
 
@@ -82,7 +82,7 @@ fn the_epoch_rises_through_full_sectors() {
 }
 
 #[test]
-fn a_board_that_cannot_do_it_says_why() {
+fn a_board_reports_why_it_cannot_start() {
     let board = |epoch, sites| Ram::blank().board(&block(epoch, sites), 1);
     let no_flash = Board {
         storage: None,

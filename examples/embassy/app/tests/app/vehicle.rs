@@ -24,7 +24,7 @@ pub(crate) struct Vehicle {
     /// Text messages for the operator that the autopilot has received from the relay.
     pub(crate) texts: Vec<String>,
     /// Target positions that the autopilot has received since a test last cleared them.
-    pub(crate) told: Vec<Placement>,
+    pub(crate) targets: Vec<Placement>,
 }
 
 impl Vehicle {
@@ -39,7 +39,7 @@ impl Vehicle {
             flies: false,
             granted: false,
             texts: Vec::new(),
-            told: Vec::new(),
+            targets: Vec::new(),
         }
     }
 
@@ -50,9 +50,9 @@ impl Vehicle {
 
     pub(crate) fn step(&mut self) {
         self.millis += 1;
-        self.hear();
+        self.receive();
         if self.granted
-            && let Some(to) = self.told.last()
+            && let Some(to) = self.targets.last()
         {
             for (own, to) in [
                 (&mut self.place.x_m, to.x_m),
@@ -66,11 +66,11 @@ impl Vehicle {
             let mode: u32 = if self.granted { 6 << 16 } else { 3 << 16 };
             let armed = if self.flies { 128 } else { 0 };
             let rest = [2, 12, 1 | armed, 4, 3];
-            self.say(id::HEARTBEAT, &[&mode.to_le_bytes()[..], &rest].concat());
+            self.send(id::HEARTBEAT, &[&mode.to_le_bytes()[..], &rest].concat());
         }
         if self.millis.is_multiple_of(500) {
             let landed = if self.flies { 2 } else { 1 };
-            self.say(id::EXTENDED_SYS_STATE, &[0, landed]);
+            self.send(id::EXTENDED_SYS_STATE, &[0, landed]);
         }
         if self.millis.is_multiple_of(200) {
             let at = self.axis.point(self.place).unwrap();
@@ -78,11 +78,11 @@ impl Vehicle {
             for part in [at.lat_e7, at.lon_e7, at.amsl_mm, 0, 0, 0] {
                 payload.extend(part.to_le_bytes());
             }
-            self.say(id::GLOBAL_POSITION_INT, &payload);
+            self.send(id::GLOBAL_POSITION_INT, &payload);
         }
     }
 
-    fn say(&mut self, id: u32, payload: &[u8]) {
+    fn send(&mut self, id: u32, payload: &[u8]) {
         let [a, b, c, _] = id.to_le_bytes();
         let length = u8::try_from(payload.len()).unwrap();
         let mut frame = vec![MAGIC, length, 0, 0, self.sequence, 1, 1, a, b, c];
@@ -93,7 +93,7 @@ impl Vehicle {
         embassy_futures::block_on(self.uart[0].write(&frame)).unwrap();
     }
 
-    fn hear(&mut self) {
+    fn receive(&mut self) {
         let mut bytes = [0; 64];
         let count = self.uart[1].take(&mut bytes);
         self.waiting.extend(&bytes[..count]);
@@ -112,7 +112,7 @@ impl Vehicle {
                     #[expect(clippy::cast_possible_truncation, reason = "millimetres")]
                     amsl_mm: (f32::from_le_bytes(word(12)) * 1e3) as i32,
                 };
-                self.told.push(self.axis.place(point).unwrap());
+                self.targets.push(self.axis.place(point).unwrap());
             }
             if frame[7..HEADER] == id::STATUSTEXT.to_le_bytes()[..3] {
                 let text = &frame[HEADER + 1..end - CHECKSUM];
@@ -125,7 +125,7 @@ impl Vehicle {
                 answer[0] = 1;
                 let asked = &frame[HEADER + 8..end - CHECKSUM];
                 answer[8..8 + asked.len()].copy_from_slice(asked);
-                self.say(id::TIMESYNC, &answer);
+                self.send(id::TIMESYNC, &answer);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use uav_relay::ViewRecord;
 use uav_relay_kept::nor::Nor;
-use uav_relay_kept::views::{WORDS, log, record};
+use uav_relay_kept::views::{WORDS, log, unpack_record};
 
 use crate::bench::{Bench, block_of_three};
 use crate::ram::Ram;
@@ -11,7 +11,7 @@ fn newest(flash: &Ram) -> Option<ViewRecord> {
     let storage = flash.storage();
     let check = u32::from_le_bytes(*block_of_three().last_chunk().unwrap());
     let mut log = log(Nor::new(storage.flash, storage.views), check);
-    log.newest::<WORDS>().and_then(|kept| record(&kept))
+    log.newest::<WORDS>().and_then(|kept| unpack_record(&kept))
 }
 
 /// Returns the view that a record promises: 4 bytes from offset 10 of `ViewRecord::to_bytes`.

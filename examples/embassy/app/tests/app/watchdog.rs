@@ -10,7 +10,7 @@ use crate::ram::Ram;
 use crate::vehicle::Vehicle;
 
 #[test]
-fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
+fn a_loop_that_hangs_stops_feeding_the_watchdog() {
     let mut bench = Bench::new();
     bench.boot(Ram::blank().board(&block(Some(1), None), 1));
     FED.with_borrow_mut(Vec::clear);
@@ -26,16 +26,16 @@ fn it_is_fed_at_every_turn_and_a_loop_that_hangs_feeds_it_no_more() {
     // The watchdog restarts the chip; the relay rejoins before its neighbour has lost it.
     let board = Ram::blank().board(&block(Some(2), None), 2);
     bench.boot(board.reset_by(Reset::Watchdog));
-    let told = bench.run(30_000);
-    println!("{told:?}");
-    assert!(told.contains(&Event::Converged), "{told:?}");
+    let events = bench.run(30_000);
+    println!("{events:?}");
+    assert!(events.contains(&Event::Converged), "{events:?}");
     assert!(FED.with_borrow(Vec::len) >= 60);
 }
 
 /// Slows the relay's task to turns of 12 s. The feeding future is polled in each turn, but must not feed the
 /// watchdog, because the relay's timers are late.
 #[test]
-fn a_task_whose_timers_are_late_feeds_it_no_more() {
+fn late_timers_stop_feeding_the_watchdog() {
     let mut bench = Bench::new();
     bench.boot(Ram::blank().board(&block(Some(1), None), 1));
     assert!(bench.run(60_000).contains(&Event::Converged));
@@ -55,13 +55,13 @@ fn a_task_whose_timers_are_late_feeds_it_no_more() {
 }
 
 #[test]
-fn the_operator_is_told_that_it_restarted_the_relay() {
-    for (reset, told) in [(Reset::Watchdog, true), (Reset::Power, false)] {
+fn the_operator_is_informed_of_a_watchdog_restart() {
+    for (reset, is_expected) in [(Reset::Watchdog, true), (Reset::Power, false)] {
         let mut bench = Bench::with(Vehicle::new(Placement::on_line(100.0, 20.0)));
         bench.boot(Ram::blank().board(&block_alone(SITES), 1).reset_by(reset));
         bench.run(5_000);
         let line = "relay: restarted by its watchdog";
-        let said = bench.vehicle().texts.iter().any(|text| text == line);
-        assert_eq!(said, told, "{:?}", bench.vehicle().texts);
+        let is_reported = bench.vehicle().texts.iter().any(|text| text == line);
+        assert_eq!(is_reported, is_expected, "{:?}", bench.vehicle().texts);
     }
 }

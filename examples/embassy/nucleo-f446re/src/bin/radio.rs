@@ -4,13 +4,13 @@
 
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
-use relay_app::drone::Room;
+use relay_app::drone::DroneStorage;
 use relay_app::{BURST, Buffers};
 use relay_nucleo_f446re::{Irqs, PLAN, board};
 use relay_stm32::{feed, init, port};
 use static_cell::StaticCell;
 
-static ROOM: StaticCell<Room> = StaticCell::new();
+static STORAGE: StaticCell<DroneStorage> = StaticCell::new();
 static RADIO: Buffers = Buffers::new();
 static AUTOPILOT: Buffers<BURST> = Buffers::new();
 
@@ -21,8 +21,8 @@ async fn main(_spawner: Spawner) {
     let enable = Output::new(chip.PA8, Level::Low, Speed::Low);
     let autopilot = port(chip.USART6, chip.PC6, chip.PC7, Irqs, &AUTOPILOT).ok();
     if let Ok(radio) = port(chip.USART1, chip.PA9, chip.PA10, Irqs, &RADIO) {
-        let room = ROOM.init_with(Room::new);
-        let _ = relay_app::fly_shared(room, board, radio, enable, autopilot, &mut feed).await;
+        let store = STORAGE.init_with(DroneStorage::new);
+        let _ = relay_app::fly_shared(store, board, radio, enable, autopilot, &mut feed).await;
     }
     relay_app::rest(feed).await;
 }

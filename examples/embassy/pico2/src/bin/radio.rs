@@ -4,12 +4,12 @@
 
 use embassy_executor::Spawner;
 use embassy_rp::gpio::{Level, Output};
-use relay_app::drone::Room;
+use relay_app::drone::DroneStorage;
 use relay_app::{BURST, Buffers};
 use relay_pico2::{Guard, board, port};
 use static_cell::StaticCell;
 
-static ROOM: StaticCell<Room> = StaticCell::new();
+static STORAGE: StaticCell<DroneStorage> = StaticCell::new();
 static RADIO: Buffers = Buffers::new();
 static AUTOPILOT: Buffers<BURST> = Buffers::new();
 
@@ -21,8 +21,8 @@ async fn main(_spawner: Spawner) {
     let radio = port(chip.UART0, chip.PIN_0, chip.PIN_1, &RADIO);
     let autopilot = port(chip.UART1, chip.PIN_4, chip.PIN_5, &AUTOPILOT);
     let enable = Output::new(chip.PIN_2, Level::Low);
-    let room = ROOM.init_with(Room::new);
-    let _ = relay_app::fly_shared(room, board, radio, enable, Some(autopilot), &mut || {
+    let store = STORAGE.init_with(DroneStorage::new);
+    let _ = relay_app::fly_shared(store, board, radio, enable, Some(autopilot), &mut || {
         guard.feed();
     })
     .await;

@@ -4,11 +4,11 @@
 
 use embassy_executor::Spawner;
 use relay_app::Buffers;
-use relay_app::drone::Room;
+use relay_app::drone::DroneStorage;
 use relay_pico2::{Guard, NO_AUTOPILOT, board, port};
 use static_cell::StaticCell;
 
-static ROOM: StaticCell<Room> = StaticCell::new();
+static STORAGE: StaticCell<DroneStorage> = StaticCell::new();
 static UPSTREAM: Buffers = Buffers::new();
 static DOWNSTREAM: Buffers = Buffers::new();
 
@@ -19,10 +19,17 @@ async fn main(_spawner: Spawner) {
     let board = board(chip.FLASH, chip.TRNG).reset_by(reset);
     let upstream = port(chip.UART0, chip.PIN_0, chip.PIN_1, &UPSTREAM);
     let downstream = port(chip.UART1, chip.PIN_4, chip.PIN_5, &DOWNSTREAM);
-    let room = ROOM.init_with(Room::new);
-    let _ = relay_app::fly(room, board, upstream, downstream, NO_AUTOPILOT, &mut || {
-        guard.feed();
-    })
+    let store = STORAGE.init_with(DroneStorage::new);
+    let _ = relay_app::fly(
+        store,
+        board,
+        upstream,
+        downstream,
+        NO_AUTOPILOT,
+        &mut || {
+            guard.feed();
+        },
+    )
     .await;
     relay_app::rest(|| guard.feed()).await;
 }

@@ -3,13 +3,13 @@
 #![no_main]
 
 use embassy_executor::Spawner;
-use relay_app::drone::Room;
+use relay_app::drone::DroneStorage;
 use relay_app::{BURST, Buffers};
 use relay_stm32::{feed, init, port};
 use relay_stm32f405::{Irqs, PLAN, board};
 use static_cell::StaticCell;
 
-static ROOM: StaticCell<Room> = StaticCell::new();
+static STORAGE: StaticCell<DroneStorage> = StaticCell::new();
 static UPSTREAM: Buffers = Buffers::new();
 static DOWNSTREAM: Buffers = Buffers::new();
 static AUTOPILOT: Buffers<BURST> = Buffers::new();
@@ -22,8 +22,8 @@ async fn main(_spawner: Spawner) {
     let downstream = port(chip.USART3, chip.PB10, chip.PB11, Irqs, &DOWNSTREAM);
     let autopilot = port(chip.USART1, chip.PA9, chip.PA10, Irqs, &AUTOPILOT).ok();
     if let (Ok(upstream), Ok(downstream)) = (upstream, downstream) {
-        let room = ROOM.init_with(Room::new);
-        let _ = relay_app::fly(room, board, upstream, downstream, autopilot, &mut feed).await;
+        let store = STORAGE.init_with(DroneStorage::new);
+        let _ = relay_app::fly(store, board, upstream, downstream, autopilot, &mut feed).await;
     }
     relay_app::rest(feed).await;
 }

@@ -317,7 +317,7 @@ impl Chain {
             let [low, high] = member.setpoint_bounds.unwrap_or([place; 2]);
             let guard = self.setup.settings.guard;
             let inside = guard.map_or(chosen, |guard| {
-                let fence = guard.fence;
+                let fence = guard.geofence;
                 // The box grows with the line of an uploaded mission.
                 let longer_m = end - self.setup.mission.config().distance_m;
                 let most_x_m = fence.most_x_m + longer_m;

@@ -12,7 +12,7 @@ use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
 
 /// Measures the instructions for one relay's local search (Algorithm 2) and interference estimate.
-pub(crate) fn shares() {
+pub(crate) fn local_search() {
     let place = Placement::on_line;
     let beside = |place| HopEnd {
         place,
@@ -35,9 +35,9 @@ pub(crate) fn shares() {
         instructions(|| black_box(&hops).worse(black_box(at)))
     );
     let mut search = LocalSearch::new(Local::Fine, hops, at, 10.0, (20.0, 300.0));
-    let (mut all, mut over) = (0, false);
-    while !over {
-        all += instructions(|| over = search.step(240).is_ready());
+    let (mut all, mut is_finished) = (0, false);
+    while !is_finished {
+        all += instructions(|| is_finished = search.step(240).is_ready());
     }
     hprintln!("search {}", all);
     hprintln!("size_of_search {}", size_of::<LocalSearch>());
