@@ -224,12 +224,12 @@ fn a_restarted_companion_engages_nothing_that_it_finds() {
         let reason = if kind == Kind::Px4 {
             "relay: waits, autopilot in failsafe"
         } else {
-            "relay: waits, change the mode first"
+            "relay: waits, choose another mode first"
         };
         assert_eq!(rig.says(reason), 1, "{kind:?}: {:?}", rig.texts);
         assert!(rig.choose(Mode::Hold));
         rig.run(8_000);
-        assert_eq!(rig.says("relay: ready, choose the mode"), 2);
+        assert_eq!(rig.says("relay: ready, choose OFFBOARD or GUIDED"), 2);
         assert!(rig.choose(Mode::Companion));
         rig.run(2_000);
         assert_eq!(rig.link.state(), State::Engaged);

@@ -82,7 +82,7 @@ fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
         let digest = uav_relay::wire::digest::digest(&mission);
         let mut relay = start(&file, "--index 1 --of 1");
         let line = relay.line("started: ");
-        let expected = format!("relay 1 of 1, network {NETWORK}, mission 0x{digest:04x}, ");
+        let expected = format!("relay 1 of 1, network {NETWORK}, mission digest 0x{digest:04x}, ");
         assert!(line.contains(&expected), "{name}: {expected} not in {line}");
     }
     let other = folder.write("other.toml", SCENARIO);

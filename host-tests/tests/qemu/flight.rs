@@ -78,7 +78,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         vehicle.heartbeats > 1 && asked.iter().all(|id| vehicle.asked.contains(id))
     });
     let name = match kind {
-        Kind::Px4 => "autopilot: found, PX4",
+        Kind::Px4 => "autopilot: found: PX4",
         Kind::ArduCopter => "autopilot: found, ArduCopter",
     };
     said(&mut fleet, name);
@@ -91,7 +91,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     // In the air under the pilot's control a PX4 receives its own position, an ArduCopter no target.
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
     vehicle.until("readiness", |vehicle| {
-        let ready = |text: &String| text == "relay: ready, choose the mode";
+        let ready = |text: &String| text == "relay: ready, choose OFFBOARD or GUIDED";
         vehicle.texts.iter().any(ready)
     });
     vehicle.run(1_000);
@@ -164,7 +164,7 @@ fn a_drone_without_sites_tells_nobody() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
     said(
         &mut fleet,
-        "no sites: no autopilot is controlled, and drones are not kept apart while they move",
+        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move",
     );
     fleet.places();
     let mut port = &fleet.autopilots[0];
@@ -178,6 +178,6 @@ fn the_smallest_image_refuses_sites() {
     let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);
     said(
         &mut fleet,
-        "configuration refused: it has sites, and this image was built without flight",
+        "configuration refused: it has sites, but this image was built without the feature flight",
     );
 }

@@ -125,7 +125,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
     });
     three.mavsdk.order("px4");
     three.until("autopilots found", |three| {
-        three.has_logged(1, "autopilot: found, PX4")
+        three.has_logged(1, "autopilot: found: PX4")
             && [2, 3]
                 .iter()
                 .all(|drone| three.has_logged(*drone, "autopilot: found, ArduCopter"))

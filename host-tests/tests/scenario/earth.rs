@@ -126,7 +126,7 @@ fn an_interferer_on_a_tower_is_refused_where_that_matters() {
             let parts = [
                 "interferer[0].amsl_m = ",
                 &by,
-                "interferers are on the ground",
+                "interferers are computed as being on the ground",
             ];
             refused(&text, Problem::OutOfRange, &parts);
         } else {

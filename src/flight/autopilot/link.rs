@@ -203,7 +203,7 @@ impl Autopilot {
                 Line::info(Topic::Clearance, "relay: lost relays cleared")
             }
             Some(_) => {
-                let text = ["relay: denied, name all lost relays of one side", ""];
+                let text = ["relay: denied, name all lost relays on one side", ""];
                 Line::warning(Topic::Clearance, text)
             }
             None => return,
@@ -517,7 +517,7 @@ impl Autopilot {
             ),
             None => (
                 AutopilotEvent::Ready,
-                Line::info(Topic::Wait, "relay: ready, choose the mode"),
+                Line::info(Topic::Wait, "relay: ready, choose OFFBOARD or GUIDED"),
             ),
         };
         self.events.waits = Some(event);

@@ -62,7 +62,7 @@ fn trouble<E>(error: PcapError) -> Trouble<E> {
             Trouble::Read(error)
         }
         PcapError::IoError(_) | PcapError::IncompleteBuffer => {
-            Trouble::Capture("it ends inside a block".to_owned())
+            Trouble::Capture("the file ends inside a pcapng block".to_owned())
         }
         error => Trouble::Capture(error.to_string()),
     }

@@ -95,12 +95,12 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
         "worst hop: SIR 1.5817",
         "the chain flies mission 1, as uploaded",
         "one radio channel",
-        "converged: 8 relays, SIR 2.466",
-        "20.000 s  the transmitter uploads mission 1",
-        " s  relays 1 to 8 stored mission 1",
-        " s  mission 1 adopted: 8 relays",
-        "converged: 8 relays, SIR 1.582",
-        "view 1, mission 1 uploaded: adopted 0.",
+        "positions agreed: 8 relays, SIR 2.466",
+        "20.000 s  the transmitter uploads mission version 1",
+        " s  relays 1 to 8 stored mission version 1",
+        " s  mission version 1 adopted: 8 relays",
+        "positions agreed: 8 relays, SIR 1.582",
+        "view 1, mission version 1 uploaded: adopted 0.",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }
@@ -110,8 +110,8 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
         "interferer: 80 W, x = 800 m, y = -300 m",
         "interferer of the previous mission: 80 W, x = 500 m, y = 400 m",
         "|y| = 300 m",
-        "mission 1 offered",
-        "mission 1 adopted",
+        "mission version 1 offered",
+        "mission version 1 adopted",
         "1.5817 (1.99 dB)",
     ] {
         assert!(drawing.contains(words), "{words} in {drawing}");

@@ -31,7 +31,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         None => Scenario::default(),
     };
     if !scenario.knows_interference() {
-        let line = "interferer: is missing: without [[interferer]] a scenario with [listen] is for cargo provision alone";
+        let line = "interferer: is missing: a scenario with [listen] but without [[interferer]] is for cargo provision only";
         return Err(Failure::input(line.to_owned()));
     }
     let number = options.number();

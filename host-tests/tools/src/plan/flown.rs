@@ -37,7 +37,7 @@ impl Flown {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
             (
-                "on board one hypothetical interferer replaces all",
+                "because the relays compute with one hypothetical interferer in place of all",
                 "let the relays estimate the interferer, and simulate that (`cargo chain --listen`, [listen]), or plan other altitudes or more \
                  relays against the true sum (`cargo plan`)",
             )
@@ -207,7 +207,7 @@ pub fn is_current(planned: &Planned, flown: &Flown) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "[plan] is of another scenario: relays in this one settle up to {off_m:.1} m from plan.places, at {sir_db:.3} dB in place of \
+        "[plan] was computed for another scenario: the relays of this one settle up to {off_m:.1} m from plan.places, at {sir_db:.3} dB in place of \
          plan.sir_db = {:.3}; allowed: [plan] as `cargo plan --out` writes it for this scenario",
         planned.sir_db
     ))

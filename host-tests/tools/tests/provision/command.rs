@@ -215,7 +215,7 @@ fn the_method_of_the_network_is_in_the_block_and_another_baud_is_refused() {
     for (sections, words) in [
         (
             network("baud = 57600"),
-            "network.baud = 57600: must be 115200, or left out: the firmware's ports run at that",
+            "network.baud = 57600: must be 115200, or left out: the firmware's ports have this fixed data rate",
         ),
         (
             network("probe_after_ms = 1200001"),
