@@ -43,12 +43,12 @@ impl Flown {
             )
         } else {
             (
-                "the field is too uneven for Algorithm 4",
+                "because the interference field is too uneven for Algorithm 4",
                 "plan another geometry.altitude_m or another number of relays (`cargo plan`)",
             )
         };
         format!(
-            "the relays reach {reach:.2} dB of {best:.2} dB, {:.1} % less than the best positions: {why}; {remedy}",
+            "the relays would reach an SIR of {reach:.2} dB instead of {best:.2} dB, {:.1} % less than the best positions, {why}; {remedy}",
             100.0 * self.loss()
         )
     }
@@ -155,7 +155,7 @@ pub fn with_plan(text: &str, planned: &Planned) -> Result<String, String> {
     _ = file.remove("plan");
     let mut table = Table::new();
     table.decor_mut().set_prefix(
-        "\n# By `cargo plan`. What is above may be changed, and is then to be planned anew.\n",
+        "\n# By `cargo plan`. If you change anything above, run `cargo plan` again.\n",
     );
     table.insert("uavs", value(i64::from(planned.uavs)));
     table.insert("method", value(planned.method.name()));

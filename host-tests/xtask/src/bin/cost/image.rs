@@ -135,7 +135,7 @@ fn of(
         row(what, "bytes", flash_taken, Some(flash)),
         row("its static RAM", "bytes", ram_taken, Some(ram)),
         row(
-            "its stack, bound: thread and one interrupt",
+            "its stack, upper bound with one interrupt",
             "bytes",
             thread + handler,
             Some(stack),

@@ -221,7 +221,7 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
     };
     let sweep = rows
         .iter()
-        .position(|row| row.what == "a full sweep, message in to message out")?;
+        .position(|row| row.what == "a sweep message of 16 targets, from receiving to sending it")?;
     let [sweep, frame] = rows.get(sweep..sweep + 2)? else {
         return None;
     };
