@@ -30,7 +30,9 @@ impl defmt::Format for Event {
             Self::Converged => (None, defmt::intern!("the relays have agreed on positions")),
             Self::Infeasible => (
                 None,
-                defmt::intern!("no positions of the relays meet any target SIR: all relays keep their positions"),
+                defmt::intern!(
+                    "no positions of the relays meet any target SIR: all relays keep their positions"
+                ),
             ),
             Self::NeighbourLost {
                 side: Side::Upstream,
@@ -84,7 +86,9 @@ impl defmt::Format for Event {
             ),
             Self::ViewAccepted => (
                 None,
-                defmt::intern!("a new view (membership of the chain) has been agreed: new positions follow"),
+                defmt::intern!(
+                    "a new view (membership of the chain) has been agreed: new positions follow"
+                ),
             ),
             Self::LeaseLapsed => (
                 None,

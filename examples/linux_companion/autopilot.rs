@@ -132,7 +132,9 @@ impl Companion {
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         let refused = self.link.refused();
         if refused > 0 {
-            let what = format_args!("{refused} frames from the autopilot rejected because of their signatures");
+            let what = format_args!(
+                "{refused} frames from the autopilot rejected because of their signatures"
+            );
             log.tell(now, EVENT, what);
         }
     }
@@ -422,8 +424,12 @@ const fn waits(reason: WaitReason) -> &'static str {
         WaitReason::Unseen => {
             "no other mode than OFFBOARD or GUIDED was reported since this program started"
         }
-        WaitReason::Position => "the position is unknown, or not near the line between transmitter and receiver",
-        WaitReason::NotReady => "this drone is on the wrong side of a neighbour along the line; fly it to its own side first",
+        WaitReason::Position => {
+            "the position is unknown, or not near the line between transmitter and receiver"
+        }
+        WaitReason::NotReady => {
+            "this drone is on the wrong side of a neighbour along the line; fly it to its own side first"
+        }
         _ => "the reason is unknown",
     }
 }

@@ -78,7 +78,9 @@ pub(crate) const fn word(reason: HoldReason) -> &'static str {
 fn said(reason: HoldReason, whom: &str) -> String {
     match reason {
         HoldReason::Unheard => {
-            format!("setpoint control is not engaged at {whom}, or its position has not been received yet")
+            format!(
+                "setpoint control is not engaged at {whom}, or its position has not been received yet"
+            )
         }
         HoldReason::Order => format!(
             "this drone is on the wrong side of {whom} along the line, or too close to it to be sure; fly one of the two drones to its own side by hand"
@@ -92,7 +94,9 @@ fn said(reason: HoldReason, whom: &str) -> String {
         HoldReason::NotFlown => {
             format!("setpoint control is not engaged at {whom}, which is in the way")
         }
-        HoldReason::Pending => format!("{whom} has not left the space that this drone moves into yet"),
+        HoldReason::Pending => {
+            format!("{whom} has not left the space that this drone moves into yet")
+        }
         HoldReason::Halted => {
             format!(
                 "a relay beyond {whom} is on the wrong side of a neighbour; the log of that relay has the reason"

@@ -311,7 +311,10 @@ impl Report {
         let db = 10.0 * target.log10();
         let fields = json!({ "target_sir": target, "target_sir_db": db });
         if target > 0.0 {
-            let text = format_args!("positions agreed, target SIR {:.6}, {db:.3} dB", Exact(target));
+            let text = format_args!(
+                "positions agreed, target SIR {:.6}, {db:.3} dB",
+                Exact(target)
+            );
             self.log.say(now, "converged", fields, text);
         } else {
             let text = "the relays spread along the line to measure the interferer";

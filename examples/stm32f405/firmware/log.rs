@@ -90,13 +90,21 @@ pub(crate) fn started(begun: &Begun) {
     let mhz = begun.clocks.core_hz / 1_000_000;
     match begun.clocks.pll {
         Some(Source::Crystal) => info!("clock {=u32} MHz, from the 8 MHz crystal", mhz),
-        Some(Source::Internal) => warn!("clock {=u32} MHz, from the internal oscillator: no 8 MHz crystal found", mhz),
-        None => warn!("clock {=u32} MHz, from the internal oscillator: the PLL did not start", mhz),
+        Some(Source::Internal) => warn!(
+            "clock {=u32} MHz, from the internal oscillator: no 8 MHz crystal found",
+            mhz
+        ),
+        None => warn!(
+            "clock {=u32} MHz, from the internal oscillator: the PLL did not start",
+            mhz
+        ),
     }
 }
 
 pub(crate) fn unguarded() {
-    warn!("no geographic sites: no autopilot is controlled, and drones are not kept apart while they move");
+    warn!(
+        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+    );
 }
 
 /// Logs the line and the speed limit of the autopilot.
@@ -123,7 +131,9 @@ pub(crate) fn off_course(error: CourseError) {
 
 #[allow(dead_code, reason = "for an image that tells no autopilot")]
 pub(crate) fn no_flight() {
-    error!("configuration refused: it has sites, but this image was built without the feature flight");
+    error!(
+        "configuration refused: it has sites, but this image was built without the feature flight"
+    );
 }
 
 #[cfg(feature = "mavlink-signing")]
@@ -161,20 +171,32 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
 pub(crate) fn refused(error: ConfigError) {
     match error {
         ConfigError::Blank => warn!("no configuration: the configuration block in flash is blank"),
-        ConfigError::Magic => error!("configuration refused: the configuration block does not begin with UAVR"),
-        ConfigError::Version => {
-            error!("configuration refused: the block's version or length is not the one of this firmware");
+        ConfigError::Magic => {
+            error!("configuration refused: the configuration block does not begin with UAVR")
         }
-        ConfigError::Crc => error!("configuration refused: the block is damaged, its CRC does not match"),
+        ConfigError::Version => {
+            error!(
+                "configuration refused: the block's version or length is not the one of this firmware"
+            );
+        }
+        ConfigError::Crc => {
+            error!("configuration refused: the block is damaged, its CRC does not match")
+        }
         ConfigError::Index => {
-            error!("configuration refused: the relay's index must be within 1 to the number of relays");
+            error!(
+                "configuration refused: the relay's index must be within 1 to the number of relays"
+            );
         }
         ConfigError::Profile => {
             error!("configuration refused: this relay's altitude or power is out of range");
         }
-        ConfigError::Hold => error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1"),
+        ConfigError::Hold => {
+            error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1")
+        }
         ConfigError::Method => {
-            error!("configuration refused: the method is unknown, or cannot use an interference field");
+            error!(
+                "configuration refused: the method is unknown, or cannot use an interference field"
+            );
         }
         ConfigError::Adjust => {
             error!(
@@ -182,7 +204,9 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Measure => {
-            error!("configuration refused: samples or i_max_w of the interference measurement out of range");
+            error!(
+                "configuration refused: samples or i_max_w of the interference measurement out of range"
+            );
         }
         ConfigError::Listen => {
             error!(
@@ -190,20 +214,30 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Reverse => {
-            error!("configuration refused: a reverse above 0 needs the method align, and no listen");
+            error!(
+                "configuration refused: a reverse above 0 needs the method align, and no listen"
+            );
         }
         ConfigError::Interferer => {
             error!("configuration refused: it has both an interferer and an interference field");
         }
-        ConfigError::Points => error!("configuration refused: the interference field has more points than the block can hold"),
+        ConfigError::Points => error!(
+            "configuration refused: the interference field has more points than the block can hold"
+        ),
         ConfigError::Unused => {
-            error!("configuration refused: bytes after the last point of the interference field are not 0");
+            error!(
+                "configuration refused: bytes after the last point of the interference field are not 0"
+            );
         }
         ConfigError::Secret => {
-            error!("configuration refused: key and epoch must be given together, the epoch within 1 to 4294967294");
+            error!(
+                "configuration refused: key and epoch must be given together, the epoch within 1 to 4294967294"
+            );
         }
         ConfigError::Speed => {
-            error!("configuration refused: the speed must be within 0.1 to 20 m/s, and needs sites");
+            error!(
+                "configuration refused: the speed must be within 0.1 to 20 m/s, and needs sites"
+            );
         }
         ConfigError::AutopilotKey => {
             error!("configuration refused: an autopilot's key needs sites");
@@ -282,7 +316,9 @@ pub(crate) fn votes(kept: bool) {
 
 #[cfg(not(feature = "auth"))]
 pub(crate) fn cannot_sign() {
-    error!("configuration refused: it has a key, but this image was built without the feature auth");
+    error!(
+        "configuration refused: it has a key, but this image was built without the feature auth"
+    );
 }
 
 /// Logs that this image was built without the feature for the method, or for measuring.

@@ -49,7 +49,10 @@ impl fmt::Display for Refusal {
             Self::Oversized(len) => write!(f, "too long: {len} bytes, a frame has at most 137"),
             Self::Truncated => f.write_str("cut short: the delimiter is inside a COBS block"),
             Self::Short(len) => write!(f, "too short: {len} bytes after COBS decoding"),
-            Self::Crc(has, is) => write!(f, "CRC mismatch: the frame has {has:08x}, its bytes give {is:08x}"),
+            Self::Crc(has, is) => write!(
+                f,
+                "CRC mismatch: the frame has {has:08x}, its bytes give {is:08x}"
+            ),
             Self::Version(version, flags) => {
                 write!(
                     f,

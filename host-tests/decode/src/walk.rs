@@ -9,7 +9,10 @@ struct Rest<'b>(&'b [u8]);
 
 impl Rest<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        let (taken, rest) = self.0.split_first_chunk::<N>().ok_or("the message ends too early")?;
+        let (taken, rest) = self
+            .0
+            .split_first_chunk::<N>()
+            .ok_or("the message ends too early")?;
         self.0 = rest;
         Ok(*taken)
     }

@@ -79,7 +79,10 @@ impl Check<'_> {
                             Problem::Missing,
                             key.instead(keys.clone())
                                 .fold(rule.to_string(), |said, other| {
-                                    format!("{said}, or the key {} instead, {}", other.name, other.rule)
+                                    format!(
+                                        "{said}, or the key {} instead, {}",
+                                        other.name, other.rule
+                                    )
                                 }),
                         ));
                     }

@@ -15,7 +15,9 @@ fn a_port_that_vanishes_is_opened_again() {
     for _ in 0..2 {
         let (_, sleeps) = flight.relay.cost();
         flight.drone.order("unplug");
-        let line = flight.relay.line("device disconnected; retried until it is back");
+        let line = flight
+            .relay
+            .line("device disconnected; retried until it is back");
         assert!(line.contains("port lost: --autopilot /"), "{line}");
         flight.relay.line("autopilot: no heartbeat");
         std::thread::sleep(Duration::from_millis(1_500));
@@ -36,7 +38,9 @@ fn a_port_that_vanishes_is_opened_again() {
 
     // Messages are requested again from an autopilot that was switched off with its port.
     flight.drone.order("unplug");
-    flight.relay.line("device disconnected; retried until it is back");
+    flight
+        .relay
+        .line("device disconnected; retried until it is back");
     flight.drone.order("reboot");
     flight.drone.forget();
     flight.drone.order("plug");

@@ -123,7 +123,11 @@ fn on_a_wire_the_ground_says_what_most_likely_is_wrong() {
         "",
         "check --network 1, --baud 115200, --end and --key-file",
     );
-    assert!(relay.line("rejected: ").contains("have a wrong signature (tag)"));
+    assert!(
+        relay
+            .line("rejected: ")
+            .contains("have a wrong signature (tag)")
+    );
 }
 
 /// Checks the likely reasons that a ground station on a shared channel gives for a failed upload. It receives the

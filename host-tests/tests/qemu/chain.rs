@@ -56,7 +56,10 @@ fn five_settle_where_the_simulated_chain_does() {
         let before = damaged.len();
         for drone in 1..=5 {
             // The emulator has no clock tree: the firmware keeps running on the HSI.
-            let begins = ["started, cause of the reset: unknown", "clock 16 MHz, from the internal oscillator: the PLL did not start"];
+            let begins = [
+                "started, cause of the reset: unknown",
+                "clock 16 MHz, from the internal oscillator: the PLL did not start",
+            ];
             let begins = begins.map(str::to_owned).into_iter();
             let begins = begins.chain([format!("relay {drone} of 5, network 7")]);
             let said = fleet.of_drone(drone).map(|line| line.text.clone());

@@ -164,7 +164,10 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
 /// # Errors
 /// If pieces overlap, or lie more than [`LARGEST`] bytes apart.
 pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
-    let first = pieces.first().ok_or("an image without loadable segments")?.address;
+    let first = pieces
+        .first()
+        .ok_or("an image without loadable segments")?
+        .address;
     let mut bytes = Vec::new();
     for piece in pieces {
         let at = piece.address.checked_sub(first).filter(|at| *at <= LARGEST);

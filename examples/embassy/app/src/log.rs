@@ -15,7 +15,9 @@ use crate::drone::Refused;
 
 pub(crate) fn started(reset: Reset) {
     match reset {
-        Reset::Watchdog => error!("restarted by the watchdog: the main loop hung, or the clock stopped"),
+        Reset::Watchdog => {
+            error!("restarted by the watchdog: the main loop hung, or the clock stopped")
+        }
         reset => info!("started: {}", reset.text()),
     }
 }
@@ -46,7 +48,9 @@ pub(crate) fn signs(epoch: u32, kept: bool) {
 }
 
 pub(crate) fn unguarded() {
-    warn!("no geographic sites: no autopilot is controlled, and drones are not kept apart while they move");
+    warn!(
+        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+    );
 }
 
 /// Logs the line and the speed limit of the autopilot.
@@ -89,7 +93,9 @@ pub(crate) fn refused(why: Refused) {
                 "configuration refused: it has a key, but this board cannot store the epoch (start counter) that signing needs"
             );
         }
-        Refused::NoEpoch => error!("frames cannot be signed: the epoch (start counter) has reached its maximum"),
+        Refused::NoEpoch => {
+            error!("frames cannot be signed: the epoch (start counter) has reached its maximum")
+        }
         Refused::NoAutopilot => {
             error!(
                 "configuration refused: it has sites, but this image has no port to an autopilot"

@@ -116,7 +116,8 @@ impl Uploads {
             return Err(Failure::input(line));
         }
         if self.no_store && !boots {
-            let line = "--no-store: would be ignored, because no relay is switched on again (--boot)";
+            let line =
+                "--no-store: would be ignored, because no relay is switched on again (--boot)";
             return Err(Failure::input(line));
         }
         Ok(())

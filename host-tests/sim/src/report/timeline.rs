@@ -218,7 +218,11 @@ impl Group {
             "engaged" | "released" | "blind" => format!("{who} {}", one.what),
             "restarted" => format!("{who}: autopilot restarted"),
             "offered" | "stored" | "adopted" => {
-                format!("mission version {} {}", one.version.unwrap_or_default(), one.what)
+                format!(
+                    "mission version {} {}",
+                    one.version.unwrap_or_default(),
+                    one.what
+                )
             }
             other => other.to_owned(),
         }
@@ -248,7 +252,9 @@ impl Group {
             "mission mismatch" => format!("{who}: relay {other} has another mission"),
             "key mismatch" => format!("{who}: relay {other} signs with another key"),
             "epoch went back" => {
-                format!("{who}: relay {other} started with an old epoch (start counter), its frames are rejected")
+                format!(
+                    "{who}: relay {other} started with an old epoch (start counter), its frames are rejected"
+                )
             }
             "duplicate index" => format!("{who}: duplicate relay number {other}"),
             "engaged" => format!("{who}: setpoint control engaged"),
@@ -287,7 +293,10 @@ impl Group {
             "offered" if relay == 0 => format!("the transmitter uploads mission version {version}"),
             "offered" => format!("the receiver uploads mission version {version}"),
             "stored" => format!("{who} stored mission version {version}"),
-            "adopted" => format!("mission version {version} adopted: {}", count(self.relays.len())),
+            "adopted" => format!(
+                "mission version {version} adopted: {}",
+                count(self.relays.len())
+            ),
             _ => "no target SIR can be met".to_owned(),
         }
     }
@@ -565,7 +574,10 @@ pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
         );
     }
     if same > 0 {
-        _ = writeln!(text, "agreed memberships (views) with unchanged relays: {same}");
+        _ = writeln!(
+            text,
+            "agreed memberships (views) with unchanged relays: {same}"
+        );
     }
     text
 }

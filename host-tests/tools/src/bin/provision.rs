@@ -217,7 +217,9 @@ impl<'a> Asked<'a> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
         if self.options.stand_in && !is_several {
-            return Err("--stand-in: is only for a scenario with several [[interferer]]".to_owned());
+            return Err(
+                "--stand-in: is only for a scenario with several [[interferer]]".to_owned(),
+            );
         }
         if !self.scenario.knows_interference()
             || is_plain && !self.options.folder.all && self.scenario.plan.is_none()

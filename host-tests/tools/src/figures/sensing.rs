@@ -51,7 +51,12 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ("20 relays, one source", 20, 1, unknown),
     ("8 relays, 1 dB position errors", 8, 1, shadowed),
     ("8 relays, two sources", 8, 2, unknown),
-    ("8 relays, two sources, given a hypothetical one", 8, 2, hypothetical),
+    (
+        "8 relays, two sources, given a hypothetical one",
+        8,
+        2,
+        hypothetical,
+    ),
 ];
 
 /// Returns the share by agreement, in `scenes` scenes each.

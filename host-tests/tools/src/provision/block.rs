@@ -279,7 +279,12 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
     };
     let ms = |time: Duration| u32::try_from(time.as_micros() / 1_000).unwrap_or(u32::MAX);
     if let Some(baud) = section.baud.filter(|baud| *baud != BAUD) {
-        let line = refuse("baud", baud, BAUD, "the firmware's ports have this fixed data rate");
+        let line = refuse(
+            "baud",
+            baud,
+            BAUD,
+            "the firmware's ports have this fixed data rate",
+        );
         return Err(format!("{line}; a radio's own data rate is --baud"));
     }
     let probe_after_ms = given_ms.or(section.probe_after_ms).unwrap_or(0);

@@ -290,7 +290,10 @@ fn the_command_has_them_from_the_scenario() {
     let fast = flight().no_faster_than(7.5).block(3).unwrap();
     assert_eq!(written("--speed 7.5"), fast);
     for (arguments, words) in [
-        ("--speed 7.5", "--speed: is only for a scenario with a [site]"),
+        (
+            "--speed 7.5",
+            "--speed: is only for a scenario with a [site]",
+        ),
         ("--speed 20.1", "must be a number within 0.1 to 20.0"),
         ("--speed NaN", "must be a number within 0.1 to 20.0"),
         (&format!("--scenario {off}"), "m from tx to rx"),

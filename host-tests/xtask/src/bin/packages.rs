@@ -89,7 +89,9 @@ fn twice() -> Result<Vec<String>, String> {
         }
     }
     versions.retain(|name, versions| versions.len() > 1 && !TWICE.contains(name));
-    let told = |(name, versions)| format!("several versions of a dependency of the firmware: {name} {versions:?}");
+    let told = |(name, versions)| {
+        format!("several versions of a dependency of the firmware: {name} {versions:?}")
+    };
     Ok(versions.into_iter().map(told).collect())
 }
 

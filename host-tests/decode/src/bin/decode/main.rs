@@ -52,9 +52,9 @@ fn run(options: &Options) -> Result<(), Failure> {
         Err(Trouble::Read(error)) => {
             Err(Failure::input(format!("{name}: cannot be read: {error}")))
         }
-        Err(Trouble::Capture(error)) => {
-            Err(Failure::input(format!("{name}: is not a valid capture: {error}")))
-        }
+        Err(Trouble::Capture(error)) => Err(Failure::input(format!(
+            "{name}: is not a valid capture: {error}"
+        ))),
     }
 }
 

@@ -80,7 +80,12 @@ const SIGNED: &[Counted] = &[
         &["tag_32"],
         None,
     ),
-    ("the tag of a sweep message of 16 targets", "instructions", &["tag_84"], None),
+    (
+        "the tag of a sweep message of 16 targets",
+        "instructions",
+        &["tag_84"],
+        None,
+    ),
     (
         "the tag of the longest body",
         "instructions",
@@ -93,7 +98,12 @@ const SIGNED: &[Counted] = &[
         &["signed_sweep"],
         None,
     ),
-    ("length of its frame", "bytes", &["signed_sweep_bytes"], Some(108)),
+    (
+        "length of its frame",
+        "bytes",
+        &["signed_sweep_bytes"],
+        Some(108),
+    ),
     (
         "a replayed sweep message, rejected",
         "instructions",
@@ -164,7 +174,12 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     ("`size_of::<Relay>()`", "bytes", &["size_of_relay"], None),
-    ("reach of a hop: one relay, one target SIR", "instructions", &["reach"], Some(165)),
+    (
+        "reach of a hop: one relay, one target SIR",
+        "instructions",
+        &["reach"],
+        Some(165),
+    ),
     (
         "the same with receiver noise, the longest of 120",
         "instructions",
@@ -245,7 +260,12 @@ const COUNTED: &[Counted] = &[
         &["theorem_2"],
         None,
     ),
-    ("Theorem 3: one relay placed along x and in altitude", "instructions", &["theorem_3"], None),
+    (
+        "Theorem 3: one relay placed along x and in altitude",
+        "instructions",
+        &["theorem_3"],
+        None,
+    ),
     (
         "number of relays for an SIR of 5: 22",
         "instructions",
@@ -270,7 +290,12 @@ const COUNTED: &[Counted] = &[
         &["joint", "predicted"],
         None,
     ),
-    ("longest frame of the joint method", "bytes", &["joint_bytes"], None),
+    (
+        "longest frame of the joint method",
+        "bytes",
+        &["joint_bytes"],
+        None,
+    ),
     (
         "8 relays solved by the joint method",
         "instructions",

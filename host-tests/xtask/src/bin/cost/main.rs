@@ -200,7 +200,8 @@ fn with(
 ) -> Result<Document, String> {
     let path = root.join(name);
     let kept = std::fs::read_to_string(&path).map_err(|error| format!("{name}: {error}"))?;
-    let measured = measured(&kept).ok_or_else(|| format!("{name}: the marked place for the costs is missing"))?;
+    let measured = measured(&kept)
+        .ok_or_else(|| format!("{name}: the marked place for the costs is missing"))?;
     Ok(Document {
         name,
         path,
@@ -219,9 +220,9 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
         let [flash, ram, stack] = [flash, ram, stack].map(|row| spaced(row.value));
         Some(format!("{flash}, {ram} and {stack} bytes"))
     };
-    let sweep = rows
-        .iter()
-        .position(|row| row.what == "a sweep message of 16 targets, from receiving to sending it")?;
+    let sweep = rows.iter().position(|row| {
+        row.what == "a sweep message of 16 targets, from receiving to sending it"
+    })?;
     let [sweep, frame] = rows.get(sweep..sweep + 2)? else {
         return None;
     };
