@@ -226,7 +226,7 @@ fn of_several_interferers_the_one_that_stands_for_all_is_changed() {
     assert!(output.status.success());
     let notes = String::from_utf8(output.stderr).unwrap();
     assert!(
-        notes.contains("replaces all") && notes.contains("an upload changes that one"),
+        notes.contains("replaces all") && notes.contains("an upload changes this interferer"),
         "{notes}"
     );
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
