@@ -772,7 +772,7 @@ fn on_earth(
             );
             let allowed = format!(
                 "no amsl_m for an interferer on the ground, or a height that changes the interference by at most {MOST_OFF_DB} dB everywhere; \
-                 this one changes it by up to {off_db:.1} dB, because interferers are computed as being on the ground"
+                 this one changes it by {off_db:.1} dB, because interferers are computed as being on the ground"
             );
             let key = format!("{table}amsl_m");
             return Err(mistake(

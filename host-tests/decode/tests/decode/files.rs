@@ -57,7 +57,7 @@ fn a_capture_that_breaks_off_is_shown_as_far_as_it_goes() {
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(
         line,
-        "standard input: no valid capture: the file ends inside a pcapng block\n"
+        "standard input: is not a valid capture: the file ends inside a pcapng block\n"
     );
     assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 1);
 }

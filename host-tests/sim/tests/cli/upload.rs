@@ -93,7 +93,7 @@ fn the_story_has_a_line_for_each_step_and_the_picture_the_new_interferer() {
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [
         "worst hop: SIR 1.5817",
-        "the chain flies mission 1, as uploaded",
+        "the chain uses the uploaded mission, version 1",
         "one radio channel",
         "positions agreed: 8 relays, SIR 2.466",
         "20.000 s  the transmitter uploads mission version 1",

@@ -161,7 +161,7 @@ pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<
         text.push('\n');
     }
     text.push_str(
-        "\ncommands to type in this folder, two for each drone, with that drone at the probe:\n",
+        "\ncommands to type in this folder, two for each drone, while that drone is connected to the debug probe:\n",
     );
     for index in 1..=*uavs {
         _ = writeln!(

@@ -128,7 +128,7 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     ] {
         let baud = arguments.split_once("--baud ").map_or("115200", |it| it.1);
         let line = format!(
-            "--baud {baud}: must be within {least} to 10000000: {in_range} relays in range of each other overload the channel: it needs {least} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {most} relays in range; if fewer receive each other, give --in-range, or --wires for separate links\n"
+            "--baud {baud}: must be within {least} to 10000000: {in_range} relays in range of each other overload the channel: use at least {least} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {most} relays in range; if fewer receive each other, give --in-range, or --wires for separate links\n"
         );
         assert_eq!(refusal(&format!("{plain} {arguments}")), line);
     }
@@ -344,7 +344,7 @@ fn a_plan_goes_to_every_drone() {
     let scenario = Scenario::load(&file).unwrap();
     let plan = scenario.plan.clone().unwrap();
     assert!(
-        said.contains(&format!("{} relays that reach", plan.uavs)),
+        said.contains(&format!("{} relays that agree on positions with", plan.uavs)),
         "{said}"
     );
     assert!(plan.sir_db >= 8.0, "{}", plan.sir_db);
