@@ -117,7 +117,7 @@ fn what_is_no_image_is_refused_in_one_line() {
     assert_eq!(nothing, "an ELF file without loadable segments");
     let twice = elf(&[(0, 0, &[1; 8]), (4, 4, &[2; 8])]);
     let twice = flat(&pieces(&twice).unwrap()).unwrap_err();
-    assert_eq!(twice, "two parts of the image are at 0x00000004");
+    assert_eq!(twice, "two segments of the image overlap at 0x00000004");
     let far = elf(&[(0, 0, &[1]), (0x2000_0000, 0, &[2])]);
     assert!(flat(&pieces(&far).unwrap()).is_err());
 }
