@@ -219,7 +219,7 @@ impl Group {
             "restarted" => format!("{who}: autopilot restarted"),
             "offered" | "stored" | "adopted" => {
                 format!(
-                    "mission version {} {}",
+                    "mission {} {}",
                     one.version.unwrap_or_default(),
                     one.what
                 )
