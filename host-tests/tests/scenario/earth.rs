@@ -81,7 +81,10 @@ fn what_is_no_place_on_the_line_is_refused() {
         (
             "x_m = 4\nlon_deg = 8.5",
             Problem::SaidTwice,
-            ["interferer[0].lon_deg = 8.5 together with x_m = 4", "not both"],
+            [
+                "interferer[0].lon_deg = 8.5 together with x_m = 4",
+                "not both",
+            ],
         ),
         (
             &format!("{near}\namsl_m = 10001"),
@@ -91,7 +94,10 @@ fn what_is_no_place_on_the_line_is_refused() {
         (
             "x_m = 4\ny_m = 9\namsl_m = 420",
             Problem::SaidTwice,
-            ["interferer[0].amsl_m = 420 together with x_m = 4", "not both"],
+            [
+                "interferer[0].amsl_m = 420 together with x_m = 4",
+                "not both",
+            ],
         ),
     ] {
         refused(&sited(lines), problem, &parts);

@@ -54,7 +54,11 @@ fn a_power_is_said_once() {
     refused(&gain, Problem::SaidTwice, &parts);
     for other in ["bandwidth_hz = 1e6", "figure_db = 3"] {
         let noise = small(&format!("[noise]\n{other}\npower_dbm = -100\n"));
-        refused(&noise, Problem::SaidTwice, &["together with power_dbm = -100"]);
+        refused(
+            &noise,
+            Problem::SaidTwice,
+            &["together with power_dbm = -100"],
+        );
     }
     let none = small("").replace("uav_w = 1\n", "");
     let parts = [

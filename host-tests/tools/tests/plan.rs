@@ -401,7 +401,9 @@ fn a_frequency_for_each_hop_carries_the_rate_of_the_worst_hop() {
     let output = plan(&format!("--scenario {path} --uavs 4"));
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
-        table.contains("bit/s: each of the 5 hops has its own frequency, and the worst hop carries "),
+        table.contains(
+            "bit/s: each of the 5 hops has its own frequency, and the worst hop carries "
+        ),
         "{table}"
     );
 }

@@ -218,11 +218,7 @@ impl Group {
             "engaged" | "released" | "blind" => format!("{who} {}", one.what),
             "restarted" => format!("{who}: autopilot restarted"),
             "offered" | "stored" | "adopted" => {
-                format!(
-                    "mission {} {}",
-                    one.version.unwrap_or_default(),
-                    one.what
-                )
+                format!("mission {} {}", one.version.unwrap_or_default(), one.what)
             }
             other => other.to_owned(),
         }

@@ -112,7 +112,11 @@ fn a_uf2_file_has_whole_blocks_with_whole_pages() {
 
 #[test]
 fn what_is_no_image_is_refused_in_one_line() {
-    assert!(pieces(b"no ELF").unwrap_err().starts_with("not a 32-bit ELF file"));
+    assert!(
+        pieces(b"no ELF")
+            .unwrap_err()
+            .starts_with("not a 32-bit ELF file")
+    );
     let nothing = pieces(&elf(&[])).unwrap_err();
     assert_eq!(nothing, "an ELF file without loadable segments");
     let twice = elf(&[(0, 0, &[1; 8]), (4, 4, &[2; 8])]);

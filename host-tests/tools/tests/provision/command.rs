@@ -344,7 +344,10 @@ fn a_plan_goes_to_every_drone() {
     let scenario = Scenario::load(&file).unwrap();
     let plan = scenario.plan.clone().unwrap();
     assert!(
-        said.contains(&format!("{} relays that agree on positions with", plan.uavs)),
+        said.contains(&format!(
+            "{} relays that agree on positions with",
+            plan.uavs
+        )),
         "{said}"
     );
     assert!(plan.sir_db >= 8.0, "{}", plan.sir_db);
