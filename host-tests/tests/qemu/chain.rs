@@ -147,7 +147,7 @@ fn the_smallest_image_refuses_what_it_cannot_do() {
         [1, 2].iter().all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == *drone);
             lines.any(|line| {
-                line.text == "configuration refused: not supported by this image, Method"
+                line.text == "configuration refused: not supported by this image: Method"
             })
         })
     });

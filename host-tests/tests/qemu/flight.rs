@@ -59,7 +59,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     fleet.wait("line to fly along", |lines| {
         lines
             .iter()
-            .any(|line| line.text.starts_with("autopilot: line of 1343.79"))
+            .any(|line| line.text.starts_with("autopilot: 1343.79"))
     });
     let from = Placement {
         x_m: to.x_m - 80.0,
@@ -79,7 +79,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     });
     let name = match kind {
         Kind::Px4 => "autopilot: found: PX4",
-        Kind::ArduCopter => "autopilot: found, ArduCopter",
+        Kind::ArduCopter => "autopilot: found: ArduCopter",
     };
     said(&mut fleet, name);
     vehicle.run(2_000);

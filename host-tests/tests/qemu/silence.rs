@@ -114,11 +114,11 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         "configuration refused: the block is damaged, its CRC does not match",
         "configuration refused: the block's version or length is not the one of this firmware",
         "configuration refused: the relay's index must be within 1 to the number of relays",
-        "configuration refused: mission, Distance",
+        "configuration refused: mission: Distance",
         "configuration refused: this relay's altitude or power is out of range",
-        "configuration refused: channel, Carrier",
-        "configuration refused: mission, Band",
-        "configuration refused: mission, Lateral",
+        "configuration refused: channel: Carrier",
+        "configuration refused: mission: Band",
+        "configuration refused: mission: Lateral",
         "configuration refused: the method is unknown, or cannot use an interference field",
         "configuration refused: byte 15 (keep the altitude) must be 0 or 1",
         "configuration refused: rounds or explore_m out of range, or not 0 for another method than adjust",
@@ -126,7 +126,7 @@ fn a_drone_without_a_good_configuration_takes_no_part_and_says_why() {
         "configuration refused: the interference field has more points than the block can hold",
         "configuration refused: bytes after the last point of the interference field are not 0",
         "configuration refused: it has both an interferer and an interference field",
-        "configuration refused: field, Upsilon",
+        "configuration refused: interference field: Upsilon",
     ];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
     fleet.wait("word from every drone", |lines| {

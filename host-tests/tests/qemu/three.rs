@@ -128,7 +128,7 @@ fn three_images_fly_each_with_its_autopilot_and_one_of_these_is_mavsdk() {
         three.has_logged(1, "autopilot: found: PX4")
             && [2, 3]
                 .iter()
-                .all(|drone| three.has_logged(*drone, "autopilot: found, ArduCopter"))
+                .all(|drone| three.has_logged(*drone, "autopilot: found: ArduCopter"))
     });
     three.until("requests for messages", |three| {
         [33, 245].iter().all(|id| three.mavsdk.is_asked_for(*id))

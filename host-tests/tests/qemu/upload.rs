@@ -157,7 +157,7 @@ fn three_fly_what_they_were_handed_before_they_were_switched_on() {
     for drone in 1..=3 {
         let said = fleet.after_start(drone).take(4);
         let told = said
-            .filter(|line| line.text == "mission version 3 restored: uploaded before this start");
+            .filter(|line| line.text == "mission version 3 restored, which was uploaded before this start");
         assert_eq!(told.count(), 1);
     }
     drop(fleet);
