@@ -96,7 +96,7 @@ impl Report {
             Instant::ZERO,
             "resumed",
             json!({ "version": version }),
-            format_args!("this relay uses version {version} of the mission, which was uploaded before this start"),
+            format_args!("this relay flies version {version} of the mission, which was uploaded before this start"),
         );
     }
 

@@ -24,7 +24,8 @@ fn keys_that_do_not_fit_are_told_of_and_nothing_is_heard() {
         assert!(!is_believed || drone.is_none(), "{line}");
         let said = flight.relay.stopped().concat();
         assert!(!said.contains("5555"), "{said}");
-        let is_refused = said.contains("frames from the autopilot rejected because of their signatures");
+        let is_refused =
+            said.contains("frames from the autopilot rejected because of their signatures");
         assert!(is_refused || relay.is_none(), "{said}");
         assert_eq!(said.contains("autopilot: found"), relay.is_none(), "{said}");
     }

@@ -26,7 +26,7 @@ fn two_that_know_where_they_are_make_room_for_each_other() {
     let mut at = [[10.0, 0.0, 20.0], [30.0, 0.0, 20.0_f32]];
     for relay in &mut chain.relays {
         let line =
-            relay.line("guarded: setpoints keep drones apart while they move, by --positions");
+            relay.line("guarded: setpoints keep drones apart while they move; this drone's positions come from --positions");
         assert!(!line.contains("unguarded"), "{line}");
         assert!(!relay.has_said("setpoint: "), "nobody knows where it is");
     }

@@ -163,5 +163,5 @@ fn a_key_that_others_can_read_is_refused() {
 #[test]
 fn without_a_key_it_says_so() {
     let line = Relay::start("--index 1 --of 1").line("unsigned: ");
-    assert!(line.contains("anybody in range can send frames"), "{line}");
+    assert!(line.contains("anybody in range can forge them"), "{line}");
 }
