@@ -63,7 +63,7 @@ fn a_power_is_said_once() {
     let none = small("").replace("uav_w = 1\n", "");
     let parts = [
         "power.uav_w is missing",
-        "1e-6 to 1e6 W, or uav_dbm instead, a number, -30 to 90 dBm",
+        "1e-6 to 1e6 W, or the key uav_dbm instead, a number, -30 to 90 dBm",
     ];
     refused(&none, Problem::Missing, &parts);
 }
