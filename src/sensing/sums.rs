@@ -1,4 +1,4 @@
-//! Sums of the measurements that a pass collects along the chain: eighteen numbers, all that a fit needs.
+//! Sums of the measurements, collected by a pass along the chain: eighteen numbers for the fit.
 //!
 //! `Terms` are the terms of a position; 1 / I is a linear combination of them, and a source has one coefficient for each. A [`Level`] is the interference
 //! at an end of the chain, on the ground, within the measurable range of powers.
