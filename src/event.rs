@@ -1,5 +1,7 @@
-//! Events for the firmware. An event is a flag, and for some kinds the node it concerns. A firmware that does not poll loses only
-//! repetitions, and of two nodes at one side the earlier one.
+//! Events for the firmware.
+//!
+//! Each kind of event is a flag; some kinds also store the node that they concern. A firmware that polls late loses only repetitions of
+//! an event, and of two nodes on one side the earlier one.
 
 use crate::geodetic::LineError;
 use crate::side::Side;

@@ -122,8 +122,8 @@ pub enum LineError {
 impl core::fmt::Display for LineError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has none",
-            Self::Sites => "the sites must be on earth, 10 m to 100 km apart",
+            Self::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has no sites",
+            Self::Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
             Self::Altitude => "the altitudes must be within the relay's own geofence",
             Self::Lateral => "the lateral range must be within the relay's own geofence",
             Self::Length => "the distance must be within the relay's own geofence",

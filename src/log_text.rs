@@ -30,7 +30,9 @@ impl defmt::Format for Event {
             Self::Converged => (None, defmt::intern!("the relays have agreed on positions")),
             Self::Infeasible => (
                 None,
-                defmt::intern!("no target SIR can be met: all relays keep their positions"),
+                defmt::intern!(
+                    "no positions of the relays meet any target SIR: all relays keep their positions"
+                ),
             ),
             Self::NeighbourLost {
                 side: Side::Upstream,
@@ -69,7 +71,7 @@ impl defmt::Format for Event {
             Self::EpochWentBack { node } => (
                 Some(node),
                 defmt::intern!(
-                    "has an old epoch, and its frames are rejected: increase its epoch and restart it"
+                    "has started with an epoch (start counter) that is not above its last one, and its frames are rejected: increase its epoch and restart it"
                 ),
             ),
             Self::DuplicateIndex { node } => (
@@ -79,23 +81,25 @@ impl defmt::Format for Event {
             Self::SensorOff { node } => (
                 Some(node),
                 defmt::intern!(
-                    "measures what does not fit the others, and is ignored: check its receiver"
+                    "measures interference that does not fit the other measurements, and is ignored: check its receiver"
                 ),
             ),
             Self::ViewAccepted => (
                 None,
-                defmt::intern!("a new view has been accepted: new positions follow"),
+                defmt::intern!(
+                    "a new view (membership of the chain) has been agreed: new positions follow"
+                ),
             ),
             Self::LeaseLapsed => (
                 None,
                 defmt::intern!(
-                    "the lease has expired because not all relays are reachable: this relay keeps its setpoint"
+                    "the lease of the last agreement has expired because not all relays are reachable: this relay keeps its setpoint"
                 ),
             ),
             Self::NoQuorum => (
                 None,
                 defmt::intern!(
-                    "no quorum: bring the missing relays into range, or land the reachable ones"
+                    "no quorum, because too few relays are reachable: bring the missing relays into range, or land the reachable ones"
                 ),
             ),
             Self::Uploaded => (None, defmt::intern!("a newer mission has been received")),
@@ -123,8 +127,8 @@ impl defmt::Format for Event {
 }
 
 texts!(LineError {
-    LineError::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has none",
-    LineError::Sites => "the sites must be on earth, 10 m to 100 km apart",
+    LineError::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has no sites",
+    LineError::Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
     LineError::Altitude => "the altitudes must be within the relay's own geofence",
     LineError::Lateral => "the lateral range must be within the relay's own geofence",
     LineError::Length => "the distance must be within the relay's own geofence",
@@ -147,7 +151,7 @@ mod autopilot {
         State::Grounded => "on the ground, or not armed",
         State::Standby => "in the air, not controlled by the relay",
         State::Engaged => "setpoint control engaged",
-        State::Blind => "no position; keeps the last target",
+        State::Blind => "no recent position from the autopilot; the last target is kept",
     });
 
     texts!(ReleaseCause {
@@ -178,8 +182,8 @@ mod autopilot {
         WaitReason::Link => "messages from the autopilot arrive late",
         WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started; choose another mode first",
         WaitReason::Unseen => "no other mode than OFFBOARD or GUIDED was reported since the relay started",
-        WaitReason::Position => "there is no position near the line",
-        WaitReason::NotReady => "the relay is not in order with its neighbours",
+        WaitReason::Position => "the position is unknown, or not near the line between transmitter and receiver",
+        WaitReason::NotReady => "this drone is on the wrong side of a neighbour along the line; fly it to its own side first",
     });
 
     texts!(Mistrust {
@@ -193,7 +197,7 @@ mod autopilot {
     impl defmt::Format for AutopilotEvent {
         fn format(&self, f: defmt::Formatter<'_>) {
             match self {
-                Self::Found(kind) => defmt::write!(f, "found, {}", kind),
+                Self::Found(kind) => defmt::write!(f, "found: {}", kind),
                 Self::Restarted => defmt::write!(f, "restarted"),
                 Self::State(state) => defmt::write!(f, "{}", state),
                 Self::Released(release) => defmt::write!(f, "released: {}", release),
@@ -201,7 +205,7 @@ mod autopilot {
                 Self::Ready => defmt::write!(f, "ready: its pilot may choose OFFBOARD or GUIDED"),
                 Self::Refused => defmt::write!(
                     f,
-                    "flies to another target than it was sent; is the setpoint outside its fence?"
+                    "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
                 ),
                 Self::FenceBreached => defmt::write!(f, "fence breached"),
                 Self::OffLine(off) => defmt::write!(
@@ -211,14 +215,14 @@ mod autopilot {
                 ),
                 Self::LostCleared { relays, from, .. } => defmt::write!(
                     f,
-                    "lost relays {} are cleared, by MAVLink system {=u8}, component {=u8}",
+                    "lost relays {} have landed, by MAVLink system {=u8}, component {=u8}: this drone keeps clear of them no longer",
                     named(relays),
                     from.system,
                     from.component
                 ),
                 Self::ClearRefused { relays, from } => defmt::write!(
                     f,
-                    "lost relays {} are not cleared: name all lost relays of one side; by MAVLink system {=u8}, component {=u8}",
+                    "the command to clear the lost relays {} was denied: name all lost relays on one side; by MAVLink system {=u8}, component {=u8}",
                     named(relays),
                     from.system,
                     from.component

@@ -293,23 +293,23 @@ impl core::fmt::Display for SetupError {
             Self::Profile => {
                 "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
             }
-            Self::Step => "the fixed step must be above 0",
-            Self::Method => "method must be Align in a field, or without the feature altitude or adjust; Joint is for at most 100 relays",
+            Self::Step => "the fixed target step (linear SIR) must be above 0",
+            Self::Method => "method must be Align with an interference field; Joint needs the feature altitude and at most 100 relays, Adjust needs the feature adjust",
             Self::Reverse => "a mission with a reverse above 0 needs the method Align, which places relays for both directions, and no listen",
             Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
             Self::Measure => {
-                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field on"
+                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field is needed"
             }
             Self::Listen => {
-                "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1, the mission not in a field, and the feature sensing on"
+                "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1; listen needs the feature sensing and a mission without an interference field"
             }
             Self::HopTime => "hop_time must be above 0",
-            Self::Epoch => "auth.epoch must be above 0, and above that of every start before",
+            Self::Epoch => "auth.epoch must be above 0, and above the epoch of every earlier start",
             Self::Silence => "probe_after must be above 0 and dead_after above probe_after",
             Self::WithoutQuorum => {
                 "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
             }
-            Self::Guard => "guard needs its feature, a fence within 1e7 m with least <= most, separation_m 0 to 1e5, relays 1 to 1000, and hover_m 0 to 1e3",
+            Self::Guard => "guard needs the feature guard, geofence limits within -1e7 to 1e7 m with least <= most, separation_m within 0 to 1e5, relays within 1 to 1000, and hover_m within 0 to 1e3",
         })
     }
 }

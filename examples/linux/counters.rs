@@ -76,7 +76,7 @@ impl RejectionReasons {
             (
                 forged >= MANY && more(|stats| stats.handshakes) == 0,
                 forged,
-                "have a wrong tag: is the key in --key-file the same at all relays?",
+                "have a wrong signature (tag): is the key in --key-file the same at all relays?",
             ),
             (
                 signs && unsigned >= MANY,

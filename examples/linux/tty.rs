@@ -60,7 +60,7 @@ impl Tty {
     /// and would otherwise cause a busy loop.
     pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
-            self.fail("is gone");
+            self.fail("device disconnected");
         }
     }
 
@@ -81,7 +81,7 @@ impl Tty {
             Ok(count) => Ok(Some(count)),
             Err(Errno::AGAIN | Errno::INTR) => Ok(None),
             Err(Errno::IO | Errno::NXIO | Errno::NODEV) => {
-                self.fail("is gone");
+                self.fail("device disconnected");
                 Err(Fault::Other)
             }
             Err(error) => {
@@ -107,7 +107,7 @@ impl SerialPort for Tty {
         let count = self.done(result)?;
         if count == Some(0) {
             // With VMIN = 1 an end of file means that the other end hung up.
-            self.fail("is gone");
+            self.fail("device disconnected");
         }
         Ok(count.unwrap_or(0))
     }

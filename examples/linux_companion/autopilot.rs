@@ -123,7 +123,7 @@ impl Companion {
             Instant::ZERO,
             EVENT,
             format_args!(
-                "connected by {place}{from}, at most {} m/s; setpoint control begins when the pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
+                "connected by {place}{from}, maximum speed {} m/s; setpoint control begins when the pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
                 pace.speed_m_s
             ),
         );
@@ -136,7 +136,9 @@ impl Companion {
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         let refused = self.link.refused();
         if refused > 0 {
-            let what = format_args!("{refused} frames rejected because of their signatures");
+            let what = format_args!(
+                "{refused} frames from the autopilot rejected because of their signatures"
+            );
             log.line(now, EVENT, what);
         }
     }
@@ -272,7 +274,7 @@ impl Companion {
                 }
             ),
             (Received::Others, _) => format!(
-                "no frame received at {} is from a PX4 or an ArduCopter: is that the port of the autopilot itself (component 1)?",
+                "no frame received at {} is from a PX4 or an ArduCopter: is this the port of the autopilot itself (MAVLink component 1)?",
                 self.plan.port
             ),
         }
@@ -342,7 +344,7 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
         AutopilotEvent::Found(Kind::ArduCopter) => "found an ArduCopter".to_owned(),
         AutopilotEvent::Restarted => "restarted".to_owned(),
         AutopilotEvent::Refused => {
-            "flies to another target than it was sent; is the setpoint outside its fence?"
+            "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
                 .to_owned()
         }
         AutopilotEvent::State(state) => {
@@ -353,7 +355,7 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
                 State::Grounded => "on the ground, or not armed",
                 State::Standby => "in the air, not controlled by the relay",
                 State::Engaged => "setpoint control engaged",
-                State::Blind => "no position; keeps the last target",
+                State::Blind => "no recent position from the autopilot; the last target is kept",
             };
             return log.event(now, EVENT, json!({ "state": word(state) }), what);
         }
@@ -429,8 +431,12 @@ const fn wait_reason(reason: WaitReason) -> &'static str {
         WaitReason::Unseen => {
             "no other mode than OFFBOARD or GUIDED was reported since this program started"
         }
-        WaitReason::Position => "there is no position near the line",
-        WaitReason::NotReady => "the relay is not in order with its neighbours",
+        WaitReason::Position => {
+            "the position is unknown, or not near the line between transmitter and receiver"
+        }
+        WaitReason::NotReady => {
+            "this drone is on the wrong side of a neighbour along the line; fly it to its own side first"
+        }
         _ => "the reason is unknown",
     }
 }

@@ -80,7 +80,9 @@ pub(crate) const fn word(reason: HoldReason) -> &'static str {
 fn describe(reason: HoldReason, whom: &str) -> String {
     match reason {
         HoldReason::Unheard => {
-            format!("{whom} is not engaged, or has not reported its position yet")
+            format!(
+                "setpoint control is not engaged at {whom}, or its position has not been received yet"
+            )
         }
         HoldReason::Order => format!(
             "this drone is on the wrong side of {whom} along the line, or too close to it to be sure; fly one of the two drones to its own side by hand"
@@ -92,12 +94,14 @@ fn describe(reason: HoldReason, whom: &str) -> String {
             format!("a lost relay may still hover between this drone and {whom}")
         }
         HoldReason::NotFlown => {
-            format!("{whom} is not engaged, and blocks the path or makes no room")
+            format!("setpoint control is not engaged at {whom}, which is in the way")
         }
-        HoldReason::Pending => format!("{whom} has not made room for this drone yet"),
+        HoldReason::Pending => {
+            format!("{whom} has not left the space that this drone moves into yet")
+        }
         HoldReason::Halted => {
             format!(
-                "a relay beyond {whom} is not in order with its neighbours; the log of that relay has the reason"
+                "a relay beyond {whom} is on the wrong side of a neighbour; the log of that relay has the reason"
             )
         }
     }

@@ -74,7 +74,11 @@ impl Positions {
     pub(crate) fn stopped(&self, now: Instant, log: &Log) {
         let bad = self.invalid_lines();
         if bad > 0 {
-            log.line(now, "position", format_args!("{bad} invalid lines"));
+            log.line(
+                now,
+                "position",
+                format_args!("{bad} invalid lines of --positions ignored"),
+            );
         }
     }
 }
@@ -83,7 +87,9 @@ impl Positions {
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
-        let what = format_args!("setpoints keep drones apart while they move, by {fifo}");
+        let what = format_args!(
+            "setpoints keep drones apart while they move; this drone's positions come from {fifo}"
+        );
         log.line(now, "guarded", what);
     } else {
         let what = "no --positions: drones are not kept apart while they move";

@@ -35,7 +35,7 @@ pub(crate) fn resume_views(
     if let Some(bytes) = &bytes {
         stored = record(bytes, ViewRecord::LENGTH);
         let votes = stored.and_then(ViewRecord::from_bytes).ok_or_else(|| {
-            refused("is damaged or no record of votes: before a new flight remove the file, and start again")
+            refused("is damaged or not a record of votes: before a new flight remove the file, and start again")
         })?;
         relay.resume_view(now, &votes).map_err(|error| match error {
             RecordError::Base => refused(&format!(
@@ -75,7 +75,7 @@ fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Upload>, String>
     let (base, loaded) = (upload.base(), mission.digest());
     if base != loaded || upload.config().relays != mission.relays() {
         return Err(named(&format!(
-            "is for relays that were loaded with mission 0x{base:04x} and not 0x{loaded:04x}"
+            "is for relays that were loaded with the mission of digest 0x{base:04x}, but this relay has 0x{loaded:04x}"
         )));
     }
     Ok(Some(upload))

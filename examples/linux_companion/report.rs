@@ -73,7 +73,7 @@ impl Report {
                 "version": env!("CARGO_PKG_VERSION"),
             }),
             format_args!(
-                "relay {index} of {relays}, network {network}, mission 0x{digest:04x}, {names}, {baud} baud"
+                "relay {index} of {relays}, network {network}, mission digest 0x{digest:04x}, {names}, {baud} baud"
             ),
         );
     }
@@ -85,7 +85,7 @@ impl Report {
             None => self.log.line(
                 Instant::ZERO,
                 "unsigned",
-                "no --key-file: frames are not signed, and anybody in range can send frames",
+                "no --key-file: frames are not signed, and anybody in range can forge them",
             ),
         }
     }
@@ -106,7 +106,7 @@ impl Report {
         self.log.line(
             Instant::ZERO,
             "restored",
-            "this relay's earlier votes on views were read from --view-file; remove that file before another flight",
+            "this relay's earlier votes on the chain's membership were read from --view-file; remove that file before another flight",
         );
     }
 
@@ -121,18 +121,18 @@ impl Report {
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
             Event::Infeasible => tell(
                 "infeasible",
-                "no target SIR can be met; all relays keep their positions",
+                "no positions of the relays meet any target SIR; all relays keep their positions",
             ),
             Event::Adopted => self.adopted(now, relay),
             Event::ViewAccepted => self.view_accepted(now, relay),
             Event::NewEstimate => self.log_estimate(now, relay.interference_estimate()),
             Event::LeaseLapsed => tell(
                 "lease expired",
-                "not all relays are reachable; this relay keeps its setpoint and requests a new view",
+                "not all relays are reachable, so the last agreement is no longer used; this relay keeps its setpoint and requests a new membership of the chain (view)",
             ),
             Event::NoQuorum => tell(
                 "no quorum",
-                "too few relays are reachable; this relay keeps its setpoint; bring the missing relays into range, or land the reachable ones",
+                "too few relays are reachable to agree on a membership of the chain; this relay keeps its setpoint; bring the missing relays into range, or land the reachable ones",
             ),
             Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {
@@ -214,7 +214,7 @@ impl Report {
             Event::MissionMismatch { .. } => say(
                 "mismatch",
                 format_args!(
-                    "{name} has another mission than this relay, which has 0x{:04x}; load the same mission into both",
+                    "{name} has another mission than this relay, whose digest is 0x{:04x}; load the same mission into both",
                     self.mission_digest(relay)
                 ),
             ),
@@ -227,7 +227,7 @@ impl Report {
             Event::EpochWentBack { .. } => say(
                 "epoch",
                 format_args!(
-                    "the epoch of {name} went back, and its frames are rejected; raise the number in the --epoch-file of {name} and restart it"
+                    "{name} has started with an epoch (start counter) that is not above its last one, and its frames are rejected; raise the number in its --epoch-file and restart it"
                 ),
             ),
             Event::SensorOff { .. } => say(
@@ -305,7 +305,7 @@ impl Report {
             now,
             "view accepted",
             json!({ "place": place, "relays": relays, "view": view }),
-            format_args!("{relays} relays, this relay at place {place}, view {view}"),
+            format_args!("the chain has {relays} relays, this one at place {place} from the transmitter (view {view})"),
         );
     }
 
@@ -313,7 +313,10 @@ impl Report {
         let db = 10.0 * target.log10();
         let fields = json!({ "target_sir": target, "target_sir_db": db });
         if target > 0.0 {
-            let text = format_args!("target SIR {:.6}, {db:.3} dB", Exact(target));
+            let text = format_args!(
+                "positions agreed, target SIR {:.6}, {db:.3} dB",
+                Exact(target)
+            );
             self.log.event(now, "converged", fields, text);
         } else {
             let text = "the relays spread along the line to measure the interferer";
@@ -347,7 +350,7 @@ impl Report {
                 self.log.line(now, "estimate", what);
             }
             InterferenceEstimate::Mission => {
-                let what = "the chain uses the interferer of the mission";
+                let what = "the chain uses the interferer given in the mission";
                 self.log.line(now, "estimate", what);
             }
         }

@@ -30,7 +30,7 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
             "version": env!("CARGO_PKG_VERSION"),
         }),
         format_args!(
-            "{end} of {relays} relays, network {network}, loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
+            "{end} of a chain of {relays} relays, network {network}, digest of the loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
         ),
     );
     log.signed(epoch);
@@ -43,7 +43,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             let digest = upload.id().digest;
             let sites = upload.sites();
             let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
-            let what = format_args!("version {version}, mission 0x{digest:04x}{sites}");
+            let what = format_args!("version {version}, mission digest 0x{digest:04x}{sites}");
             log.line(now, "offering", what);
         }
         Progress::Stored { by } => log.line(
@@ -234,13 +234,13 @@ fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         (
             stats.mission,
             format!(
-                "hellos come from relays that were loaded with another mission than 0x{:04x}: give this station the mission that the relays were loaded with",
+                "hello messages come from relays that were loaded with another mission than 0x{:04x}: give this station the mission that the relays were loaded with",
                 plan.loaded.mission.digest()
             ),
         ),
         (
             stats.forged,
-            "frames have a wrong tag: --key-file must be the key of the relays".to_owned(),
+            "frames have a wrong signature (tag): --key-file must be the key of the relays".to_owned(),
         ),
         (
             stats.unsigned,
@@ -279,7 +279,7 @@ fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         }
         // A relay with another mission sends only handshakes.
         None if stats.handshakes > 0 => format!(
-            "a relay sends handshakes but no hellos: it was probably loaded with another mission than 0x{:04x}",
+            "a relay sends handshakes but no hello messages: it was probably loaded with another mission than 0x{:04x}",
             plan.loaded.mission.digest()
         ),
         None => format!(

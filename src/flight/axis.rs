@@ -61,7 +61,7 @@ impl core::fmt::Display for AxisError {
             let Geodetic { lat_e7, lon_e7, .. } = site;
             write!(
                 f,
-                "site {name}: latitude {lat_e7} and longitude {lon_e7} in 1e-7 degrees: allowed are ±900000000 and ±1800000000"
+                "site {name}: latitude {lat_e7} and longitude {lon_e7} in 1e-7 degrees: must be within ±900000000 and ±1800000000"
             )
         };
         match self {
@@ -69,11 +69,11 @@ impl core::fmt::Display for AxisError {
             Self::Rx(at) => site(f, "rx", at),
             Self::TooShort { distance_m } => write!(
                 f,
-                "the sites are {distance_m:.2} m apart: allowed are {SHORTEST_M} to {LONGEST_M} m"
+                "the sites are {distance_m:.2} m apart: must be within {SHORTEST_M} to {LONGEST_M} m"
             ),
             Self::TooLong { distance_m } => write!(
                 f,
-                "the sites are {distance_m:.0} m apart: allowed are {SHORTEST_M} to {LONGEST_M} m"
+                "the sites are {distance_m:.0} m apart: must be within {SHORTEST_M} to {LONGEST_M} m"
             ),
         }
     }

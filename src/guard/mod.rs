@@ -1,7 +1,7 @@
 //! Motion guard: keeps relays apart while they fly to new agreed positions. Messages may be lost or late.
 //!
-//! Relays are in order along x. Normally neighbours are the separation apart *along x*, and then so are all relays, whatever they
-//! do across the line. Two relays whose agreed positions are beside or above each other come closer along x once both have
+//! Relays are in order along x. Normally neighbours are the separation apart *along x*; then all relays are, independently of their
+//! positions across the line. Two relays whose agreed positions are beside or above each other come closer along x once both have
 //! arrived across the line; their distance across the line then counts. Two relays with one between them always stay the
 //! separation apart along x, so no relay needs more information than its neighbours'. Positions that do not allow that are
 //! approached as far as possible, and [`Guard::hold_reason`] reports it.

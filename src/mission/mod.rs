@@ -150,7 +150,7 @@ impl core::fmt::Display for MissionError {
                 "common.altitude_m must be within 0.1 to 1e5, common.power_w within 1e-6 to 1e6"
             }
             Self::Band => {
-                "band.least_m to band.most_m must be within 0.1 to 1e5, with common.altitude_m between them"
+                "the altitude band, band.least_m to band.most_m, must be within 0.1 to 1e5 and include common.altitude_m"
             }
             Self::Lateral => "lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
             Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
@@ -160,9 +160,9 @@ impl core::fmt::Display for MissionError {
             }
             Self::NoiseFeature => "a noise_w above 0 needs the feature `noise`",
             Self::Field => "a field of interference needs the feature `field`",
-            Self::Reverse => "reverse must be within 0 to 1",
+            Self::Reverse => "reverse (SIR of the direction Rx to Tx, as a share of that from Tx to Rx) must be within 0 to 1",
             Self::ReverseInterference => {
-                "a reverse above 0 needs a known interferer: no field of interference, and none that relays locate"
+                "a reverse above 0 needs a known interferer, not an interference field or an interferer that the relays locate"
             }
             Self::ReverseFeature => "a reverse above 0 needs the feature `reverse`",
             Self::RxPower => "rx_power_w must be within 1e-6 to 1e6",

@@ -1,4 +1,4 @@
-//! Placement algorithms on board: pure functions of the mission without state of their own.
+//! Placement algorithms on board: pure functions of the mission, without state.
 //!
 //! | purpose | files |
 //! | --- | --- |

@@ -1,4 +1,4 @@
-//! End of the frame counter, which no test can reach by sending.
+//! Tests of the end of the frame counter's range, which sending frames would not reach in a test.
 
 use super::Relay;
 use crate::mission::tests::paper;

@@ -1,6 +1,6 @@
-//! Sums that a pass collects along the chain. Eighteen numbers that contain all a fit needs of the measurements.
+//! Sums of the measurements, collected by a pass along the chain: eighteen numbers for the fit.
 //!
-//! `Terms` are those of which 1 / I is a linear combination; a source has a coefficient for each. A [`Level`] is the interference
+//! `Terms` are the terms of a position; 1 / I is a linear combination of them, and a source has one coefficient for each. A [`Level`] is the interference
 //! at an end of the chain, on the ground, within the measurable range of powers.
 //! A `Listener` has the measurements of one relay: the average at its position, and faded sums of earlier positions.
 

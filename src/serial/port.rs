@@ -23,11 +23,11 @@ pub enum Fault {
 impl core::fmt::Display for Fault {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Overrun => "a received byte was overrun by the next one",
-            Self::Framing => "a received byte had no stop bit",
-            Self::Parity => "a received byte had the wrong parity",
-            Self::Noise => "a byte was received from a noisy line",
-            Self::Other => "the serial port failed",
+            Self::Overrun => "receive overrun: a byte was lost because it was read too late",
+            Self::Framing => "framing error: a received byte had no stop bit",
+            Self::Parity => "parity error in a received byte",
+            Self::Noise => "noise error: a byte was received with noise on the line",
+            Self::Other => "unknown error of the serial port",
         })
     }
 }

@@ -1,6 +1,6 @@
 //! End of a node's links: accepts received frames, and addresses, numbers and signs its own.
 //!
-//! A relay and a ground station have one each. What a frame then means to them is theirs.
+//! A relay and a ground station have one each, and interpret the accepted messages themselves.
 
 use super::auth::{AUTH, Auth};
 use super::deframe::DeframeError;

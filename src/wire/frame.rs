@@ -62,7 +62,7 @@ impl core::fmt::Display for FrameError {
         match self {
             Self::Short => f.write_str("the frame is too short"),
             Self::Crc => f.write_str("the CRC does not match"),
-            Self::Version => f.write_str("the frame is of another version of the format"),
+            Self::Version => f.write_str("the frame has another version of the frame format"),
             Self::Message(error) => error.fmt(f),
         }
     }

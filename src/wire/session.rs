@@ -1,7 +1,7 @@
 //! Sessions: authentication of received frames and signing of sent ones, with one session per node.
 //!
-//! For each such node, a relay has a *nonce*: its epoch, and below it a number that counts entries from the relay's claim number
-//! on (`node::duplicate`). A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender. So a
+//! Toward each other node a relay has a *nonce*: its epoch, and in the lower half a number that counts up from the relay's claim
+//! number (`node::duplicate`). A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender. So a
 //! frame that was recorded before either of them started, or had forgotten the other, is rejected. The other's nonce comes in a
 //! *handshake*: a frame whose body is the sender's nonce, the receiver's as far as the sender knows it, and whether the sender
 //! still lacks the proof that the receiver is present.

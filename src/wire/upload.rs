@@ -67,7 +67,7 @@ impl core::fmt::Display for UploadError {
                 "an upload, and the mission it replaces, must have one interferer and no field"
             }
             Self::Reverse => {
-                "an upload, and the mission it replaces, must have a reverse of 0: relays are loaded with a way back before flight"
+                "an upload, and the mission it replaces, must have a reverse of 0, because a reverse above 0 can only be loaded before flight"
             }
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",

@@ -83,27 +83,35 @@ pub(crate) fn begins(config: &Config) {
 pub(crate) fn started(begun: &Begun) {
     match begun.reset {
         Reset::Watchdog => {
-            error!("started by the watchdog: the loop hung, or the clock stopped");
+            error!("restarted by the watchdog: the main loop hung, or the clock stopped");
         }
-        reset => info!("started: {=str}", reset.text()),
+        reset => info!("started, cause of the reset: {=str}", reset.text()),
     }
     let mhz = begun.clocks.core_hz / 1_000_000;
     match begun.clocks.pll {
-        Some(Source::Crystal) => info!("clock {=u32} MHz, from the crystal", mhz),
-        Some(Source::Internal) => warn!("clock {=u32} MHz, no crystal of 8 MHz", mhz),
-        None => warn!("clock {=u32} MHz, no PLL", mhz),
+        Some(Source::Crystal) => info!("clock {=u32} MHz, from the 8 MHz crystal", mhz),
+        Some(Source::Internal) => warn!(
+            "clock {=u32} MHz, from the internal oscillator: no 8 MHz crystal found",
+            mhz
+        ),
+        None => warn!(
+            "clock {=u32} MHz, from the internal oscillator: the PLL did not start",
+            mhz
+        ),
     }
 }
 
 pub(crate) fn unguarded() {
-    warn!("no sites: no autopilot is controlled, and drones are not kept apart while they move");
+    warn!(
+        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+    );
 }
 
 /// Logs the length of the line between the sites, and the drone's speed limit.
 #[cfg(feature = "flight")]
 pub(crate) fn flies(course: &Course) {
     info!(
-        "autopilot: line of {=f64} m, at most {=f32} m/s",
+        "autopilot: {=f64} m from transmitter to receiver, maximum speed {=f32} m/s",
         course.axis.distance_m(),
         course.pace.speed_m_s
     );
@@ -112,18 +120,20 @@ pub(crate) fn flies(course: &Course) {
 #[cfg(feature = "flight")]
 pub(crate) fn off_course(error: CourseError) {
     match error {
-        CourseError::Axis(error) => error!("configuration refused: sites, {}", error),
+        CourseError::Axis(error) => error!("configuration refused: sites: {}", error),
         CourseError::Distance(along) => error!(
             "configuration refused: the sites are {=f64} m apart: the mission's distance must be the same",
             along
         ),
-        other => error!("configuration refused: sites, {}", other),
+        other => error!("configuration refused: sites: {}", other),
     }
 }
 
 #[allow(dead_code, reason = "for an image that tells no autopilot")]
 pub(crate) fn no_flight() {
-    error!("configuration refused: it has sites, and this image was built without flight");
+    error!(
+        "configuration refused: it has sites, but this image was built without the feature flight"
+    );
 }
 
 #[cfg(feature = "mavlink-signing")]
@@ -136,7 +146,7 @@ pub(crate) fn signs_to_autopilot() {
 #[cfg(all(feature = "flight", not(feature = "mavlink-signing")))]
 pub(crate) fn cannot_sign_to_autopilot() {
     error!(
-        "configuration refused: it has an autopilot's key, and this image was built without mavlink-signing"
+        "configuration refused: it has an autopilot's key, but this image was built without the feature mavlink-signing"
     );
 }
 
@@ -160,60 +170,84 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
 
 pub(crate) fn refused(error: ConfigError) {
     match error {
-        ConfigError::Blank => warn!("no configuration: the block is blank"),
-        ConfigError::Magic => error!("configuration refused: the block does not begin with UAVR"),
-        ConfigError::Version => {
-            error!("configuration refused: another version or length of the block");
+        ConfigError::Blank => warn!("no configuration: the configuration block in flash is blank"),
+        ConfigError::Magic => {
+            error!("configuration refused: the configuration block does not begin with UAVR")
         }
-        ConfigError::Crc => error!("configuration refused: damaged, the CRC does not match"),
+        ConfigError::Version => {
+            error!(
+                "configuration refused: the block's version or length is not the one of this firmware"
+            );
+        }
+        ConfigError::Crc => {
+            error!("configuration refused: the block is damaged, its CRC does not match")
+        }
         ConfigError::Index => {
-            error!("configuration refused: the index exceeds the number of relays, or is 0");
+            error!(
+                "configuration refused: the relay's index must be within 1 to the number of relays"
+            );
         }
         ConfigError::Profile => {
-            error!("configuration refused: altitude or power of this relay out of range");
+            error!("configuration refused: this relay's altitude or power is out of range");
         }
-        ConfigError::Hold => error!("configuration refused: byte 15 is neither 0 nor 1"),
+        ConfigError::Hold => {
+            error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1")
+        }
         ConfigError::Method => {
-            error!("configuration refused: method unknown, or not for a field");
+            error!(
+                "configuration refused: the method is unknown, or cannot use an interference field"
+            );
         }
         ConfigError::Adjust => {
             error!(
-                "configuration refused: rounds or explore of adjust out of range, or not 0 for another method"
+                "configuration refused: rounds or explore_m out of range, or not 0 for another method than adjust"
             );
         }
         ConfigError::Measure => {
-            error!("configuration refused: samples or i_max_w of the measurement out of range");
+            error!(
+                "configuration refused: samples or i_max_w of the interference measurement out of range"
+            );
         }
         ConfigError::Listen => {
             error!(
-                "configuration refused: settings for measurements (listen) out of range, or in a field"
+                "configuration refused: listen settings (locating the interferer) out of range, or given with an interference field"
             );
         }
         ConfigError::Reverse => {
-            error!("configuration refused: a way back needs align, and no listen");
+            error!(
+                "configuration refused: a reverse above 0 needs the method align, and no listen"
+            );
         }
         ConfigError::Interferer => {
-            error!("configuration refused: it has both an interferer and a field");
+            error!("configuration refused: it has both an interferer and an interference field");
         }
-        ConfigError::Points => error!("configuration refused: too many points of the field"),
+        ConfigError::Points => error!(
+            "configuration refused: the interference field has more points than the block can hold"
+        ),
         ConfigError::Unused => {
-            error!("configuration refused: bytes behind the last point are not 0");
+            error!(
+                "configuration refused: bytes after the last point of the interference field are not 0"
+            );
         }
         ConfigError::Secret => {
-            error!("configuration refused: key or epoch, without the other or out of range");
+            error!(
+                "configuration refused: key and epoch must be given together, the epoch within 1 to 4294967294"
+            );
         }
         ConfigError::Speed => {
-            error!("configuration refused: speed out of range, or without sites");
+            error!(
+                "configuration refused: the speed must be within 0.1 to 20 m/s, and needs sites"
+            );
         }
         ConfigError::AutopilotKey => {
-            error!("configuration refused: an autopilot's key without sites");
+            error!("configuration refused: an autopilot's key needs sites");
         }
         ConfigError::Silence => {
-            error!("configuration refused: probe_after_ms above 1200000");
+            error!("configuration refused: probe_after_ms must be at most 1200000");
         }
-        ConfigError::Field(error) => error!("configuration refused: field, {}", error),
-        ConfigError::Channel(error) => error!("configuration refused: channel, {}", error),
-        ConfigError::Mission(error) => error!("configuration refused: mission, {}", error),
+        ConfigError::Field(error) => error!("configuration refused: interference field: {}", error),
+        ConfigError::Channel(error) => error!("configuration refused: channel: {}", error),
+        ConfigError::Mission(error) => error!("configuration refused: mission: {}", error),
     }
 }
 
@@ -224,7 +258,7 @@ pub(crate) fn signs(epoch: u32, is_stored: bool) {
         info!("frames are signed, epoch {=u32}", epoch);
     } else {
         error!(
-            "frames are signed, epoch {=u32}; it cannot be stored: raise the epoch of the block before the next start",
+            "frames are signed, epoch {=u32}; the epoch cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }
@@ -232,19 +266,19 @@ pub(crate) fn signs(epoch: u32, is_stored: bool) {
 
 #[cfg(feature = "auth")]
 pub(crate) fn unsigned() {
-    warn!("no key: frames are not signed, and anybody in range can send frames");
+    warn!("no key: frames are not signed, and anybody in range can forge them");
 }
 
 #[cfg(feature = "auth")]
 pub(crate) fn no_epoch() {
-    error!("no epoch is left to sign with");
+    error!("frames cannot be signed: the epoch (start counter) has reached its maximum");
 }
 
 /// Logs that a mission uploaded before this start was restored.
 #[cfg(feature = "upload")]
 pub(crate) fn resumes(version: u16) {
     info!(
-        "mission version {=u16} restored: uploaded before this start",
+        "mission version {=u16} restored, which was uploaded before this start",
         version
     );
 }
@@ -265,30 +299,32 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
 /// Logs the votes restored after a reboot; `accepted` is true if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
-        info!("votes on views restored from flash");
+        info!("votes on the chain's membership restored from flash");
     } else {
-        error!("votes on views in flash are of another firmware, and ignored");
+        error!("votes on the chain's membership in flash are from another firmware, and ignored");
     }
 }
 
 /// Logs that storing the relay's votes works again (`is_stored` is true) or fails (`is_stored` is false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
-        info!("votes on views can be stored again");
+        info!("votes on the chain's membership can be stored again");
     } else {
-        error!("votes on views cannot be stored: a reboot in flight loses them");
+        error!("votes on the chain's membership cannot be stored: a reboot in flight loses them");
     }
 }
 
 #[cfg(not(feature = "auth"))]
 pub(crate) fn cannot_sign() {
-    error!("configuration refused: it has a key, and this image was built without auth");
+    error!(
+        "configuration refused: it has a key, but this image was built without the feature auth"
+    );
 }
 
 /// Logs that the relay rejects the configuration, mostly because this image lacks a feature for it.
 pub(crate) fn cannot_fly(error: SetupError) {
     error!(
-        "configuration refused: not supported by this image, {}",
+        "configuration refused: not supported by this image: {}",
         error
     );
 }
@@ -335,7 +371,7 @@ pub(crate) fn event(event: Event, relay: &Relay) {
 
 pub(crate) fn counters(relay: &Relay) {
     info!("counters {}", relay.stats());
-    info!("log frames lost {=u32}", lost());
+    info!("log lines lost: {=u32}", lost());
 }
 
 pub(crate) fn link_counters(link: &SerialStats) {

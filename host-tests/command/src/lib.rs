@@ -85,7 +85,7 @@ fn wrong(error: &clap::Error) -> String {
     if let Some(meant) = meant.iter().find(|meant| !meant.is_empty()) {
         wrong = format!("{wrong}; did you mean {meant}?");
     } else if error.kind() == ErrorKind::UnknownArgument {
-        wrong.push_str("; --help lists what there is");
+        wrong.push_str("; --help lists the options");
     }
     wrong.trim_start_matches("error: ").to_owned()
 }
@@ -177,7 +177,7 @@ pub fn file(text: &str) -> Result<PathBuf, String> {
     match text {
         "" => Err("must be the name of a file".to_owned()),
         "-" => Err(
-            "must be the name of a file: standard output has the report; a file of this name is ./-"
+            "must be the name of a file, because standard output has the report; for a file named - give ./-"
                 .to_owned(),
         ),
         name => Ok(name.into()),

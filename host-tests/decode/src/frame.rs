@@ -102,7 +102,9 @@ fn open<'f>(format: &'f Format, plain: &[u8], frame: &mut Frame<'f>) {
         (Ok(_), None) => None,
         (Err(MessageError::Value), None) => Some(Refusal::Range),
         (_, Some(error)) => Some(Refusal::Malformed(error)),
-        (Err(_), None) => Some(Refusal::Malformed("not its one encoding".to_owned())),
+        (Err(_), None) => Some(Refusal::Malformed(
+            "it is not in the canonical encoding".to_owned(),
+        )),
     };
 }
 

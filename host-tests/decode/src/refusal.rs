@@ -45,20 +45,23 @@ impl Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unended => f.write_str("it has no delimiter at its end"),
+            Self::Unended => f.write_str("the delimiter at its end is missing"),
             Self::Oversized(len) => write!(f, "too long: {len} bytes, a frame has at most 137"),
-            Self::Truncated => f.write_str("cut short: the delimiter comes inside a COBS run"),
-            Self::Short(len) => write!(f, "too short: {len} bytes without COBS"),
-            Self::Crc(has, is) => write!(f, "CRC {has:08x}, but its bytes give {is:08x}"),
+            Self::Truncated => f.write_str("cut short: the delimiter is inside a COBS block"),
+            Self::Short(len) => write!(f, "too short: {len} bytes after COBS decoding"),
+            Self::Crc(has, is) => write!(
+                f,
+                "CRC mismatch: the frame has {has:08x}, its bytes give {is:08x}"
+            ),
             Self::Version(version, flags) => {
                 write!(
                     f,
-                    "version {version} with flags {flags}: must be 1 with 0, 1 or 3"
+                    "frame version {version} with flags {flags}: must be version 1 with flags 0, 1 or 3"
                 )
             }
-            Self::UnknownTag(tag) => write!(f, "unknown tag {tag:02x}"),
+            Self::UnknownTag(tag) => write!(f, "unknown message type (tag {tag:02x})"),
             Self::Malformed(what) => write!(f, "malformed: {what}"),
-            Self::Range => f.write_str("a number is outside its range"),
+            Self::Range => f.write_str("a number in the message is outside its range"),
         }
     }
 }

@@ -26,8 +26,8 @@ impl TagCheck {
         match self {
             Self::Right => "tag right",
             Self::Wrong => "tag wrong",
-            Self::NoKey => "tag not checked: no --key",
-            Self::NoHandshake => "tag not checked: no handshake of the two was seen",
+            Self::NoKey => "tag not checked: give --key",
+            Self::NoHandshake => "tag not checked: the capture has no handshake of these two nodes",
         }
     }
 

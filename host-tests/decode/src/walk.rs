@@ -9,7 +9,10 @@ struct Rest<'b>(&'b [u8]);
 
 impl Rest<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        let (taken, rest) = self.0.split_first_chunk::<N>().ok_or("it ends here")?;
+        let (taken, rest) = self
+            .0
+            .split_first_chunk::<N>()
+            .ok_or("the message ends too early")?;
         self.0 = rest;
         Ok(*taken)
     }
@@ -24,14 +27,14 @@ impl Rest<'_> {
         for shift in (0..64).step_by(7) {
             let byte = self.byte()?;
             if byte == 0 && shift > 0 {
-                return Err("its varint is padded".to_owned());
+                return Err("a varint in it is not in the shortest form".to_owned());
             }
             number |= u64::from(byte & 0x7F) << shift;
             if byte < 0x80 {
                 return Ok(number);
             }
         }
-        Err("its varint is too long".to_owned())
+        Err("a varint in it is too long".to_owned())
     }
 
     fn flag(&mut self, what: &str) -> Result<bool, String> {
@@ -68,7 +71,7 @@ pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>
         return (read, Some(error));
     }
     let over = rest.0.len();
-    let error = (over > 0).then(|| format!("{over} bytes are left over"));
+    let error = (over > 0).then(|| format!("{over} bytes are left over after the last field"));
     (read, error)
 }
 

@@ -81,7 +81,7 @@ fn run(options: &str, scenario: &str, film: bool) -> Result<RunOutput, Failure> 
         while !chain.step(HAPPENINGS) {
             if chain.progress().1.as_micros() > LONGEST_S * 1_000_000 {
                 return Err(Failure::unmet(format!(
-                    "the chain has not settled after {LONGEST_S} s"
+                    "the relays have not agreed on final positions after {LONGEST_S} s"
                 )));
             }
         }

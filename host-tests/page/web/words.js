@@ -6,7 +6,7 @@ const byId = (id) => document.getElementById(id);
 const decibels = (linear) => `${(10 * Math.log10(linear)).toFixed(2)} dB`;
 
 function summary(report) {
-  if (report.sir === undefined) return "No agreement.";
+  if (report.sir === undefined) return "The relays have not agreed on positions.";
   const share = report.share_of_optimum === undefined ? "" : ` ${(100 * report.share_of_optimum).toFixed(1)} % of the optimum with the interferer known.`;
   return `Worst hop: SIR ${report.sir.toPrecision(5)} (${decibels(report.sir)}) with ${report.relays.length} relays; ${report.messages} messages, ${report.bytes} bytes, ${report.virtual_s.toFixed(3)} s of virtual time.${share}`;
 }
@@ -51,8 +51,12 @@ function list(sirs, ends) {
 const PHRASES = {
   "silent": "went silent",
   "lost": "lost relay",
-  "found": "linked with relay",
+  "found": "became a neighbour of relay",
   "no quorum": "no quorum, too few relays are reachable",
+  "view accepted": "new membership of the chain agreed",
+  "lease expired": "the lease of the agreement expired",
+  "not received by": "is not received by relay",
+  "sensor off": "ignores the measurements of relay",
   "converged": "agreed on a position",
   "infeasible": "no target SIR can be met",
   "new estimate": "new interference estimate",

@@ -79,7 +79,10 @@ impl Check<'_> {
                             Problem::Missing,
                             key.alternatives(keys.clone())
                                 .fold(rule.to_string(), |said, other| {
-                                    format!("{said}, or {} instead, {}", other.name, other.rule)
+                                    format!(
+                                        "{said}, or the key {} instead, {}",
+                                        other.name, other.rule
+                                    )
                                 }),
                         ));
                     }
@@ -102,7 +105,7 @@ impl Check<'_> {
             return Ok(());
         };
         let allowed = format!("{} or {other}, not both", key.name);
-        let both = format!("{} beside {other} = {}", quote(value), quote(twice));
+        let both = format!("{} together with {other} = {}", quote(value), quote(twice));
         Err(mistake(
             self.file,
             path,
@@ -115,8 +118,8 @@ impl Check<'_> {
     fn value(&self, path: &str, value: &Value, rule: &Rule) -> Result<(), ScenarioError> {
         let fail = |problem| {
             let allowed = match problem {
-                Problem::NoList => format!("[[{path}]] in place of [{path}], {rule}"),
-                Problem::NoTable => format!("[{path}] in place of [[{path}]], {rule}"),
+                Problem::NoList => format!("[[{path}]] instead of [{path}], {rule}"),
+                Problem::NoTable => format!("[{path}] instead of [[{path}]], {rule}"),
                 _ => rule.to_string(),
             };
             Err(mistake(

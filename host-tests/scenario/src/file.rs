@@ -360,9 +360,9 @@ fn interference(
         (None, Some(_)) if listens => Err(mistake(
             file,
             "listen",
-            Some("[listen] beside a [field]".to_owned()),
+            Some("[listen] together with a [field]".to_owned()),
             Problem::MeasuredField,
-            "[listen] alone or beside [[interferer]]".to_owned(),
+            "[listen] alone or together with [[interferer]]".to_owned(),
         )),
         (None, None) => Err(mistake(
             file,
@@ -372,7 +372,7 @@ fn interference(
             one(),
         )),
         (Some(raw), Some(_)) => {
-            let both = format!("[field] beside {} [[interferer]]", raw.len());
+            let both = format!("[field] together with {} [[interferer]]", raw.len());
             Err(mistake(
                 file,
                 "field",
@@ -444,7 +444,7 @@ fn relays(
         if raw.altitude_m.is_none() && power_w.is_none() {
             return fail(
                 Problem::NothingDiffers,
-                "altitude_m, power_w (or power_dbm) or both beside index".to_owned(),
+                "an index together with altitude_m, power_w (or power_dbm) or both".to_owned(),
             );
         }
         let relay = RelayOverride {
@@ -452,7 +452,7 @@ fn relays(
             power_w,
         };
         if relays.insert(raw.index, relay).is_some() {
-            let allowed = "1 to 1000, each in one [[relay]] only".to_owned();
+            let allowed = "1 to 1000, each in only one [[relay]]".to_owned();
             return fail(Problem::DuplicateRelay, allowed);
         }
     }
@@ -756,7 +756,7 @@ fn on_earth(
         ))
     };
     let Some(line) = room.line else {
-        let allowed = "x_m and y_m, or a [site] that says where the line is";
+        let allowed = "x_m and y_m, or a [site] with the geographic position of the line";
         return fail(Problem::NoSite, allowed);
     };
     let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
@@ -782,8 +782,8 @@ fn on_earth(
                 number(amsl_m)
             );
             let allowed = format!(
-                "a height that changes the interference anywhere by at most {MAX_HEIGHT_ERROR_DB} dB, and this does by {off_db:.1} dB: \
-                 interferers are on the ground; none, for one there"
+                "no amsl_m for an interferer on the ground, or a height that changes the interference by at most {MAX_HEIGHT_ERROR_DB} dB everywhere; \
+                 this one changes it by {off_db:.1} dB, because interferers are computed as being on the ground"
             );
             let key = format!("{table}amsl_m");
             return Err(mistake(

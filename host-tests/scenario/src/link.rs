@@ -194,7 +194,7 @@ impl Radio {
             Access::Slots => {
                 format!("{hops} hops share one frequency in {hops} equal time slots")
             }
-            Access::Channels => format!("{hops} hops have a frequency each"),
+            Access::Channels => format!("each of the {hops} hops has its own frequency"),
             Access::Fitted => {
                 format!("{hops} hops share one frequency in time slots as long as each hop needs")
             }

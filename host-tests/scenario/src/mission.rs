@@ -43,10 +43,10 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoHypothetical => {
-                f.write_str("no single interferer has the same effect as these [[interferer]]")
+                f.write_str("the [[interferer]] cannot be replaced by a single interferer with the same effect, which the relays need")
             }
             Self::ReverseSources => f.write_str(
-                "link.reverse above 0 needs one [[interferer]]: one that replaces several is fitted for one direction",
+                "link.reverse above 0 needs exactly one [[interferer]]: the single one that replaces several is fitted for one direction only",
             ),
             Self::NoRoom {
                 relays,

@@ -224,12 +224,12 @@ fn a_restarted_companion_engages_no_drone() {
         let reason = if kind == Kind::Px4 {
             "relay: waits, autopilot in failsafe"
         } else {
-            "relay: waits, change the mode first"
+            "relay: waits, choose another mode first"
         };
         assert_eq!(rig.text_count(reason), 1, "{kind:?}: {:?}", rig.texts);
         assert!(rig.choose(Mode::Hold));
         rig.run(8_000);
-        assert_eq!(rig.text_count("relay: ready, choose the mode"), 2);
+        assert_eq!(rig.text_count("relay: ready, choose OFFBOARD or GUIDED"), 2);
         assert!(rig.choose(Mode::Companion));
         rig.run(2_000);
         assert_eq!(rig.link.state(), State::Engaged);

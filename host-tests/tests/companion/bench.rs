@@ -66,7 +66,9 @@ fn two_relays_on_one_computer_agree() {
     for line in lines.map_while(Result::ok) {
         println!("{line}");
         for (relay, agreed) in ["relay 1", "relay 2"].iter().zip(&mut agreed) {
-            *agreed |= line.contains(&format!("{relay}  converged: target SIR 1.616563 "));
+            *agreed |= line.contains(&format!(
+                "{relay}  converged: positions agreed, target SIR 1.616563 "
+            ));
         }
         if agreed == [true; 2] {
             break;

@@ -82,13 +82,13 @@ fn each_kind_of_scenario_is_the_mission_of_the_other_tools() {
         let digest = uav_relay::wire::digest::digest(&mission);
         let mut relay = start(&file, "--index 1 --of 1");
         let line = relay.line("started: ");
-        let expected = format!("relay 1 of 1, network {NETWORK}, mission 0x{digest:04x}, ");
+        let expected = format!("relay 1 of 1, network {NETWORK}, mission digest 0x{digest:04x}, ");
         assert!(line.contains(&expected), "{name}: {expected} not in {line}");
     }
     let other = folder.write("other.toml", SCENARIO);
     let line = start(&other, "--index 1 --of 1 --altitude 23").line("started: ");
     let alone = start(&other, "--index 1 --of 1").line("started: ");
-    let digest = |line: &str| line.split("mission ").nth(1).unwrap()[..6].to_owned();
+    let digest = |line: &str| line.split("mission digest ").nth(1).unwrap()[..6].to_owned();
     assert_ne!(digest(&line), digest(&alone), "the command line counts");
 }
 

@@ -243,7 +243,7 @@ fn an_arducopter_that_refuses_targets_is_reported() {
     flight.drone.order("refuse");
     flight.is_engaged();
     flight.relay.line(
-        "autopilot: flies to another target than it was sent; is the setpoint outside its fence?",
+        "autopilot: flies to another target than the one sent; is the setpoint outside the autopilot's fence?",
     );
 }
 

@@ -27,7 +27,7 @@ fn two_relays_with_positions_keep_apart_by_their_guards() {
     let mut at = [[10.0, 0.0, 20.0], [30.0, 0.0, 20.0_f32]];
     for relay in &mut chain.relays {
         let line =
-            relay.line("guarded: setpoints keep drones apart while they move, by --positions");
+            relay.line("guarded: setpoints keep drones apart while they move; this drone's positions come from --positions");
         assert!(!line.contains("unguarded"), "{line}");
         assert!(!relay.has_printed("setpoint: "), "nobody knows where it is");
     }

@@ -132,7 +132,7 @@ fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     let mut back = start(&chain, 2, "key");
     assert!(back.line("signed: ").ends_with("epoch 6"));
     let line = chain.relays[0].line("epoch: ");
-    let remedy = "epoch: the epoch of relay 2 went back, and its frames are rejected; raise the number in the --epoch-file of relay 2 and restart it";
+    let remedy = "epoch: relay 2 has started with an epoch (start counter) that is not above its last one, and its frames are rejected; raise the number in its --epoch-file and restart it";
     assert!(line.ends_with(remedy), "{line}");
     assert!(!back.has_printed("converged: "));
     back.stopped();
@@ -165,5 +165,5 @@ fn a_key_file_readable_by_others_is_refused() {
 #[test]
 fn a_missing_key_is_reported() {
     let line = Relay::start("--index 1 --of 1").line("unsigned: ");
-    assert!(line.contains("anybody in range can send frames"), "{line}");
+    assert!(line.contains("anybody in range can forge them"), "{line}");
 }

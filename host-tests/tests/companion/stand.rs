@@ -86,7 +86,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     let mut rx = station(&field, "rx", &level, "");
     let started = tx.line("\"event\":\"started\"");
     assert!(started.contains("\"end\":\"transmitter\""));
-    rx.line("started: receiver of 3 relays, ");
+    rx.line("started: receiver of a chain of 3 relays, ");
     rx.line("measurement: \"nonsense\" is not POWER or receiver POWER, a power within 1e-30 to 1e6 W, or that in dBm");
     let meter = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     // Notation of a spectrum analyser.

@@ -30,7 +30,7 @@ fn a_vanished_port_returns_and_the_other_one_goes_on() {
     relay.line("started: ");
     for time in 1..=2_u64 {
         hub.pull(0);
-        let line = relay.line("is gone; retried until it is back");
+        let line = relay.line("device disconnected; retried until it is back");
         assert!(line.contains("port lost: --upstream "), "{line}");
         let sent = |said: &Value| said["links"]["ports"][1]["bytes_out"].as_u64().unwrap();
         let before = sent(&status_of(&socket));

@@ -15,7 +15,9 @@ fn a_port_that_vanishes_is_opened_again() {
     for _ in 0..2 {
         let (_, sleeps) = flight.relay.cost();
         flight.drone.order("unplug");
-        let line = flight.relay.line("is gone; retried until it is back");
+        let line = flight
+            .relay
+            .line("device disconnected; retried until it is back");
         assert!(line.contains("port lost: --autopilot /"), "{line}");
         flight.relay.line("autopilot: no heartbeat");
         std::thread::sleep(Duration::from_millis(1_500));
@@ -31,12 +33,14 @@ fn a_port_that_vanishes_is_opened_again() {
         flight.drone.receive(ReceivedMessage::is_target);
     }
     flight.arrives(place);
-    let gone = flight.relay.lines_with("is gone");
+    let gone = flight.relay.lines_with("device disconnected");
     assert!(gone.is_empty(), "once each: {gone:?}");
 
     // Messages are requested again from an autopilot that was switched off with its port.
     flight.drone.order("unplug");
-    flight.relay.line("is gone; retried until it is back");
+    flight
+        .relay
+        .line("device disconnected; retried until it is back");
     flight.drone.order("reboot");
     flight.drone.forget();
     flight.drone.order("plug");

@@ -216,7 +216,7 @@ fn a_useless_upload_file_is_named_and_ignored() {
         (Vec::new(), Some("is damaged or not an upload; not used")),
         (
             stored(&high, &new()),
-            Some("is for relays that were loaded with mission 0x"),
+            Some("is for relays that were loaded with the mission of digest 0x"),
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();

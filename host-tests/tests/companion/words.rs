@@ -64,7 +64,7 @@ fn reasons_of_rejected_frames_are_logged() {
         (
             &*files.signed("key", "e1"),
             &*files.signed("other", "e2"),
-            "have a wrong tag",
+            "have a wrong signature (tag)",
         ),
         (&files.signed("key", "e3"), "", "are not signed"),
         (
@@ -123,7 +123,11 @@ fn on_a_wire_the_ground_names_the_likely_cause() {
         "",
         "check --network 1, --baud 115200, --end and --key-file",
     );
-    assert!(relay.line("rejected: ").contains("have a wrong tag"));
+    assert!(
+        relay
+            .line("rejected: ")
+            .contains("have a wrong signature (tag)")
+    );
 }
 
 /// Checks the likely reasons that a ground station on a shared channel gives for a failed upload. It receives the

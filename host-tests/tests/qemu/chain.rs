@@ -56,7 +56,10 @@ fn five_drones_settle_like_the_simulation() {
         let before = damaged.len();
         for drone in 1..=5 {
             // The emulator has no clock tree: the firmware keeps running on the HSI.
-            let begins = ["started: unknown", "clock 16 MHz, no PLL"];
+            let begins = [
+                "started, cause of the reset: unknown",
+                "clock 16 MHz, from the internal oscillator: the PLL did not start",
+            ];
             let begins = begins.map(str::to_owned).into_iter();
             let begins = begins.chain([format!("relay {drone} of 5, network 7")]);
             let said = fleet.of_drone(drone).map(|line| line.text.clone());
@@ -144,7 +147,7 @@ fn the_smallest_image_refuses_unsupported_methods() {
         [1, 2].iter().all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == *drone);
             lines.any(|line| {
-                line.text == "configuration refused: not supported by this image, Method"
+                line.text == "configuration refused: not supported by this image: Method"
             })
         })
     });

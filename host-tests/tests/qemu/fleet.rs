@@ -18,7 +18,10 @@ use uav_relay_tools::provision::block::Flight;
 use crate::log::{self, Line};
 
 /// First log lines of every image: the emulator has no reset cause and no PLL.
-pub(crate) const OF_THE_CHIP: [&str; 2] = ["started: unknown", "clock 16 MHz, no PLL"];
+pub(crate) const OF_THE_CHIP: [&str; 2] = [
+    "started, cause of the reset: unknown",
+    "clock 16 MHz, from the internal oscillator: the PLL did not start",
+];
 
 /// Timeout of any step of a test. A fleet has `PATIENCE_A_DRONE` more for each drone.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);

@@ -59,7 +59,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     fleet.wait("line to fly along", |lines| {
         lines
             .iter()
-            .any(|line| line.text.starts_with("autopilot: line of 1343.79"))
+            .any(|line| line.text.starts_with("autopilot: 1343.79"))
     });
     let from = Placement {
         x_m: to.x_m - 80.0,
@@ -78,8 +78,8 @@ fn flies_to_its_place(image: Image, kind: Kind) {
         vehicle.heartbeats > 1 && asked.iter().all(|id| vehicle.asked.contains(id))
     });
     let name = match kind {
-        Kind::Px4 => "autopilot: found, PX4",
-        Kind::ArduCopter => "autopilot: found, ArduCopter",
+        Kind::Px4 => "autopilot: found: PX4",
+        Kind::ArduCopter => "autopilot: found: ArduCopter",
     };
     wait_for_line(&mut fleet, name);
     vehicle.run(2_000);
@@ -91,7 +91,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     // In the air under the pilot's control a PX4 receives its own position, an ArduCopter no target.
     vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
     vehicle.until("readiness", |vehicle| {
-        let ready = |text: &String| text == "relay: ready, choose the mode";
+        let ready = |text: &String| text == "relay: ready, choose OFFBOARD or GUIDED";
         vehicle.texts.iter().any(ready)
     });
     vehicle.run(1_000);
@@ -164,7 +164,7 @@ fn a_drone_without_sites_sends_no_targets() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
     wait_for_line(
         &mut fleet,
-        "no sites: no autopilot is controlled, and drones are not kept apart while they move",
+        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move",
     );
     fleet.places();
     let mut port = &fleet.autopilots[0];
@@ -178,6 +178,6 @@ fn the_smallest_image_refuses_sites() {
     let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);
     wait_for_line(
         &mut fleet,
-        "configuration refused: it has sites, and this image was built without flight",
+        "configuration refused: it has sites, but this image was built without the feature flight",
     );
 }

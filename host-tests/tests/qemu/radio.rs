@@ -35,8 +35,10 @@ fn four_of_five_on_one_radio_recover_from_a_loss() {
     // Each drone logs the new view, its new position, and the agreement.
     let story = |lines: &[Line], drone: u16, place: &[u32; 3]| {
         let mut new = lines[before..].iter().filter(|line| line.drone == drone);
-        let counted =
-            new.find(|line| line.text == "a new view has been accepted: new positions follow")?;
+        let counted = new.find(|line| {
+            line.text
+                == "a new view (membership of the chain) has been agreed: new positions follow"
+        })?;
         new.find(|line| line.setpoint() == Some(*place))?;
         let agreed = new.find(|line| line.text == "the relays have agreed on positions")?;
         Some(agreed.at - counted.at)

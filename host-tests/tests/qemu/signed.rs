@@ -36,7 +36,7 @@ fn five_signing_drones_settle_like_the_simulation() {
             let mut lines = fleet.after_start(drone).skip(1);
             assert_eq!(
                 lines.next().unwrap().text,
-                "frames are signed, epoch 77; it cannot be stored: raise the epoch of the block before the next start"
+                "frames are signed, epoch 77; the epoch cannot be stored: raise it in the configuration block before the next start"
             );
         }
     }
@@ -80,10 +80,10 @@ fn a_drone_without_the_key_takes_no_part() {
     let said = fleet.after_start(4).nth(1).unwrap();
     assert_eq!(
         said.text,
-        "no key: frames are not signed, and anybody in range can send frames"
+        "no key: frames are not signed, and anybody in range can forge them"
     );
     assert_eq!(
         fleet.after_start(4).nth(2).unwrap().text,
-        "no sites: no autopilot is controlled, and drones are not kept apart while they move"
+        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
     );
 }

@@ -109,24 +109,24 @@ fn a_drone_with_a_bad_configuration_stays_out_and_logs_why() {
         with(&field, 128, &0.0_f32.to_le_bytes()),
     ];
     let words = [
-        "no configuration: the block is blank",
-        "no configuration: the block is blank",
-        "configuration refused: damaged, the CRC does not match",
-        "configuration refused: another version or length of the block",
-        "configuration refused: the index exceeds the number of relays, or is 0",
-        "configuration refused: mission, Distance",
-        "configuration refused: altitude or power of this relay out of range",
-        "configuration refused: channel, Carrier",
-        "configuration refused: mission, Band",
-        "configuration refused: mission, Lateral",
-        "configuration refused: method unknown, or not for a field",
-        "configuration refused: byte 15 is neither 0 nor 1",
-        "configuration refused: rounds or explore of adjust out of range, or not 0 for another method",
-        "configuration refused: samples or i_max_w of the measurement out of range",
-        "configuration refused: too many points of the field",
-        "configuration refused: bytes behind the last point are not 0",
-        "configuration refused: it has both an interferer and a field",
-        "configuration refused: field, Upsilon",
+        "no configuration: the configuration block in flash is blank",
+        "no configuration: the configuration block in flash is blank",
+        "configuration refused: the block is damaged, its CRC does not match",
+        "configuration refused: the block's version or length is not the one of this firmware",
+        "configuration refused: the relay's index must be within 1 to the number of relays",
+        "configuration refused: mission: Distance",
+        "configuration refused: this relay's altitude or power is out of range",
+        "configuration refused: channel: Carrier",
+        "configuration refused: mission: Band",
+        "configuration refused: mission: Lateral",
+        "configuration refused: the method is unknown, or cannot use an interference field",
+        "configuration refused: byte 15 (keep the altitude) must be 0 or 1",
+        "configuration refused: rounds or explore_m out of range, or not 0 for another method than adjust",
+        "configuration refused: samples or i_max_w of the interference measurement out of range",
+        "configuration refused: the interference field has more points than the block can hold",
+        "configuration refused: bytes after the last point of the interference field are not 0",
+        "configuration refused: it has both an interferer and an interference field",
+        "configuration refused: interference field: Upsilon",
     ];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
     fleet.wait("word from every drone", |lines| {
@@ -150,7 +150,7 @@ fn a_drone_with_half_a_key_stays_out_and_logs_why() {
             .after_start(drone)
             .map(|line| &line.text[..])
             .collect();
-        let refused = "configuration refused: key or epoch, without the other or out of range";
+        let refused = "configuration refused: key and epoch must be given together, the epoch within 1 to 4294967294";
         assert_eq!(texts, ["relay 2 of 3, network 7", refused]);
     }
 }

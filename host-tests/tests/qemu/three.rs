@@ -125,10 +125,10 @@ fn three_images_fly_with_autopilots_one_by_mavsdk() {
     });
     three.mavsdk.order("px4");
     three.until("autopilots found", |three| {
-        three.has_logged(1, "autopilot: found, PX4")
+        three.has_logged(1, "autopilot: found: PX4")
             && [2, 3]
                 .iter()
-                .all(|drone| three.has_logged(*drone, "autopilot: found, ArduCopter"))
+                .all(|drone| three.has_logged(*drone, "autopilot: found: ArduCopter"))
     });
     three.until("requests for messages", |three| {
         [33, 245].iter().all(|id| three.mavsdk.has_request_for(*id))

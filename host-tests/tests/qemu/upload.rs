@@ -156,8 +156,9 @@ fn three_drones_fly_a_stored_upload() {
     assert_eq!(fleet.places(), simulated(&moved(3)));
     for drone in 1..=3 {
         let said = fleet.after_start(drone).take(4);
-        let told = said
-            .filter(|line| line.text == "mission version 3 restored: uploaded before this start");
+        let told = said.filter(|line| {
+            line.text == "mission version 3 restored, which was uploaded before this start"
+        });
         assert_eq!(told.count(), 1);
     }
     drop(fleet);

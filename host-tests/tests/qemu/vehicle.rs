@@ -185,7 +185,7 @@ impl Vehicle {
 
     /// Reads a status text for the operator. The pilot chooses another mode for a while if it asks for that.
     fn read_status_text(&mut self, text: String) {
-        if self.granted && text == "relay: waits, change the mode first" {
+        if self.granted && text == "relay: waits, choose another mode first" {
             self.elsewhere_until = self.now() + ELSEWHERE;
         }
         self.texts.push(text);

@@ -36,7 +36,7 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
     vec![(SECTORS[0], flash.bytes())]
 }
 
-const HOLDS: &str = "votes on views restored from flash";
+const HOLDS: &str = "votes on the chain's membership restored from flash";
 
 /// Checks that drones with stored votes up to membership view 40 fly in a later view.
 #[test]
@@ -67,7 +67,7 @@ fn two_drones_that_recall_a_view_without_them_do_not_fly() {
     fleet.wait("a quorum that is missed", |lines| {
         lines.iter().any(|line| {
             line.text
-                == "no quorum: bring the missing relays into range, or land the reachable ones"
+                == "no quorum, because too few relays are reachable: bring the missing relays into range, or land the reachable ones"
         })
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));

@@ -77,12 +77,15 @@ fn coordinates_off_the_line_are_refused() {
         (
             "lat_deg = 47.404",
             Problem::Missing,
-            ["interferer[0].y_m is missing", "or lon_deg instead"],
+            ["interferer[0].y_m is missing", "or the key lon_deg instead"],
         ),
         (
             "x_m = 4\nlon_deg = 8.5",
             Problem::SaidTwice,
-            ["interferer[0].lon_deg = 8.5 beside x_m = 4", "not both"],
+            [
+                "interferer[0].lon_deg = 8.5 together with x_m = 4",
+                "not both",
+            ],
         ),
         (
             &format!("{near}\namsl_m = 10001"),
@@ -92,7 +95,10 @@ fn coordinates_off_the_line_are_refused() {
         (
             "x_m = 4\ny_m = 9\namsl_m = 420",
             Problem::SaidTwice,
-            ["interferer[0].amsl_m = 420 beside x_m = 4", "not both"],
+            [
+                "interferer[0].amsl_m = 420 together with x_m = 4",
+                "not both",
+            ],
         ),
     ] {
         refused(&sited(lines), problem, &parts);
@@ -129,7 +135,7 @@ fn an_interferer_on_a_tower_is_refused_if_its_height_matters() {
             let parts = [
                 "interferer[0].amsl_m = ",
                 &by,
-                "interferers are on the ground",
+                "interferers are computed as being on the ground",
             ];
             refused(&text, Problem::OutOfRange, &parts);
         } else {

@@ -42,24 +42,28 @@ fn a_power_is_given_once() {
     ] {
         let text = small("").replace(key, &format!("{key}\n{other}"));
         let name = |pair: &str| pair.split(' ').next().unwrap().to_owned();
-        let both = format!("{table}.{key} beside {other} is given twice");
+        let both = format!("{table}.{key} together with {other} is given twice");
         let allowed = format!("{} or {}, not both", name(key), name(other));
         refused(&text, Problem::SaidTwice, &[&both, &allowed]);
     }
     let relay = small("[[relay]]\nindex = 1\npower_w = 1\npower_dbm = 30\n");
-    let parts = ["relay[0].power_w = 1 beside power_dbm = 30"];
+    let parts = ["relay[0].power_w = 1 together with power_dbm = 30"];
     refused(&relay, Problem::SaidTwice, &parts);
     let gain = small("").replace("tx_w = 80", "tx_gain_dbi = 3\ntx_eirp_dbm = 49");
-    let parts = ["power.tx_gain_dbi = 3 beside tx_eirp_dbm = 49"];
+    let parts = ["power.tx_gain_dbi = 3 together with tx_eirp_dbm = 49"];
     refused(&gain, Problem::SaidTwice, &parts);
     for other in ["bandwidth_hz = 1e6", "figure_db = 3"] {
         let noise = small(&format!("[noise]\n{other}\npower_dbm = -100\n"));
-        refused(&noise, Problem::SaidTwice, &["beside power_dbm = -100"]);
+        refused(
+            &noise,
+            Problem::SaidTwice,
+            &["together with power_dbm = -100"],
+        );
     }
     let none = small("").replace("uav_w = 1\n", "");
     let parts = [
         "power.uav_w is missing",
-        "1e-6 to 1e6 W, or uav_dbm instead, a number, -30 to 90 dBm",
+        "1e-6 to 1e6 W, or the key uav_dbm instead, a number, -30 to 90 dBm",
     ];
     refused(&none, Problem::Missing, &parts);
 }

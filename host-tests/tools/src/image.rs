@@ -141,14 +141,14 @@ pub struct Piece {
 /// # Errors
 /// A line that says why the file is not a loadable ELF.
 pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
-    let wrong = |error: object::Error| format!("not an ELF of 32 bits: {error}");
+    let wrong = |error: object::Error| format!("not a 32-bit ELF file: {error}");
     let header = FileHeader32::<LittleEndian>::parse(elf).map_err(wrong)?;
     let endian: LittleEndian = header.endian().map_err(wrong)?;
     let mut pieces = Vec::new();
     for segment in header.program_headers(endian, elf).map_err(wrong)? {
         let bytes = segment
             .data(endian, elf)
-            .map_err(|()| "an ELF that is cut short")?;
+            .map_err(|()| "an ELF file that is cut short")?;
         if segment.p_type(endian) == PT_LOAD && !bytes.is_empty() {
             pieces.push(Piece {
                 address: segment.p_paddr(endian),
@@ -158,7 +158,7 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     }
     pieces.sort_by_key(|piece| piece.address);
     if pieces.is_empty() {
-        return Err("an ELF with nothing to load".into());
+        return Err("an ELF file without loadable segments".into());
     }
     Ok(pieces)
 }
@@ -168,20 +168,23 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
 /// # Errors
 /// The pieces overlap, or one begins more than [`LARGEST`] bytes behind the first.
 pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
-    let first = pieces.first().ok_or("nothing to load")?.address;
+    let first = pieces
+        .first()
+        .ok_or("an image without loadable segments")?
+        .address;
     let mut bytes = Vec::new();
     for piece in pieces {
         let at = piece.address.checked_sub(first).filter(|at| *at <= LARGEST);
         let at = at.ok_or_else(|| {
             format!(
-                "{:#010x} lies more than {LARGEST} bytes behind {first:#010x}",
+                "address {:#010x} is more than {LARGEST} bytes after the first one, {first:#010x}",
                 piece.address
             )
         })?;
         let at = at as usize;
         if at < bytes.len() {
             return Err(format!(
-                "two parts of the image are at {:#010x}",
+                "two segments of the image overlap at {:#010x}",
                 piece.address
             ));
         }

@@ -370,7 +370,7 @@ fn relays_are_planned_for_both_directions_on_request() {
     );
     let (_, line) = refusal(&format!("--uavs 3 --scenario {path}"));
     assert!(
-        line.contains("link.reverse above 0 needs one [[interferer]]"),
+        line.contains("link.reverse above 0 needs exactly one [[interferer]]"),
         "{line}"
     );
 }
@@ -403,7 +403,9 @@ fn a_frequency_for_each_hop_carries_the_rate_of_the_worst_hop() {
     let output = plan(&format!("--scenario {path} --uavs 4"));
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
-        table.contains("bit/s: 5 hops have a frequency each, and the worst hop carries "),
+        table.contains(
+            "bit/s: each of the 5 hops has its own frequency, and the worst hop carries "
+        ),
         "{table}"
     );
 }
@@ -443,7 +445,7 @@ fn steps_of_a_radio_are_met_by_the_fewest_relays() {
     let high = linked("steps = [{ sinr_db = 80, bits_per_hz = 1 }]\n");
     let output = plan(&format!("--scenario {} --uavs 2", high.path().display()));
     let table = String::from_utf8(output.stdout).unwrap();
-    assert!(table.contains("largest data rate: 0 bit/s: the worst hop of any number of relays is below the first of link.steps\n"), "{table}");
+    assert!(table.contains("largest data rate: 0 bit/s: the SINR of the worst hop with any number of relays is below the first of link.steps\n"), "{table}");
 }
 
 #[test]
@@ -590,7 +592,7 @@ fn several_interferers_get_a_rated_hypothetical_one() {
     assert!((gained - number(&one["gain"])).abs() < 1e-9);
     let table = String::from_utf8(plan(&format!("--scenario {path} --uavs 8")).stdout).unwrap();
     assert!(
-        table.contains("its places are not good enough") && table.contains("a gain of"),
+        table.contains("its positions are not good enough") && table.contains("a gain of"),
         "{table}"
     );
 }
@@ -728,14 +730,14 @@ fn a_target_in_decibels_is_answered_in_decibels() {
     let table = output_of("--target-sir-db 6");
     for part in [
         "worst hop: 6.000 dB (SIR 3.98107",
-        "target: SIR 6 dB; that many relays reach up to 6.",
+        "target: SIR 6 dB; this number of relays reaches up to 6.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
     let table = output_of("--target-sir 4");
     for part in [
         "worst hop: SIR 4.00000",
-        "target: SIR 4; that many relays reach up to 4.",
+        "target: SIR 4; this number of relays reaches up to 4.",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }

@@ -35,7 +35,7 @@ impl std::fmt::Display for StackError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Recursion(name) => write!(f, "{name} can call itself, so its stack has no bound"),
-            Self::Dynamic(name) => write!(f, "{name} takes a frame of unknown size"),
+            Self::Dynamic(name) => write!(f, "{name} has a stack frame of unknown size"),
             Self::Unknown(name) => write!(f, "there is no function {name} in the image"),
         }
     }

@@ -30,7 +30,7 @@ pub fn generate(name: &str, folder: &Path) -> io::Result<()> {
     let root = fs::canonicalize(checkout())?;
     if std::path::absolute(folder)?.starts_with(&root) {
         let text = format!(
-            "{} is inside of {}, whose cargo settings and workspace would apply to it",
+            "{} is inside {}, whose Cargo settings and workspace would apply to it",
             folder.display(),
             root.display()
         );

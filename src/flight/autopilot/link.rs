@@ -210,7 +210,7 @@ impl Autopilot {
                 Line::info(Topic::Clearance, "relay: lost relays cleared")
             }
             Some(_) => {
-                let text = ["relay: denied, name all lost relays of one side", ""];
+                let text = ["relay: denied, name all lost relays on one side", ""];
                 Line::warning(Topic::Clearance, text)
             }
             None => return,
@@ -533,7 +533,7 @@ impl Autopilot {
             ),
             None => (
                 AutopilotEvent::Ready,
-                Line::info(Topic::Wait, "relay: ready, choose the mode"),
+                Line::info(Topic::Wait, "relay: ready, choose OFFBOARD or GUIDED"),
             ),
         };
         self.events.waits = Some(event);

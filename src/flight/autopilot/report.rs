@@ -92,8 +92,8 @@ impl Line {
             Some(HoldReason::Close) => "relay: waits, too close to",
             Some(HoldReason::Lost) => "relay: waits, lost relay near",
             Some(HoldReason::NotFlown) => "relay: waits, not engaged:",
-            Some(HoldReason::Pending) => "relay: waits for room from",
-            Some(HoldReason::Halted) => "relay: halts, wrong order past",
+            Some(HoldReason::Pending) => "relay: waits, space still used by",
+            Some(HoldReason::Halted) => "relay: stops, wrong order past",
             None => "relay: no longer waits for",
         };
         Self::warning(topic, [what, whom])
@@ -105,9 +105,9 @@ impl Line {
             Event::Infeasible => "relay: no target SIR can be met",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",
-            Event::LeaseLapsed => "relay: lease expired, holds position",
+            Event::LeaseLapsed => "relay: agreement expired, holds position",
             Event::Adopted => "relay: new mission adopted",
-            Event::UploadRefused { .. } => "relay: mission rejected: line or geofence",
+            Event::UploadRefused { .. } => "relay: mission rejected: sites or geofence",
             Event::DuplicateIndex { .. } => "relay: duplicate relay number",
             _ => return None,
         };

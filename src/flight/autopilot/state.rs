@@ -218,10 +218,10 @@ impl WaitReason {
         match self {
             Self::Failsafe => "relay: waits, autopilot in failsafe",
             Self::Link => "relay: waits, autopilot link delayed",
-            Self::Found => "relay: waits, change the mode first",
+            Self::Found => "relay: waits, choose another mode first",
             Self::Unseen => "relay: waits, no mode change seen",
-            Self::Position => "relay: waits, no position near the line",
-            Self::NotReady => "relay: waits, out of order",
+            Self::Position => "relay: waits, position unknown or off the line",
+            Self::NotReady => "relay: waits, wrong side of a neighbour",
         }
     }
 }

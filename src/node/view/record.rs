@@ -42,8 +42,10 @@ pub enum RecordError {
 impl core::fmt::Display for RecordError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Base => "the record was written by a relay that was loaded with another mission",
-            Self::Begun => "the record must be restored before the relay starts",
+            Self::Base => {
+                "the record of votes was written by a relay that was loaded with another mission"
+            }
+            Self::Begun => "the record of votes must be restored before the relay starts",
         })
     }
 }

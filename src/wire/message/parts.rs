@@ -1,6 +1,6 @@
 //! Parts of several bodies, the ranges of their numbers, and the tags of the messages.
 //!
-//! A type of its own costs no bytes on the wire, and saves the code to read it again.
+//! A shared type adds no bytes on the wire, and the image has its decoder only once.
 
 use serde::{Deserialize, Serialize, Serializer};
 

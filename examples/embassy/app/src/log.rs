@@ -15,7 +15,9 @@ use crate::drone::Refused;
 
 pub(crate) fn started(reset: Reset) {
     match reset {
-        Reset::Watchdog => error!("started by the watchdog: the loop hung, or the clock stopped"),
+        Reset::Watchdog => {
+            error!("restarted by the watchdog: the main loop hung, or the clock stopped")
+        }
         reset => info!("started: {}", reset.text()),
     }
 }
@@ -30,7 +32,7 @@ pub(crate) fn begins(config: &Config) {
 }
 
 pub(crate) fn unsigned() {
-    warn!("no key: frames are not signed, and anybody in range can send frames");
+    warn!("no key: frames are not signed, and anybody in range can forge them");
 }
 
 /// Logs the signing epoch; `is_stored` is true if it was stored.
@@ -39,20 +41,22 @@ pub(crate) fn signs(epoch: u32, is_stored: bool) {
         info!("frames are signed, epoch {}", epoch);
     } else {
         error!(
-            "frames are signed, epoch {}; it cannot be stored: raise the epoch of the block before the next start",
+            "frames are signed, epoch {}; the epoch cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }
 }
 
 pub(crate) fn unguarded() {
-    warn!("no sites: no autopilot is controlled, and drones are not kept apart while they move");
+    warn!(
+        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+    );
 }
 
 /// Logs the length of the line between the sites, m, and the drone's speed limit, m/s.
 pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
     info!(
-        "autopilot: line of {} m, at most {} m/s",
+        "autopilot: {} m from transmitter to receiver, maximum speed {} m/s",
         along_m, speed_m_s
     );
 }
@@ -66,18 +70,18 @@ pub(crate) fn signs_to_autopilot() {
 /// Logs the votes restored after a reboot; `accepted` is true if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
-        info!("votes on views restored from flash");
+        info!("votes on the chain's membership restored from flash");
     } else {
-        error!("votes on views in flash are of another firmware, and ignored");
+        error!("votes on the chain's membership in flash are from another firmware, and ignored");
     }
 }
 
 /// Logs that storing the relay's votes works again (`is_stored` is true) or fails (`is_stored` is false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
-        info!("votes on views can be stored again");
+        info!("votes on the chain's membership can be stored again");
     } else {
-        error!("votes on views cannot be stored: a reboot in flight loses them");
+        error!("votes on the chain's membership cannot be stored: a reboot in flight loses them");
     }
 }
 
@@ -86,19 +90,21 @@ pub(crate) fn refused(why: Refused) {
         Refused::Block(why) => error!("configuration refused: {}", Debug2Format(&why)),
         Refused::NoFlash => {
             error!(
-                "configuration refused: it has a key, and this board stores no epoch to sign with"
+                "configuration refused: it has a key, but this board cannot store the epoch (start counter) that signing needs"
             );
         }
-        Refused::NoEpoch => error!("no epoch is left to sign with"),
+        Refused::NoEpoch => {
+            error!("frames cannot be signed: the epoch (start counter) has reached its maximum")
+        }
         Refused::NoAutopilot => {
             error!(
-                "configuration refused: it has sites, and this image has no port to an autopilot"
+                "configuration refused: it has sites, but this image has no port to an autopilot"
             );
         }
-        Refused::Course(why) => error!("configuration refused: sites, {}", why),
+        Refused::Course(why) => error!("configuration refused: sites: {}", why),
         Refused::Setup(why) => {
             error!(
-                "configuration refused: not supported by this image, {}",
+                "configuration refused: not supported by this image: {}",
                 why
             );
         }

@@ -62,7 +62,7 @@ fn source_error<E>(error: PcapError) -> SourceError<E> {
             SourceError::Read(error)
         }
         PcapError::IoError(_) | PcapError::IncompleteBuffer => {
-            SourceError::Capture("it ends inside a block".to_owned())
+            SourceError::Capture("the file ends inside a pcapng block".to_owned())
         }
         error => SourceError::Capture(error.to_string()),
     }

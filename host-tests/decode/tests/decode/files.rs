@@ -57,7 +57,7 @@ fn a_truncated_capture_is_shown_up_to_its_end() {
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(
         line,
-        "standard input: no valid capture: it ends inside a block\n"
+        "standard input: is not a valid capture: the file ends inside a pcapng block\n"
     );
     assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 1);
 }

@@ -154,7 +154,7 @@ impl Link {
             }
             13 => {
                 let text = String::from_utf8_lossy(input.piece()).into_owned();
-                without(|| self.autopilot.send_text(&text));
+                without_allocation(|| self.autopilot.send_text(&text));
             }
             14 => {
                 self.rx = if input.flag() { MOVED } else { RX };

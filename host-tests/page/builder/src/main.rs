@@ -43,7 +43,7 @@ y_m = 400.0
 ";
 
 const HELP: &str = "\
-Builds the page to play with: the simulator as WebAssembly in one file, and prints its path
+Builds the interactive page of the simulator (WebAssembly, in one HTML file) and prints its path
 
 Usage: cargo page
 
@@ -58,7 +58,7 @@ fn answer(arguments: &[String]) -> Option<(String, bool)> {
         [] => None,
         [one] if matches!(one.as_str(), "-h" | "--help") => Some((HELP.to_owned(), true)),
         [one, ..] => Some((
-            format!("page: unexpected argument '{one}': must be --help or nothing\n"),
+            format!("page: unexpected argument '{one}': only --help is allowed\n"),
             false,
         )),
     }

@@ -60,7 +60,7 @@ impl Data {
                     .to_owned()
             }
             (_, Some(Way::Both)) if uploads => {
-                "--traffic both: after an --upload the SIRs of the way back are not known; allowed: forward"
+                "--traffic both: after an --upload the SIRs from Rx to Tx are not known; allowed: forward"
                     .to_owned()
             }
             _ => return Ok(()),

@@ -134,11 +134,11 @@ impl Hostile {
         self.flight.agree(uavs)?;
         self.in_time()?;
         if self.is_eventful() && is_loop {
-            let line = "--closed-loop goes with none of --kill, --boot, --partition, --deaf, --soak, --fly, --forge, --replay and --upload";
+            let line = "--closed-loop cannot be combined with --kill, --boot, --partition, --deaf, --soak, --fly, --forge, --replay or --upload";
             return Err(Failure::input(line));
         }
         if self.uploads.are_planned() && self.no_auth {
-            let line = "--upload needs frames with tags, and --no-auth leaves them out";
+            let line = "--upload needs signed frames, so it cannot be combined with --no-auth";
             return Err(Failure::input(line));
         }
         Ok(())
@@ -353,7 +353,7 @@ impl Air {
         let least = Bursts::shortest(loss);
         if self.burst > 1.0 && self.burst < least {
             let line = format!(
-                "--burst {}: must be 1, or {least:.4} to 1e6 with --loss {loss}: independent losses come in runs as long",
+                "--burst {}: must be 1, or {least:.4} to 1e6 with --loss {loss}: independent losses have runs of this mean length already",
                 self.burst
             );
             return Err(Failure::input(line));

@@ -107,9 +107,9 @@ impl Options {
     pub(super) fn agree(&self, method: &str) -> Result<(), Failure> {
         let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);
         let is_adjust = self.method == Method::Adjust;
-        let step = "has no fixed step; align-step and stochastic-step have";
-        let rounds = "has no rounds; adjust has";
-        let bracket = "has a fixed step, see --epsilon; the other methods bracket";
+        let step = "has no fixed step; use align-step or stochastic-step";
+        let rounds = "has no rounds of adjustment; use adjust";
+        let bracket = "uses the fixed step of --epsilon; the other methods bracket the target";
         let ignored: [(Option<String>, &str); 6] = [
             (
                 given_option("--epsilon", self.epsilon.filter(|_| !is_step)),
@@ -141,7 +141,7 @@ impl Options {
         }
         if self.closed_loop.is_some() && !self.method.is_for_fields() {
             let line = format!(
-                "--closed-loop: would be ignored: with --method {method} relays measure nothing"
+                "--closed-loop: would be ignored: relays measure interference only with --method stochastic or stochastic-step, not {method}"
             );
             return Err(Failure::input(line));
         }
@@ -236,11 +236,11 @@ impl Listening {
             return Ok(());
         }
         if setup.soak.is_some() || !setup.uploads.is_empty() || setup.attack.is_some() {
-            let line = "--listen goes with neither --soak nor --upload nor an attacker";
+            let line = "--listen cannot be combined with --soak, --upload, --forge or --replay";
             return Err(Failure::input(line.to_owned()));
         }
         let Some(scene) = Scene::new(scenario, uavs) else {
-            let line = "--listen needs an [[interferer]], and the scenario has a [field]";
+            let line = "--listen needs an [[interferer]], but the scenario has a [field]";
             return Err(Failure::input(line.to_owned()));
         };
         let unknown = Mission::try_new(MissionConfig {

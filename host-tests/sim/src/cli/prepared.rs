@@ -72,7 +72,7 @@ impl<'a> Prepared<'a> {
             .to_possible_value()
             .map_or_else(String::new, |value| value.get_name().to_owned());
         if !scenario.knows_interference() {
-            let line = "interferer: is missing: without [[interferer]] a scenario with [listen] is for cargo provision alone";
+            let line = "interferer: is missing: a scenario with [listen] but without [[interferer]] is for cargo provision only";
             return Err(Failure::input(line.to_owned()).into());
         }
         agree(options, &method, &scenario)?;
@@ -247,7 +247,7 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
     if options.method.is_for_fields() != is_field {
         let line = if is_field {
             format!(
-                "--method {method} needs an [[interferer]], and the scenario has a [field]: take stochastic or stochastic-step"
+                "--method {method} needs an [[interferer]], but the scenario has a [field]: use stochastic or stochastic-step"
             )
         } else {
             format!("--method {method} needs a --scenario with a [field] of interference")
@@ -255,18 +255,18 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         return Err(Failure::input(line));
     }
     if uploads && is_field {
-        let line = "--upload needs an [[interferer]], and the scenario has a [field]";
+        let line = "--upload needs an [[interferer]], but the scenario has a [field]";
         return Err(Failure::input(line));
     }
     if let Some(one) = mission::hypothetical(scenario) {
         command::complain(&format!(
-            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m replaces all, and SIRs are against it; `cargo plan` has the \
-             SIRs against all",
+            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m replaces all of them, and the SIRs are \
+             computed with it; `cargo plan` computes the SIRs with all",
             one.power_w, one.x_m, one.y_m
         ));
         if uploads {
             command::complain(
-                "note: an upload changes that one; all other values stay as they are",
+                "note: an upload changes this interferer; all other values stay as they are",
             );
         }
     }

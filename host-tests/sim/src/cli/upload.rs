@@ -118,7 +118,8 @@ impl Uploads {
             return Err(Failure::input(line));
         }
         if self.no_store && !boots {
-            let line = "--no-store: would be ignored: no relay is switched on again, see --boot";
+            let line =
+                "--no-store: would be ignored, because no relay is switched on again (--boot)";
             return Err(Failure::input(line));
         }
         Ok(())
@@ -189,7 +190,7 @@ impl Planned {
         if new.as_flattened().iter().all(Option::is_none) {
             return Ok(None);
         }
-        let sites = sites.ok_or("an end can be moved only where the scenario has [site]")?;
+        let sites = sites.ok_or("Tx or Rx can be moved only if the scenario has a [site]")?;
         let to = |at: Geodetic, [lat, lon, amsl]: [Option<f64>; 3]| {
             Geodetic::from_degrees(
                 lat.unwrap_or(f64::from(at.lat_e7) / 1e7),

@@ -118,7 +118,7 @@ impl AttackReport {
         _ = match (self.harm(), self.farthest_m) {
             (None, _) => writeln!(
                 text,
-                "every relay ended where it ends without the attack, to the bit"
+                "the final position of every relay is bit-identical to that of a run without the attack"
             ),
             (Some(harm), Some(far)) => writeln!(text, "{harm}, by {far:.3} m at most"),
             (Some(harm), None) => writeln!(text, "{harm}, and some got no position at all"),
@@ -126,14 +126,14 @@ impl AttackReport {
         if self.misled > 0 {
             _ = writeln!(
                 text,
-                "in between, relays took {} positions by target SIRs that no relay has without the attack",
+                "meanwhile, relays took {} positions for target SIRs that do not occur without the attack",
                 self.misled
             );
         }
         if self.formed != self.formed_without {
             _ = writeln!(
                 text,
-                "views accepted: {}, without the attack {}",
+                "agreed memberships (views) of the chain: {}, without the attack {}",
                 self.formed, self.formed_without
             );
         }

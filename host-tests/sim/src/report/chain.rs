@@ -284,13 +284,13 @@ impl ChainReport {
         if let (Some(first), Some(last)) = (self.rounds.first(), self.rounds.last()) {
             _ = writeln!(
                 text,
-                "Algorithm 2: {} rounds, from SIR {first:.6} to {last:.6}",
+                "Algorithm 2 of the paper: {} rounds, from SIR {first:.6} to {last:.6}",
                 self.rounds.len() - 1
             );
         }
         _ = writeln!(
             text,
-            "cost: {} sweeps, {} messages, {} bytes, {:.3} s of virtual time",
+            "cost: {} sweeps along the chain, {} messages, {} bytes, {:.3} s of virtual time",
             self.sweeps, self.messages, self.bytes, self.virtual_s
         );
         let faults = self.faults;
@@ -299,7 +299,7 @@ impl ChainReport {
         {
             _ = writeln!(
                 text,
-                "faults: {} lost, {} corrupted, {} duplicated, {} reordered; {} frames rejected (seed {})",
+                "injected faults: frames {} lost, {} corrupted, {} duplicated, {} reordered; {} frames rejected (seed {})",
                 faults.lost,
                 faults.corrupted,
                 faults.duplicated,
@@ -334,11 +334,11 @@ impl ChainReport {
         match self.version {
             None => String::new(),
             Some(0) if self.timeline.iter().any(|moment| moment.what == "adopted") => {
-                "no remaining relay flies the mission that was uploaded and adopted\n".to_owned()
+                "no remaining relay uses the mission that was uploaded and adopted\n".to_owned()
             }
-            Some(0) => "the chain flies the mission that it took off with: no upload was adopted\n"
+            Some(0) => "the chain uses the mission that it started with: no upload was adopted\n"
                 .to_owned(),
-            Some(version) => format!("the chain flies mission {version}, as uploaded\n"),
+            Some(version) => format!("the chain uses the uploaded mission, version {version}\n"),
         }
     }
 
@@ -446,7 +446,7 @@ fn ended(method: &str, outcome: &Outcome) -> Option<String> {
     match outcome.ending {
         Ending::Settled | Ending::Soaked => None,
         Ending::Infeasible if method.ends_with("-step") => Some(
-            "no target SIR of the fixed-step schedule can be met; a smaller step may find one"
+            "no target SIR of the fixed-step schedule can be met; a smaller --epsilon may find one"
                 .to_owned(),
         ),
         Ending::Infeasible => Some("no placement gives every hop an SIR above 0".to_owned()),
@@ -461,9 +461,9 @@ fn ended(method: &str, outcome: &Outcome) -> Option<String> {
                 silent.join(", ")
             ))
         }
-        Ending::NoQuorum => Some("no quorum: too few relays reach each other".to_owned()),
+        Ending::NoQuorum => Some("no quorum: too few relays receive each other".to_owned()),
         Ending::OutOfTime => Some(format!(
-            "the chain had not settled after {:.0} s",
+            "the relays had not agreed on final positions after {:.0} s",
             seconds(outcome.ended)
         )),
     }
@@ -552,11 +552,11 @@ impl AvailabilityReport {
             _ = match self.first_agreement_s {
                 Some(first) => writeln!(
                     text,
-                    "availability: {availability:.6} since the first agreement at {first:.3} s; the longest outage took {outage:.3} s"
+                    "availability: {availability:.6} (share of time with a complete chain at its optimum) since the first agreement at {first:.3} s; longest outage {outage:.3} s"
                 ),
                 None => writeln!(
                     text,
-                    "availability: {availability:.6}, because there was no agreement"
+                    "availability: {availability:.6}, because the relays never agreed on positions"
                 ),
             };
         }

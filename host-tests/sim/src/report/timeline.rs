@@ -206,7 +206,7 @@ impl Group {
             "switched on" => format!("{who} switched on"),
             "lost" => format!("relay {other} lost"),
             "found" => format!("relays {relay} and {other} linked"),
-            "view accepted" => format!("view of {}", count(one.relays.unwrap_or_default().into())),
+            "view accepted" => format!("chain of {}", count(one.relays.unwrap_or_default().into())),
             "converged" => one.sir.map_or_else(
                 || "relays spread evenly".to_owned(),
                 |sir| format!("SIR {sir:.3}"),
@@ -247,16 +247,18 @@ impl Group {
             "found" if many => format!("{who} became neighbours"),
             "found" => format!("{who} became a neighbour of relay {other}"),
             "view accepted" => format!(
-                "view accepted: {}, view {}",
+                "membership agreed: {} (view {})",
                 count(one.relays.unwrap_or_default().into()),
                 one.view.unwrap_or_default()
             ),
-            "lease expired" => format!("{who}: lease expired"),
+            "lease expired" => format!("{who}: lease of the agreement expired"),
             "not received by" => format!("relay {other} does not receive {who}"),
             "mission mismatch" => format!("{who}: relay {other} has another mission"),
             "key mismatch" => format!("{who}: relay {other} signs with another key"),
             "epoch went back" => {
-                format!("{who}: relay {other} has an old epoch, its frames are rejected")
+                format!(
+                    "{who}: relay {other} started with an old epoch (start counter), its frames are rejected"
+                )
             }
             "duplicate index" => format!("{who}: duplicate relay number {other}"),
             "engaged" => format!("{who}: setpoint control engaged"),
@@ -280,7 +282,7 @@ impl Group {
                 )
             }
             "converged" => format!(
-                "converged: {}, SIR {:.3}",
+                "positions agreed: {}, SIR {:.3}",
                 count(self.relays.len()),
                 one.sir.unwrap_or_default()
             ),
@@ -292,10 +294,13 @@ impl Group {
             ),
             "does not receive" => format!("{who} does not receive relay {other}"),
             "receives again" => format!("{who} receives relay {other} again"),
-            "offered" if relay == 0 => format!("the transmitter uploads mission {version}"),
-            "offered" => format!("the receiver uploads mission {version}"),
-            "stored" => format!("{who} stored mission {version}"),
-            "adopted" => format!("mission {version} adopted: {}", count(self.relays.len())),
+            "offered" if relay == 0 => format!("the transmitter uploads mission version {version}"),
+            "offered" => format!("the receiver uploads mission version {version}"),
+            "stored" => format!("{who} stored mission version {version}"),
+            "adopted" => format!(
+                "mission version {version} adopted: {}",
+                count(self.relays.len())
+            ),
             _ => "no target SIR can be met".to_owned(),
         }
     }
@@ -568,7 +573,7 @@ pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
             .collect();
         what.extend(
             one.version
-                .map(|version| format!("mission {version} uploaded")),
+                .map(|version| format!("mission version {version} uploaded")),
         );
         if what.is_empty() {
             same += 1;
@@ -583,7 +588,10 @@ pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
         );
     }
     if same > 0 {
-        _ = writeln!(text, "views with unchanged relays: {same}");
+        _ = writeln!(
+            text,
+            "agreed memberships (views) with unchanged relays: {same}"
+        );
     }
     text
 }
@@ -597,7 +605,7 @@ impl RecoveryReport {
         if let Some(detected) = self.detected_s {
             _ = write!(
                 text,
-                "view accepted {:.3} s after the detection, ",
+                "membership agreed {:.3} s after the detection, ",
                 self.formed_s - detected
             );
         }
@@ -606,11 +614,11 @@ impl RecoveryReport {
             _ = write!(text, "adopted {after:.3} s after the upload began, ");
         }
         let Some(converged) = self.converged_s else {
-            return text + "replaced by another view before convergence";
+            return text + "replaced by another membership before the relays agreed on positions";
         };
         _ = write!(
             text,
-            "converged {:.3} s after the view",
+            "positions agreed {:.3} s after the membership",
             converged - self.formed_s
         );
         if let Some(sweeps) = self.sweeps {

@@ -220,7 +220,7 @@ fn ends(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, distance: f64) 
 ///
 /// `left` and `right` are the vertical coordinates of the two limits.
 fn label(canvas: &mut Canvas, labels: &mut Labels, [left, right]: [f64; 2]) {
-    let words = "edges of the room for relays";
+    let words = "limits of the lateral range";
     let size = (width(words, SIZE) + 4.0, SIZE + 1.0);
     let columns = [RIGHT - 0.5 * size.0 - 3.0, LEFT + 0.5 * size.0 + 3.0];
     let rows = [right + 8.5, left - 8.5, right - 8.5, left + 8.5];

@@ -69,8 +69,8 @@ fn the_timeline_of_a_loss_has_a_line_per_event() {
         "20.000 s  relay 4 went silent",
         " s  relays 3 and 5 lost relay 4",
         " s  relays 3 and 5 became neighbours",
-        " s  view accepted: 7 relays, view ",
-        " s  converged: 7 relays, SIR 2.312",
+        " s  membership agreed: 7 relays (view ",
+        " s  positions agreed: 7 relays, SIR 2.312",
         // The last frame of relay 4, a lease renewal, is up to 5 s old; the first probe after 15 s detects the loss.
         ", relay 4 lost: noticed after 1",
     ] {
@@ -243,7 +243,7 @@ fn an_overloaded_channel_is_refused_before_flight() {
 fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
     let (status, line) = refusal(arguments);
-    let expected = "--baud 57600: must be within 229974 to 10000000: 50 relays in range of each other overload the channel: it needs 229974 bit/s, or --probe-after-ms 19963 with three times that for --dead-after-ms, or at most 13 relays in range\n";
+    let expected = "--baud 57600: must be within 229974 to 10000000: 50 relays in range of each other overload the channel: use at least 229974 bit/s, or --probe-after-ms 19963 with three times that for --dead-after-ms, or at most 13 relays in range\n";
     assert_eq!((status, line.as_str()), (2, expected));
     // A millisecond less does not fit.
     let (status, _) = refusal(&format!("{arguments} --probe-after-ms 19962"));

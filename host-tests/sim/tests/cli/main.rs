@@ -98,7 +98,10 @@ fn the_default_is_eight_relays_by_align_and_a_table() {
         table.contains("worst hop: SIR 2.4655") && table.contains("8 relays by `align`"),
         "{table}"
     );
-    assert!(table.contains("cost: 1 sweeps, 14 messages"), "{table}");
+    assert!(
+        table.contains("cost: 1 sweeps along the chain, 14 messages"),
+        "{table}"
+    );
     assert_eq!(table.lines().count(), 1 + 8 + 1 + 2, "{table}");
 }
 
@@ -354,7 +357,11 @@ fn an_adopted_upload_is_never_reported_as_not_adopted() {
         assert_eq!(output.status.code(), Some(1));
         let all = [output.stdout, output.stderr].concat();
         let text = String::from_utf8(all).unwrap();
-        assert_eq!(text.contains("mission 1 adopted"), !is_denied, "{text}");
+        assert_eq!(
+            text.contains("mission version 1 adopted"),
+            !is_denied,
+            "{text}"
+        );
         for denial in ["was not adopted", "no upload was adopted"] {
             assert_eq!(text.contains(denial), is_denied, "{denial} in {text}");
         }

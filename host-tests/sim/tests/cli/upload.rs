@@ -95,14 +95,14 @@ fn an_upload_is_in_the_timeline_and_the_picture() {
     let text = String::from_utf8(output.stdout).unwrap();
     for line in [
         "worst hop: SIR 1.5817",
-        "the chain flies mission 1, as uploaded",
+        "the chain uses the uploaded mission, version 1",
         "one radio channel",
-        "converged: 8 relays, SIR 2.466",
-        "20.000 s  the transmitter uploads mission 1",
-        " s  relays 1 to 8 stored mission 1",
-        " s  mission 1 adopted: 8 relays",
-        "converged: 8 relays, SIR 1.582",
-        "view 1, mission 1 uploaded: adopted 0.",
+        "positions agreed: 8 relays, SIR 2.466",
+        "20.000 s  the transmitter uploads mission version 1",
+        " s  relays 1 to 8 stored mission version 1",
+        " s  mission version 1 adopted: 8 relays",
+        "positions agreed: 8 relays, SIR 1.582",
+        "view 1, mission version 1 uploaded: adopted 0.",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }
@@ -230,7 +230,7 @@ fn an_upload_changes_the_hypothetical_interferer() {
     assert!(output.status.success());
     let notes = String::from_utf8(output.stderr).unwrap();
     assert!(
-        notes.contains("replaces all") && notes.contains("an upload changes that one"),
+        notes.contains("replaces all") && notes.contains("an upload changes this interferer"),
         "{notes}"
     );
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();

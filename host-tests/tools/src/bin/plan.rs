@@ -31,7 +31,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         None => Scenario::default(),
     };
     if !scenario.knows_interference() {
-        let line = "interferer: is missing: without [[interferer]] a scenario with [listen] is for cargo provision alone";
+        let line = "interferer: is missing: a scenario with [listen] but without [[interferer]] is for cargo provision only";
         return Err(Failure::input(line.to_owned()));
     }
     let number = options.number();
@@ -198,8 +198,7 @@ fn too_fast(rates: &RateReport) -> String {
         "every hop has a frequency of its own"
     };
     format!(
-        "--target-rate-bps {target_bps:?}: {among} carries it: {shared}; {}. Ask for less, or for more with a larger bandwidth than \
-         {:?} Hz",
+        "--target-rate-bps {target_bps:?}: {among} carries it: {shared}; {}. Give a lower rate, or a larger bandwidth than {:?} Hz",
         rates.largest(),
         rates.bandwidth_hz
     )
@@ -361,13 +360,13 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let refuse = |line: String| Err(Failure::input(line));
     if let Some(x_m) = options.x_m {
         return refuse(format!(
-            "--x-m {x_m:?} is not for --out: a relay chooses its place along the line by itself"
+            "--x-m {x_m:?} is not for --out: a relay computes its position along the line itself"
         ));
     }
     let is_field = matches!(scenario.interference, Interference::Field(_));
     if is_field && options.altitude == Altitude::Free {
         return refuse(
-            "--altitude free is not for --out with a [field]: relays hold geometry.altitude_m there, and best at geometry.altitude_min_m"
+            "--altitude free is not for --out with a [field]: there relays stay at geometry.altitude_m, which is best set to geometry.altitude_min_m"
                 .to_owned(),
         );
     }
@@ -419,7 +418,7 @@ fn write_out(
         && flown.plan.sir() < target * (1.0 - options.tolerance)
     {
         return Err(Failure::unmet(format!(
-            "--out {}: not written: {relays} relays agree on {sir:.2} dB, below the target of {:.2} dB; give a larger --uavs",
+            "--out {}: not written: {relays} relays would agree on positions with {sir:.2} dB, below the target of {:.2} dB; give a larger --uavs",
             file.display(),
             db(target)
         )));
@@ -428,8 +427,7 @@ fn write_out(
         let rate_bps = radio.chain_bps(&flown.plan.sirs);
         if rate_bps < target_bps * (1.0 - options.tolerance) {
             return Err(Failure::unmet(format!(
-                "--out {}: not written: {relays} relays by themselves carry {rate_bps:.6e} bit/s, and the target is {target_bps:.6e} \
-                 bit/s; ask for more by --uavs",
+                "--out {}: not written: the positions on which {relays} relays agree carry {rate_bps:.6e} bit/s, below the target of {target_bps:.6e} bit/s; give a larger --uavs",
                 file.display()
             )));
         }
@@ -444,7 +442,7 @@ fn write_out(
     save(file, "--out", &text)?;
     let file = file.display().to_string();
     Ok(format!(
-        "{file}: the scenario with its plan, {relays} relays that reach {sir:.3} dB by themselves; {}",
+        "{file}: the scenario and its plan were written: {relays} relays that agree on positions with {sir:.3} dB; {}",
         next(&file, &sections)
     ))
 }
@@ -518,7 +516,7 @@ fn write_map(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), 
         .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
     for number in &map.left_out {
         command::complain(&format!(
-            "note: interferer {number} is more than 5 km from the line, and not on the map"
+            "note: interferer {number} is more than 5 km from the line, and is left out of the map"
         ));
     }
     if let Some(file) = &options.geojson {

@@ -81,7 +81,7 @@ fn run(options: &Options) -> Result<String, String> {
     };
     if secret.is_none() {
         command::complain(
-            "no --key-file: frames are not signed, and anybody in range can send frames",
+            "no --key-file: frames are not signed, and anybody in range can forge them",
         );
     }
     Ok(said)
@@ -159,7 +159,7 @@ impl<'a> Asked<'a> {
             ("--explore", options.explore_m.is_some()),
         ] {
             if given && method != Method::Adjust {
-                return Err(format!("{option}: is for --method adjust"));
+                return Err(format!("{option}: is only for --method adjust"));
             }
         }
         Ok(Self {
@@ -192,14 +192,14 @@ impl<'a> Asked<'a> {
         carried(options, self.uavs, probe_after)?;
         let flight = match options.speed {
             Some(_) if !flight.has_sites() => {
-                return Err("--speed: is for a scenario with a [site]".to_owned());
+                return Err("--speed: is only for a scenario with a [site]".to_owned());
             }
             Some(speed) => flight.no_faster_than(speed),
             None => flight,
         };
         let autopilot_key = match &options.autopilot_key_file {
             Some(_) if !flight.has_sites() => {
-                return Err("--autopilot-key-file: is for a scenario with a [site]".to_owned());
+                return Err("--autopilot-key-file: is only for a scenario with a [site]".to_owned());
             }
             Some(file) => Some(key::load("--autopilot-key-file", file)?),
             None => None,
@@ -220,7 +220,9 @@ impl<'a> Asked<'a> {
         let is_plain = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() == 1);
         let is_several = matches!(&self.scenario.interference, Interference::Sources(sources) if sources.len() > 1);
         if self.options.stand_in && !is_several {
-            return Err("--stand-in: is for a scenario with several [[interferer]]".to_owned());
+            return Err(
+                "--stand-in: is only for a scenario with several [[interferer]]".to_owned(),
+            );
         }
         if !self.scenario.knows_interference()
             || is_plain && !self.options.folder.all && self.scenario.plan.is_none()
@@ -248,7 +250,7 @@ impl<'a> Asked<'a> {
         if flown.is_poor() {
             let line = format!("{}: {}", self.name, flown.describe());
             if flown.stand_in && !self.options.stand_in {
-                return Err(format!("{line}; --stand-in writes it all the same"));
+                return Err(format!("{line}; --stand-in writes the files nevertheless"));
             }
             command::complain(&line);
         }
@@ -259,7 +261,7 @@ impl<'a> Asked<'a> {
         let Some(file) = &self.key_file else {
             return match self.options.epoch {
                 Some(epoch) => Err(format!(
-                    "--epoch {epoch}: is for frames that are signed, with --key-file"
+                    "--epoch {epoch}: is only for signed frames, so it needs --key-file"
                 )),
                 None => Ok(None),
             };
@@ -328,7 +330,7 @@ fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, St
     };
     let Interference::Field(field) = &scenario.interference else {
         return Err(format!(
-            "--samples {samples}: is for a scenario with a [field]"
+            "--samples {samples}: is only for a scenario with a [field]"
         ));
     };
     #[expect(

@@ -127,11 +127,9 @@ fn taken() -> Vec<String> {
         "D = 1000 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 150) m, N = 50, relays at \
          least 4 m apart"
             .to_owned(),
-        "from the places of Algorithm 1 (bracketed, not in steps of 0.1) at the paper's h = 220 \
-         m"
+        "starts from the positions of Algorithm 1 (bracketed targets, not steps of 0.1) at the paper's h = 220 m"
         .to_owned(),
-        "the paper leaves out epsilon_h, the grid and the band: a relay goes 10 m up or down a \
-         round at most, within 20 m to 300 m, and searches from coarse to fine"
+        "the paper does not state epsilon_h, the grid and the altitude band; chosen: at most 10 m up or down in a round, 20 m to 300 m, and a search from coarse to fine"
             .to_owned(),
     ]
 }
@@ -178,8 +176,7 @@ pub fn shapes_sheet() -> Result<Sheet, FigureError> {
              climb away from the interferer, as the paper describes."
                 .to_owned(),
             format!(
-                "It also sees larger horizontal steps at both ends than in the middle. That holds until \
-                 the middle has reached the ceiling: from relay 1 to 2, 25 to 26 and 49 to 50 it is {}.",
+                "The paper also reports larger horizontal distances between relays at both ends than in the middle. Here that holds until the middle relays have reached the ceiling: the distances from relay 1 to 2, 25 to 26 and 49 to 50 are {}.",
                 ROUNDS.map(|round| steps(&rows, round)).join("; "),
             ),
         ],
@@ -222,17 +219,12 @@ pub fn rounds_sheet() -> Result<Sheet, FigureError> {
         title: "SIR by round of Algorithm 2, fifty relays",
         says: vec![
             format!(
-                "After {most} rounds {:.1} % more than at first by the search from coarse to \
-                 fine, {:.1} % by the grid of 41 by 21: where Algorithm 1 has made all hops \
-                 equal, a relay alone gains only by a step finer than a coarse grid has.",
+                "After {most} rounds the SIR is {:.1} % higher than at first with the search from coarse to fine, and {:.1} % with the grid of 41 by 21. Algorithm 1 has made all hops equal, so a single relay can improve only by steps smaller than those of the coarse grid.",
                 gain(|row| row.sir_fine_linear),
                 gain(|row| row.sir_grid_linear),
             ),
             format!(
-                "The paper prints a gain of 25 %, which from here would be SIR {:.2}. Altitudes \
-                 and places chosen jointly (`--method altitude`, {} passes) come to {:.4}, {:.1} \
-                 % more than at first, within 0.01 % of the true joint optimum 6.49838: below a \
-                 ceiling of 300 m, 25 % cannot be had.",
+                "The paper prints a gain of 25 %, which from here would be SIR {:.2}. Altitudes and positions chosen jointly (`--method joint`, {} passes) reach {:.4}, {:.1} % more than at first, within 0.01 % of the true joint optimum 6.49838: with a ceiling of 300 m a gain of 25 % is impossible.",
                 1.25 * start,
                 joint.sweeps,
                 joint.sir,

@@ -174,9 +174,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
                 "Best altitudes between 20 m and 300 m: {}.",
                 bests?.join("; ")
             ),
-            "The paper reads h = 220 m off its curve for Y = 150 m. That is the step: the chain \
-             ends up to 0.1 below its optimum, by an amount that jumps with the \
-             altitude."
+            "The paper reads a best altitude of 220 m off its curve for Y = 150 m. That is an effect of the step of 0.1: the chain ends up to 0.1 below its optimum, by an amount that jumps with the altitude."
                 .to_owned(),
         ],
         taken: vec![

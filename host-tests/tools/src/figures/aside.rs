@@ -146,14 +146,14 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
     };
     Ok(Sheet {
         name: "aside",
-        title: "Best position of a single relay by lateral room",
+        title: "Best position of a single relay for different lateral ranges",
         says: vec![
-            "Not in the paper. Seen from above: the relay leaves the line on the side away from the interferer, and stays at the edge of the room while the room is small. With enough room it is where the circles of equal SIR of both hops touch, and more room changes nothing."
+            "Not in the paper. Seen from above: the relay leaves the line on the side away from the interferer, and stays at the limit of the permitted lateral range while that range is small. With a larger range the best position is where the circles of equal SIR of both hops touch, and a still larger range changes nothing."
                 .to_owned(),
         ],
         taken: [
             taken(),
-            vec!["at the lowest altitude, with the same room to both sides".to_owned()],
+            vec!["at the lowest altitude, with the same lateral range to both sides".to_owned()],
         ]
         .concat(),
         chart: Chart {
@@ -166,7 +166,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
                 },
                 Panel {
                     heading: "gain".to_owned(),
-                    x: Axis::linear("room to each side, m").between(0.0, f64::from(MOST_ROOM_M)),
+                    x: Axis::linear("lateral range to each side, m").between(0.0, f64::from(MOST_ROOM_M)),
                     y: Axis::linear("SIR, linear"),
                     lines: lines(|row| (row.room_m, f64::from(row.sir_linear))),
                 },
@@ -190,22 +190,22 @@ pub fn gains_sheet() -> Result<Sheet, FigureError> {
         name: "aside-gain",
         title: "Gain of a single relay by lateral offset, altitude and both",
         says: vec![
-            "Not in the paper. With an interferer on the line, lateral offset and altitude gain nearly the same. Otherwise the lateral offset gains more. If all of the room is used, the altitude can add to it; with enough room the lowest altitude is best."
+            "Not in the paper. With an interferer on the line, lateral offset and altitude gain nearly the same. Otherwise the lateral offset gains more. If the relay is at the limit of its lateral range, a higher altitude can help as well; with a large range the lowest altitude is best."
                 .to_owned(),
         ],
         taken: [
             taken(),
-            vec![format!("room of {ROOM_M} m to both sides")],
+            vec![format!("lateral range of {ROOM_M} m to both sides")],
         ]
         .concat(),
         chart: Chart::of(
             Axis::linear("offset Y of the interferer, m").between(0.0, f64::from(MOST_OFFSET_M)),
             Axis::linear("SIR of the worse hop, linear"),
             vec![
-                line("above the line, lowest", 0, |row| row.line_sir_linear),
+                line("above the line, lowest altitude", 0, |row| row.line_sir_linear),
                 line("altitude free", 1, |row| row.altitude_sir_linear),
-                line("side free", 2, |row| row.side_sir_linear),
-                line("both free", 3, |row| row.both_sir_linear),
+                line("lateral offset free", 2, |row| row.side_sir_linear),
+                line("lateral offset and altitude free", 3, |row| row.both_sir_linear),
             ],
         ),
         tables: vec![Table::new("aside-gain", &rows)?],

@@ -78,17 +78,15 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         name: "beta",
         title: "Beta distributions of the interference power",
         says: vec![
-            "A relay needs one number of such a distribution: Upsilon = E[1/I], in the table as a \
-             multiple of 1 / I_max."
+            "A relay needs only one number of such a distribution, Upsilon = E[1/I]; the table has it as a multiple of 1 / I_max."
                 .to_owned(),
         ],
         taken: vec![
-            "the paper's shapes are only in its picture; these are chosen, all with alpha above \
-             1, without which E[1/I] is infinite"
+            "the paper shows its shape parameters only in a picture; these are chosen, all with alpha above 1, because otherwise E[1/I] is infinite"
                 .to_owned(),
         ],
         chart: Chart::of(
-            Axis::linear("interference power, part of its largest").between(0.0, 1.0),
+            Axis::linear("interference power, as a share of the largest").between(0.0, 1.0),
             Axis::linear("probability density"),
             lines,
         ),

@@ -106,9 +106,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         name: "convergence",
         title: "Algorithm 1 with the paper's step of 0.1, sweep by sweep",
         says: vec![
-            "The target starts above 1000 and comes down by 0.1 a sweep; nearly all of the ten \
-             thousand sweeps are spent on targets far too high. The last point of each line is \
-             where the chain settles."
+            "The target SIR starts above 1000 and falls by 0.1 with each sweep; nearly all of the ten thousand sweeps try targets that are far too high. The last point of each line is the result."
                 .to_owned(),
             format!("Settled: {}.", ends.join("; ")),
         ],
@@ -117,11 +115,9 @@ pub fn sheet() -> Result<Sheet, FigureError> {
              step 0.1 linear SIR"
                 .to_owned(),
             "the numbers of relays are not in the paper's text".to_owned(),
-            "SIR of the worst hop, Rx included, with every relay as far toward Rx as the target \
-             of the sweep lets it"
+            "plotted: SIR of the worst hop, including the hop to Rx, with every relay as far toward Rx as the target of the sweep permits"
                 .to_owned(),
-            "the least separation of 4 m is not looked at, as in the printed algorithm (at the \
-             highest targets relays would be 2 m apart)"
+            "the minimum separation of 4 m is ignored, as in the printed algorithm (at the highest targets relays would be 2 m apart)"
                 .to_owned(),
             "rows: every 100th sweep, every 10th of the last 1000, the last 20".to_owned(),
         ],
@@ -133,7 +129,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
                     lines(0),
                 ),
                 panel(
-                    "the last ones",
+                    "the last sweeps",
                     Axis::linear("sweep").between(9700.0, 10300.0),
                     lines(9700),
                 ),

@@ -98,19 +98,17 @@ pub fn sheet() -> Result<Sheet, FigureError> {
     });
     Ok(Sheet {
         name: "cost",
-        title: "Passes, messages and bytes until the chain settles",
+        title: "Passes, messages and bytes until the relays agree",
         says: vec![format!(
-            "With 100 relays the paper's schedule takes {ratio:.0} times as many messages as the \
-             head that first solves the chain from the mission. One relay alone sends none."
+            "With 100 relays the paper's schedule takes {ratio:.0} times as many messages as a leader that first solves the chain from the mission. A single relay sends no messages."
         )],
         taken: vec![
             "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, interferer at (500, 400) m, \
              relays at least 4 m apart"
                 .to_owned(),
-            "simulated serial links without faults; all frames on any link counted, verdicts and \
-             repetitions too"
+            "simulated serial links without faults; counted are all frames on all links, replies and retransmissions included"
                 .to_owned(),
-            "bracketed targets end within 1e-4 of the optimum, the step within 0.1".to_owned(),
+            "bracketed targets end within 1e-4 of the optimum, the step of 0.1 within 0.1".to_owned(),
         ],
         chart: Chart {
             panels: vec![

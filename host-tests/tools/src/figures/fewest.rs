@@ -112,15 +112,13 @@ pub fn by_place_sheet() -> Result<Sheet, FigureError> {
         name: "fewest-by-place",
         title: "Minimum number of relays for a target SIR, by the interferer's position",
         says: vec![format!(
-            "The nearer the interferer to the line between Tx and Rx, the more relays. The paper \
-             has it that nearness to Tx or Rx itself does it, which holds for low targets and Rx \
-             alone: for a target of 1 and Y = 100 m, X = 500 m, 100 m and 900 m need {low}, \
+            "The nearer the interferer to the line between Tx and Rx, the more relays are needed. The paper says so of an interferer near Tx or Rx, which holds only for low targets, and only near Rx: for a target of 1 and Y = 100 m, X = 500 m, 100 m and 900 m need {low}, \
              {low_tx} and {low_rx} relays; for a target of 5 it is {close}, {close_tx} and \
              {close_rx}, and with Y = 400 m {middle}, {near_tx} and {near_rx}."
         )],
         taken: vec![
             "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, p_u = 1 W, no least separation".to_owned(),
-            "the paper leaves out the places of the interferer: those in the legend are chosen"
+            "the paper does not state the positions of the interferer: those in the legend are chosen"
                 .to_owned(),
         ],
         chart: chart(&rows, |row| {
@@ -138,7 +136,7 @@ pub fn by_power_sheet() -> Result<Sheet, FigureError> {
         name: "fewest-by-power",
         title: "Minimum number of relays for a target SIR, by the relays' power",
         says: vec![
-            "More power at the relays means fewer of them, as the paper says. The formulas as \
+            "With more power at the relays fewer relays are needed, as the paper says. The formulas as \
              printed give too few: 16, 24, 36 and 54 relays of 1 W for targets of 5, 10, 20 and \
              40."
             .to_owned(),
@@ -147,7 +145,7 @@ pub fn by_power_sheet() -> Result<Sheet, FigureError> {
             "D = 1000 m, h = 20 m, p_t = p_MSI = 80 W, interferer at (500, 400) m, no least \
              separation"
                 .to_owned(),
-            "the paper leaves out the powers: those in the legend are chosen".to_owned(),
+            "the paper does not state the powers: those in the legend are chosen".to_owned(),
         ],
         chart: chart(&rows, |row| format!("relays of {} W", row.relay_w)),
         tables: vec![Table::new("fewest-by-power", &rows)?],

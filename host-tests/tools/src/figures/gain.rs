@@ -94,16 +94,13 @@ pub fn sheet() -> Result<Sheet, FigureError> {
              m"
             .to_owned(),
             format!(
-                "random: the mean SIR of the worst hop over {DRAWS} chains of places uniform \
-             in [0, D], in order (seed {SEED} + N)"
+                "random: mean SIR of the worst hop over {DRAWS} chains with positions uniform in [0, D], in order (seed {SEED} + N)"
             ),
-            "blind: the chain whose weakest received signal is strongest; the paper only names \
-             the method it compares with. From N = 43 on every such chain has an outer relay \
+            "blind (ignores the interferer): the chain whose weakest received signal is strongest; the paper only names this method. From N = 43 on every such chain has an outer relay \
              straight above Rx, and all hops are shortened in proportion"
                 .to_owned(),
             "equal: relay k at k D / (N + 1); not in the paper".to_owned(),
-            "Algorithm 1 by the relays' own arithmetic, to 1e-6 of its optimum instead of a step \
-             of 0.1"
+            "Algorithm 1 with the arithmetic of the relays, within 1e-6 of its optimum instead of a step of 0.1"
                 .to_owned(),
         ],
         chart: Chart::of(

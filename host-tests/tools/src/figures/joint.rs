@@ -119,8 +119,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
              20 m to 300 m, relays at least 4 m apart"
                 .to_owned(),
             format!(
-                "Algorithm 2: {ROUNDS} rounds of 10 m up or down at most, each relay \
-             searching from coarse to fine"
+                "Algorithm 2: {ROUNDS} rounds, at most 10 m up or down in each; every relay searches from coarse to fine"
             ),
         ],
         chart: Chart {

@@ -106,8 +106,7 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         ],
         taken: vec![
             "p_u = 1 W, D = 35 m; the power of the interferer cancels".to_owned(),
-            "the paper leaves out p_t and the interferer's places: 20 W and 40 W, and (X, Y) as \
-             in the legend, are chosen"
+            "the paper does not state p_t and the positions of the interferer: 20 W and 40 W, and (X, Y) as in the legend, are chosen"
                 .to_owned(),
         ],
         chart: Chart::of(

@@ -51,7 +51,12 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ("20 relays, one source", 20, 1, unknown),
     ("8 relays, 1 dB position errors", 8, 1, shadowed),
     ("8 relays, two sources", 8, 2, unknown),
-    ("8, two sources, hypothetical one", 8, 2, hypothetical),
+    (
+        "8 relays, two sources, given a hypothetical one",
+        8,
+        2,
+        hypothetical,
+    ),
 ];
 
 /// Returns SIR / optimum after each number of agreements, over `scenes` random scenes of each kind.
@@ -132,17 +137,15 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         name: "sensing",
         title: "Estimation and tracking of an unknown interferer",
         says: vec![
-            "Not in the paper, which takes the interferer as known. The share of the SIR of the chain that was told everything; of two sources, \
-             of the exact optimum for their sum, beside the chain that was told the paper's hypothetical interferer."
+            "Not in the paper, which assumes that the interferer is known. Shown is the SIR as a share of that of a chain that knows the interferer. With two sources it is the share of the exact optimum for their sum, and for comparison that of a chain that is given the paper's single hypothetical interferer."
                 .to_owned(),
         ],
         taken: vec![
             format!(
-                "{SCENES} random scenes a line: D = 1000 m, sources of 1 to 100 W at x from -200 to 1200 m and 50 to 800 m aside; \
-                 measurements 3 % off every 5 s; medians"
+                "each line: median of {SCENES} random scenes, D = 1000 m, sources of 1 to 100 W at x from -200 to 1200 m and 50 to 800 m beside the line; measurements with an error of 3 % every 5 s"
             ),
             format!(
-                "{PASSES} scenes a speed: the interferer passes at 300 m, drones of 10 m/s measure every second; means from a minute after the begin on"
+                "{PASSES} scenes for each speed: the interferer passes at 300 m, drones of 10 m/s measure every second; means from one minute after the start"
             ),
         ],
         chart: Chart {
@@ -159,10 +162,10 @@ pub fn sheet() -> Result<Sheet, FigureError> {
                     x: Axis::linear("speed of the interferer, m/s").between(0.0, 10.0),
                     y: Axis::linear("share of the optimum").between(0.5, 1.0),
                     lines: vec![
-                        speeds(3, 0, "3 relays track it", |row| row.followed_linear),
-                        speeds(8, 1, "8 relays track it", |row| row.followed_linear),
-                        speeds(3, 5, "3 relays stay", |row| row.stayed_linear),
-                        speeds(8, 6, "8 relays stay", |row| row.stayed_linear),
+                        speeds(3, 0, "3 relays, tracking the interferer", |row| row.followed_linear),
+                        speeds(8, 1, "8 relays, tracking the interferer", |row| row.followed_linear),
+                        speeds(3, 5, "3 relays, staying at the first optimum", |row| row.stayed_linear),
+                        speeds(8, 6, "8 relays, staying at the first optimum", |row| row.stayed_linear),
                     ],
                 },
             ],

@@ -414,16 +414,12 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         says,
         taken: vec![
             "D = 35 m, p_MSI = 20 W, interferer at (30, 30) m".to_owned(),
-            "the paper leaves out p_t and p_u: those over the panels are chosen, the first near \
-             the printed averages, the second with the blind place straight above Rx at every \
-             altitude"
+            "the paper does not state p_t and p_u: those above the panels are chosen, the first near the printed averages, the second with the blind position right above Rx at every altitude"
                 .to_owned(),
             format!(
-                "random: the mean SIR over {DRAWS} places uniform in [0, D] (seed {SEED} + \
-             altitude in m), shown as the dB of that mean"
+                "random: mean SIR over {DRAWS} positions uniform in [0, D] (seed {SEED} + altitude in m), shown as the dB of that mean"
             ),
-            "blind: the place of the largest min{p_t / (x^2 + h^2), p_u / ((D - x)^2 + h^2)}; the \
-             paper only names the method it compares with"
+            "blind: the position with the largest min{p_t / (x^2 + h^2), p_u / ((D - x)^2 + h^2)}; the paper only names this method"
                 .to_owned(),
         ],
         chart: Chart {

@@ -196,12 +196,10 @@ pub fn sheet() -> Result<Sheet, FigureError> {
         name: "stochastic",
         title: "Algorithm 4 with the paper's step of 0.1, sweep by sweep",
         says: vec![
-            "A chain that has settled holds its SIR. Where the interference is not the same \
+            "The last SIR of each line is the result. Where the interference is not the same \
              everywhere, a lower target may give a lower SIR, as the paper says."
                 .to_owned(),
-            "The step is an eighth of the largest expected SIR: what it loses is in the table. \
-             With 8 relays or fewer, i.i.d., it passes over all there is: 8 end with 0.0003 \
-             instead of 0.0912."
+            "The step of 0.1 is an eighth of the largest expected SIR; the table has the loss that it causes. With 8 relays or fewer and i.i.d. interference it skips all targets that can be met: 8 relays end at 0.0003 instead of 0.0912."
                 .to_owned(),
         ],
         taken: vec![
@@ -209,17 +207,13 @@ pub fn sheet() -> Result<Sheet, FigureError> {
              h^2)"
                 .to_owned(),
             "Upsilon = (alpha + beta - 1) / ((alpha - 1) I_max); the paper prints (alpha + beta) \
-             / alpha, which is E[1/I] of no Beta distribution, without I_max, and 0.8 Lambda for \
-             what can only be 0.8 / Lambda"
+             / alpha, which is not E[1/I] of a Beta distribution, omits I_max, and 0.8 Lambda where only 0.8 / Lambda is possible"
                 .to_owned(),
-            "i.i.d.: Upsilon = 0.8 / Lambda; not i.i.d.: between 0.6 / Lambda and 1 / Lambda, \
-             drawn anew every 20 m (seed 4), straight lines between"
+            "i.i.d.: Upsilon = 0.8 / Lambda; not i.i.d.: random between 0.6 / Lambda and 1 / Lambda every 20 m (seed 4), with straight lines in between"
                 .to_owned(),
-            "alpha = 3 and I_max = 2 Lambda everywhere, beta by Upsilon; the paper gives neither, \
-             nor the numbers of relays"
+            "alpha = 3 and I_max = 2 Lambda everywhere, and beta follows from Upsilon; the paper states neither these nor the numbers of relays"
                 .to_owned(),
-            "as corrected: the last hop follows the target, and no relay stands before \
-             Tx"
+            "Algorithm 4 as corrected: the last hop follows the target, and no relay is placed before Tx"
             .to_owned(),
         ],
         chart: Chart {

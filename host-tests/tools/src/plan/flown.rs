@@ -37,18 +37,18 @@ impl Flown {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
             (
-                "on board one hypothetical interferer replaces all",
+                "because the relays compute with one hypothetical interferer in place of all",
                 "let the relays estimate the interferer, and simulate that (`cargo chain --listen`, [listen]), or plan other altitudes or more \
                  relays against the true sum (`cargo plan`)",
             )
         } else {
             (
-                "the field is too uneven for Algorithm 4",
+                "because the interference field is too uneven for Algorithm 4",
                 "plan another geometry.altitude_m or another number of relays (`cargo plan`)",
             )
         };
         format!(
-            "the relays reach {reach:.2} dB of {best:.2} dB, {:.1} % less than the best positions: {why}; {remedy}",
+            "the relays would reach an SIR of {reach:.2} dB instead of {best:.2} dB, {:.1} % less than the best positions, {why}; {remedy}",
             100.0 * self.loss()
         )
     }
@@ -154,9 +154,9 @@ pub fn with_plan(text: &str, planned: &Planned) -> Result<String, String> {
         .map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
     _ = file.remove("plan");
     let mut table = Table::new();
-    table.decor_mut().set_prefix(
-        "\n# By `cargo plan`. What is above may be changed, and is then to be planned anew.\n",
-    );
+    table
+        .decor_mut()
+        .set_prefix("\n# By `cargo plan`. If you change anything above, run `cargo plan` again.\n");
     table.insert("uavs", value(i64::from(planned.uavs)));
     table.insert("method", value(planned.method.name()));
     table.insert("tolerance", value(planned.tolerance));
@@ -207,7 +207,7 @@ pub fn is_current(planned: &Planned, flown: &Flown) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "[plan] is of another scenario: relays in this one settle up to {off_m:.1} m from plan.places, at {sir_db:.3} dB in place of \
+        "[plan] was computed for another scenario: the relays of this one settle up to {off_m:.1} m from plan.places, at {sir_db:.3} dB instead of \
          plan.sir_db = {:.3}; allowed: [plan] as `cargo plan --out` writes it for this scenario",
         planned.sir_db
     ))

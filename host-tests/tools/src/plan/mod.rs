@@ -62,7 +62,7 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     } else if ask.number != Number::Of(1) {
         "--x-m is for one relay: it needs --uavs 1".to_owned()
     } else if matches!(scenario.interference, Interference::Field(_)) {
-        "--x-m needs an [[interferer]]: in a [field] the altitude does not change what is heard"
+        "--x-m needs an [[interferer]]: in a [field] the interference does not depend on the altitude"
             .to_owned()
     } else {
         return Ok(());
@@ -74,7 +74,7 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
 fn both_ways_only_by_align(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
     if scenario.reverse > 0.0 {
         return Err(NoPlan::Wrong(format!(
-            "{what} is for one direction, and link.reverse = {:?}: Algorithm 1 places relays at their own altitudes for both directions; \
+            "{what} is for one direction, and link.reverse = {:?}: for both directions only Algorithm 1 places the relays, at fixed altitudes; \
              allowed: link.reverse = 0.0 or no {what}",
             scenario.reverse
         )));

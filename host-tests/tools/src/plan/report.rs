@@ -108,7 +108,7 @@ impl RateReport {
         if let Some(target_bps) = self.target_rate_bps {
             _ = writeln!(
                 text,
-                "target: {target_bps:.6e} bit/s; no fewer relays carry it"
+                "target: {target_bps:.6e} bit/s; fewer relays do not carry it"
             );
         }
         let mut before_bps = f64::NAN;
@@ -138,7 +138,7 @@ impl RateReport {
                 format!("1 to {tried_uavs}")
             };
             return format!(
-                "largest data rate: 0 bit/s: the worst hop of {any} relays is below the first of link.steps"
+                "largest data rate: 0 bit/s: the SINR of the worst hop with {any} relays is below the first of link.steps"
             );
         }
         let (relays, verb) = relays_carry(best_uavs);
@@ -438,7 +438,7 @@ impl PlanReport {
             let most = unit.say(most);
             _ = writeln!(
                 text,
-                "target: SIR {target}; that many relays reach up to {most} (--uavs {uavs})"
+                "target: SIR {target}; this number of relays reaches up to {most} (--uavs {uavs})"
             );
         }
         let is_for_both = self.way_back.is_some_and(|back| back.reverse.is_some());
@@ -467,7 +467,7 @@ impl HypotheticalReport {
     fn describe(&self, text: &mut String, unit: Unit) {
         _ = writeln!(
             text,
-            "hypothetical interferer: {:.6} W at x = {:.3} m, y = {:.3} m; it is off by {:.3} % of the interference, {:.3e} W on average",
+            "hypothetical interferer: {:.6} W at x = {:.3} m, y = {:.3} m; its interference differs from the true one by {:.3} %, {:.3e} W on average",
             self.power_w,
             self.x_m,
             self.y_m,
@@ -484,12 +484,12 @@ impl HypotheticalReport {
             ),
             (false, Some(sir)) => writeln!(
                 text,
-                "its places are not good enough: {} against all interferers; these are the best found against all{gain}. Relays fly the positions for the hypothetical one: `cargo provision` refuses them, and `cargo chain --listen` has relays find their own",
+                "its positions are not good enough, {} against all interferers; shown are the best found against all{gain}. Relays would fly the positions for the hypothetical one, so `cargo provision` refuses this scenario; with `cargo chain --listen` the relays estimate the interferer themselves",
                 unit.both(sir)
             ),
             (false, None) => writeln!(
                 text,
-                "no positions are good against it; these are the best found against all"
+                "no positions are good against it; shown are the best found against all interferers"
             ),
         };
     }

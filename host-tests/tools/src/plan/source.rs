@@ -283,18 +283,17 @@ fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Pla
 
 /// Explanation for an interferer at Rx.
 const DROWNED: &str =
-    "the interferer stands at Rx, where no signal is received wherever the drone is";
+    "the interferer is at Rx, so the SIR of the second hop is 0 wherever the drone is";
 
 /// Explanation for an interferer at Tx.
-const LEVEL: &str = "the drone goes right above Rx: the interferer stands at Tx, so the first hop is the same everywhere, and the \
-                     second is best there";
+const LEVEL: &str = "the drone goes right above Rx: the interferer is at Tx, so the first hop has the same SIR everywhere, and the second is best there";
 
 /// Explains a case of Theorem 1.
 pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
     use theorems::PlaceCase;
     match case {
         PlaceCase::AboveTx => {
-            "the drone stays right above Tx: its first hop is the weaker one even there, and weaker anywhere else"
+            "the drone stays right above Tx: its first hop is the weaker one even there, and it is weaker still anywhere else"
         }
         PlaceCase::Crossing => {
             "the drone goes where both hops are equally good: nearer to Tx the second would be worse, nearer to Rx the first"
@@ -303,14 +302,13 @@ pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
             "the drone goes right above Rx: its first hop is the better one even there, and only the second has to improve"
         }
         PlaceCase::BeforeValley => {
-            "the drone goes to where both hops are equally good, before the interference is worst, or past it all to right above Rx, \
-             whichever is better"
+            "the drone goes to where both hops are equally good, before the point of the strongest interference, or beyond that point to right above Rx, whichever is better"
         }
         PlaceCase::OverValley => {
             "the drone goes right above Rx: its first hop is the better one even where the interference is worst"
         }
         PlaceCase::Hilltop => {
-            "the drone goes where its first hop is best: that is the weaker one even there"
+            "the drone goes to where its first hop is best, because the first hop is the weaker one even there"
         }
         PlaceCase::BeyondHill => {
             "the drone goes beyond the best place of its first hop, to where both hops are equally good"
@@ -320,7 +318,7 @@ pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
         }
         PlaceCase::Level => LEVEL,
         PlaceCase::SecondHill => {
-            "the drone goes past the worst interference: to where its first hop is best again, or both hops are equally good"
+            "the drone goes past the point of the strongest interference, to where its first hop is best again, or where both hops are equally good"
         }
         PlaceCase::Drowned => DROWNED,
     }
@@ -334,7 +332,7 @@ pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
             "the drone flies as low as it may: both hops get worse with the altitude"
         }
         AltitudeCase::Crossing => {
-            "the drone climbs until both hops are equally good: lower the interference harms the first, higher the way to Rx the second"
+            "the drone climbs until both hops are equally good: at a lower altitude the interference weakens the first hop, at a higher one the distance to Rx weakens the second"
         }
         AltitudeCase::End => {
             "the drone flies as low or as high as it may, whichever is better: nowhere between are both hops equally good"
@@ -365,7 +363,7 @@ pub(super) fn sideways(case: aside::AsideCase) -> &'static str {
             "the drone flies low and goes aside, away from the interferer, to where any step that helps one hop harms the other"
         }
         AsideCase::Hilltop => {
-            "the drone flies low and goes where its first hop is best: that is the weaker one even there"
+            "the drone flies low and goes to where its first hop is best, because the first hop is the weaker one even there"
         }
         AsideCase::AboveRx => {
             "the drone goes right above Rx, as low as it may: its first hop is the better one even there"
@@ -381,10 +379,10 @@ pub(super) fn sideways(case: aside::AsideCase) -> &'static str {
         }
         AsideCase::Level => LEVEL,
         AsideCase::Inside => {
-            "the drone goes to the best place within its room that a search finds, as low or as high as it may"
+            "the drone goes to the best position within its permitted space that a search finds, at the lowest or the highest altitude"
         }
         AsideCase::Wall => {
-            "the drone goes to a wall of its room, to where any step along it that helps one hop harms the other"
+            "the drone goes to a side of its permitted space, to where any step along that side that helps one hop harms the other"
         }
         AsideCase::Drowned => DROWNED,
     }

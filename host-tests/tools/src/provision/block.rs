@@ -78,7 +78,7 @@ impl fmt::Display for BlockError {
             Self::Config(ConfigError::Mission(error)) => error.fmt(f),
             Self::Config(ConfigError::Channel(error)) => error.fmt(f),
             Self::Config(_) | Self::Changed => {
-                f.write_str("the drone would read another mission from this block than that of the scenario")
+                f.write_str("the drone would read a mission from this block that differs from the scenario's")
             }
         }
     }
@@ -287,12 +287,17 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
 pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> Result<u32, String> {
     let refuse = |key: &str, value: u32, own: u32, why: &str| {
         format!(
-            "{name}: network.{key} = {value}: must be {own}, or left out: {why}, and no block changes it"
+            "{name}: network.{key} = {value}: must be {own}, or left out: {why}, and a configuration block cannot change it"
         )
     };
     let ms = |time: Duration| u32::try_from(time.as_micros() / 1_000).unwrap_or(u32::MAX);
     if let Some(baud) = section.baud.filter(|baud| *baud != BAUD) {
-        let line = refuse("baud", baud, BAUD, "the firmware's ports run at that");
+        let line = refuse(
+            "baud",
+            baud,
+            BAUD,
+            "the firmware's ports have this fixed data rate",
+        );
         return Err(format!("{line}; a radio's own data rate is --baud"));
     }
     let probe_after_ms = given_ms.or(section.probe_after_ms).unwrap_or(0);
@@ -305,7 +310,7 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
     let dead = ms(dead_after);
     let own = section.dead_after_ms.filter(|_| given_ms.is_none());
     if let Some(after) = own.filter(|after| *after != dead) {
-        let why = "three times probe_after_ms, as the firmware has it";
+        let why = "the firmware uses three times probe_after_ms";
         return Err(refuse("dead_after_ms", after, dead, why));
     }
     // The explicit default and 0 give the same block.

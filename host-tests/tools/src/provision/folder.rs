@@ -29,7 +29,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
         && !force
     {
         return Err(format!(
-            "--out-dir {}: {} exists already; --force overwrites it, and removes blocks of other relays",
+            "--out-dir {}: {} exists already; --force overwrites it, and removes the blocks of other relays in the folder",
             dir.display(),
             first.file_name().unwrap_or_default().to_string_lossy()
         ));
@@ -132,7 +132,7 @@ pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<
     if places.is_empty() {
         text.push_str("their positions are not known before the flight\n");
     } else {
-        text.push_str("positions on which they settle:\n");
+        text.push_str("positions on which the relays will settle:\n");
         let earth = if line.is_some() {
             "      lat [deg]     lon [deg]  amsl [m]"
         } else {
@@ -164,7 +164,7 @@ pub fn summary(heading: &Heading, places: &[(Placement, Profile)], line: Option<
         text.push('\n');
     }
     text.push_str(
-        "\ncommands to type in this folder, two for each drone, with that drone at the probe:\n",
+        "\ncommands to type in this folder, two for each drone, while that drone is connected to the debug probe:\n",
     );
     for index in 1..=*uavs {
         _ = writeln!(

@@ -112,12 +112,16 @@ fn a_uf2_file_has_whole_blocks_with_whole_pages() {
 
 #[test]
 fn an_invalid_image_is_refused_in_one_line() {
-    assert!(pieces(b"no ELF").unwrap_err().starts_with("not an ELF"));
+    assert!(
+        pieces(b"no ELF")
+            .unwrap_err()
+            .starts_with("not a 32-bit ELF file")
+    );
     let nothing = pieces(&elf(&[])).unwrap_err();
-    assert_eq!(nothing, "an ELF with nothing to load");
+    assert_eq!(nothing, "an ELF file without loadable segments");
     let twice = elf(&[(0, 0, &[1; 8]), (4, 4, &[2; 8])]);
     let twice = flat(&pieces(&twice).unwrap()).unwrap_err();
-    assert_eq!(twice, "two parts of the image are at 0x00000004");
+    assert_eq!(twice, "two segments of the image overlap at 0x00000004");
     let far = elf(&[(0, 0, &[1]), (0x2000_0000, 0, &[2])]);
     assert!(flat(&pieces(&far).unwrap()).is_err());
 }

@@ -130,7 +130,7 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     ] {
         let baud = arguments.split_once("--baud ").map_or("115200", |it| it.1);
         let line = format!(
-            "--baud {baud}: must be within {least} to 10000000: {in_range} relays in range of each other overload the channel: it needs {least} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {most} relays in range; if fewer receive each other, give --in-range, or --wires for separate links\n"
+            "--baud {baud}: must be within {least} to 10000000: {in_range} relays in range of each other overload the channel: use at least {least} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {most} relays in range; if fewer receive each other, give --in-range, or --wires for separate links\n"
         );
         assert_eq!(refusal(&format!("{plain} {arguments}")), line);
     }
@@ -217,7 +217,7 @@ fn the_block_has_the_networks_method_and_baud() {
     for (sections, words) in [
         (
             network("baud = 57600"),
-            "network.baud = 57600: must be 115200, or left out: the firmware's ports run at that",
+            "network.baud = 57600: must be 115200, or left out: the firmware's ports have this fixed data rate",
         ),
         (
             network("probe_after_ms = 1200001"),
@@ -348,7 +348,10 @@ fn a_plan_is_written_to_every_block() {
     let scenario = Scenario::load(&file).unwrap();
     let plan = scenario.plan.clone().unwrap();
     assert!(
-        said.contains(&format!("{} relays that reach", plan.uavs)),
+        said.contains(&format!(
+            "{} relays that agree on positions with",
+            plan.uavs
+        )),
         "{said}"
     );
     assert!(plan.sir_db >= 8.0, "{}", plan.sir_db);

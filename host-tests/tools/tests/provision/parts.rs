@@ -67,7 +67,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(
         said,
-        "no --key-file: frames are not signed, and anybody in range can send frames\n"
+        "no --key-file: frames are not signed, and anybody in range can forge them\n"
     );
     assert_eq!(block(), paper());
 
@@ -290,7 +290,10 @@ fn the_command_takes_the_sites_from_the_scenario() {
     let fast = flight().no_faster_than(7.5).block(3).unwrap();
     assert_eq!(written("--speed 7.5"), fast);
     for (arguments, words) in [
-        ("--speed 7.5", "--speed: is for a scenario with a [site]"),
+        (
+            "--speed 7.5",
+            "--speed: is only for a scenario with a [site]",
+        ),
         ("--speed 20.1", "must be a number within 0.1 to 20.0"),
         ("--speed NaN", "must be a number within 0.1 to 20.0"),
         (&format!("--scenario {off}"), "m from tx to rx"),

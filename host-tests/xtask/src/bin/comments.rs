@@ -207,7 +207,7 @@ fn main() -> ExitCode {
         Ok((count, faults)) => {
             eprintln!("{}", faults.join("\n"));
             eprintln!(
-                "{} of {count} doc comments: begin the summary with a noun, an article or a verb; at most {LONGEST} characters",
+                "{} of {count} doc comments do not follow the rule: begin the summary with a noun, an article or a verb; at most {LONGEST} characters",
                 faults.len()
             );
             ExitCode::FAILURE

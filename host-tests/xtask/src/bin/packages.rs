@@ -98,7 +98,9 @@ fn twice() -> Result<Vec<String>, String> {
         }
     }
     versions.retain(|name, versions| versions.len() > 1 && !TWICE.contains(name));
-    let told = |(name, versions)| format!("several versions in what flies: {name} {versions:?}");
+    let told = |(name, versions)| {
+        format!("several versions of a dependency of the firmware: {name} {versions:?}")
+    };
     Ok(versions.into_iter().map(told).collect())
 }
 
@@ -106,7 +108,7 @@ fn elsewhere(lock: &str) -> Vec<String> {
     let sources = lock.lines().filter(|line| line.starts_with("source = "));
     let other = sources.filter(|line| !line.starts_with("source = \"registry+"));
     other
-        .map(|line| format!("not of the registry: {line}"))
+        .map(|line| format!("a dependency that is not from crates.io: {line}"))
         .collect()
 }
 

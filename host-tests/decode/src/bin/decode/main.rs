@@ -52,9 +52,9 @@ fn run(options: &Options) -> Result<(), Failure> {
         Err(SourceError::Read(error)) => {
             Err(Failure::input(format!("{name}: cannot be read: {error}")))
         }
-        Err(SourceError::Capture(error)) => {
-            Err(Failure::input(format!("{name}: no valid capture: {error}")))
-        }
+        Err(SourceError::Capture(error)) => Err(Failure::input(format!(
+            "{name}: is not a valid capture: {error}"
+        ))),
     }
 }
 
@@ -74,7 +74,7 @@ fn open(file: Option<&Path>) -> Result<(String, Box<dyn Read>), Failure> {
             }
         }
         None if io::stdin().is_terminal() => Err(Failure::input(
-            "FILE: is missing: must be a capture (pcapng) or a file of bytes, unless they come from another command by a pipe",
+            "FILE: is missing: must be a capture (pcapng) or a file of raw bytes, unless a pipe supplies the bytes",
         )),
         None => Ok(("standard input".to_owned(), Box::new(io::stdin()))),
     }

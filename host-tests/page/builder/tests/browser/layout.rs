@@ -83,7 +83,7 @@ fn all_of_it_can_be_heard() {
         );
     }
     find("button", "Play");
-    find("slider", "Time");
+    find("slider", "Time since the start");
     let heard: Vec<&str> = nodes
         .iter()
         .filter(|node| node["role"]["value"] == "StaticText")

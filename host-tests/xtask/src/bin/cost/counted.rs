@@ -80,7 +80,12 @@ const SIGNED: &[Counted] = &[
         &["tag_32"],
         None,
     ),
-    ("the tag of a full sweep", "instructions", &["tag_84"], None),
+    (
+        "the tag of a sweep message of 16 targets",
+        "instructions",
+        &["tag_84"],
+        None,
+    ),
     (
         "the tag of the longest body",
         "instructions",
@@ -88,14 +93,19 @@ const SIGNED: &[Counted] = &[
         None,
     ),
     (
-        "a full sweep with tags, message in to message out",
+        "a sweep message of 16 targets with tags, from receiving to sending it",
         "instructions",
         &["signed_sweep"],
         None,
     ),
-    ("its frame", "bytes", &["signed_sweep_bytes"], Some(108)),
     (
-        "a replayed sweep, refused",
+        "length of its frame",
+        "bytes",
+        &["signed_sweep_bytes"],
+        Some(108),
+    ),
+    (
+        "a replayed sweep message, rejected",
         "instructions",
         &["refused"],
         None,
@@ -105,7 +115,7 @@ const SIGNED: &[Counted] = &[
 /// Table rows for the runners: functions that move bytes between the ports and a relay.
 const RUNNERS: &[Counted] = &[
     (
-        "a full sweep on polled ports, bytes in to bytes out",
+        "a sweep message of 16 targets on polled ports, from bytes to bytes",
         "instructions",
         &["polled_sweep"],
         None,
@@ -123,7 +133,7 @@ const RUNNERS: &[Counted] = &[
         None,
     ),
     (
-        "the same of asynchronous ports",
+        "the same with asynchronous ports",
         "instructions",
         &["async_idle"],
         None,
@@ -140,12 +150,12 @@ const RUNNERS: &[Counted] = &[
 /// Table rows for the upload of a new mission in flight.
 const UPLOADED: &[Counted] = &[
     (
-        "an offer of a new mission, taken",
+        "an offer of a new mission, accepted",
         "instructions",
         &["offer"],
         None,
     ),
-    ("its frame", "bytes", &["offer_bytes"], Some(140)),
+    ("length of its frame", "bytes", &["offer_bytes"], Some(140)),
 ];
 
 /// Row of the cost table: description, unit, names of measured figures, and budget.
@@ -160,64 +170,69 @@ pub(crate) type Counted = (
 
 const COUNTED: &[Counted] = &[
     (
-        "stack, measured: the calls of a relay",
+        "stack, measured, of the calls of a relay",
         "bytes",
         &["stack"],
         None,
     ),
     ("`size_of::<Relay>()`", "bytes", &["size_of_relay"], None),
-    ("one reach", "instructions", &["reach"], Some(165)),
     (
-        "one reach in noise, the longest of 120",
+        "reach of a hop: one relay, one target SIR",
+        "instructions",
+        &["reach"],
+        Some(165),
+    ),
+    (
+        "the same with receiver noise, the longest of 120",
         "instructions",
         &["reach_noise"],
         None,
     ),
     (
-        "one reach in noise, the median of 120",
+        "the same with receiver noise, the median of 120",
         "instructions",
         &["reach_noise_median"],
         None,
     ),
     (
-        "a full sweep, message in to message out",
+        "a sweep message of 16 targets, from receiving to sending it",
         "instructions",
         &["sweep"],
         Some(14_000),
     ),
-    ("its frame", "bytes", &["sweep_bytes"], Some(100)),
+    ("length of its frame", "bytes", &["sweep_bytes"], Some(100)),
     (
-        "a full sweep at the last relay, message in to verdict out",
+        "a sweep message at the last relay, which sends the verdict",
         "instructions",
         &["sweep_at_tail"],
         None,
     ),
     (
-        "a full verdict, message in to message out",
+        "a verdict message of 16 targets, from receiving to sending it",
         "instructions",
         &["verdict"],
         None,
     ),
     (
-        "a full verdict at the leader",
+        "a verdict message at the leader, which receives it last",
         "instructions",
         &["verdict_at_head"],
         None,
     ),
     (
-        "a full frame, deframed and checked",
+        "a frame of full length, decoded and checked",
         "instructions",
         &["frame"],
         None,
     ),
     (
-        "a portion of the leader's prediction",
+        "one portion of the leader's advance solution of the chain",
         "instructions",
         &["predict"],
         None,
     ),
     (
-        "portions for a chain of 100",
+        "portions of that for a chain of 100",
         "",
         &["predict_portions"],
         None,
@@ -242,14 +257,19 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
-        "Theorem 2: its altitude",
+        "Theorem 2: one relay placed in altitude",
         "instructions",
         &["theorem_2"],
         None,
     ),
-    ("Theorem 3: both", "instructions", &["theorem_3"], None),
     (
-        "the fewest relays for an SIR of 5: 22",
+        "Theorem 3: one relay placed along x and in altitude",
+        "instructions",
+        &["theorem_3"],
+        None,
+    ),
+    (
+        "number of relays for an SIR of 5: 22",
         "instructions",
         &["fewest"],
         None,
@@ -272,28 +292,33 @@ const COUNTED: &[Counted] = &[
         &["joint", "predicted"],
         None,
     ),
-    ("its longest frame", "bytes", &["joint_bytes"], None),
+    (
+        "longest frame of the joint method",
+        "bytes",
+        &["joint_bytes"],
+        None,
+    ),
     (
         "8 relays solved by the joint method",
         "instructions",
         &["solved_8"],
         None,
     ),
-    ("in portions", "", &["portions_8"], None),
+    ("number of portions", "", &["portions_8"], None),
     (
         "50 relays solved by the joint method",
         "instructions",
         &["solved_50"],
         None,
     ),
-    ("in portions", "", &["portions_50"], None),
+    ("number of portions", "", &["portions_50"], None),
     (
         "50 relays with room to the side solved by the joint method",
         "instructions",
         &["solved_50_wide"],
         None,
     ),
-    ("in portions", "", &["portions_50_wide"], None),
+    ("number of portions", "", &["portions_50_wide"], None),
     (
         "`size_of::<Solver>()` for up to 100 relays",
         "bytes",
@@ -319,19 +344,19 @@ const COUNTED: &[Counted] = &[
 /// They are measured in the image that also measures the runners.
 const FLOWN: &[Counted] = &[
     (
-        "the line between two sites",
+        "conversion set-up for the line between two sites",
         "instructions",
         &["line"],
         None,
     ),
     (
-        "a place along it as latitude and longitude",
+        "a position along the line to latitude and longitude",
         "instructions",
         &["to_earth"],
         None,
     ),
     (
-        "a latitude and longitude as a place along it",
+        "a latitude and longitude to a position along the line",
         "instructions",
         &["from_earth"],
         None,

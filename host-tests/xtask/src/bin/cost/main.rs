@@ -12,7 +12,7 @@ use std::process::{Command, ExitCode};
 
 use uav_relay_xtask::toolchain::spaced;
 
-const USAGE: &str = "cargo cost [--write]: what the firmware costs\n\n  --write  README.md and examples/RESULTS.md say from now on what was measured";
+const USAGE: &str = "cargo cost [--write]: what the firmware costs\n\n  --write  write the measured figures into README.md and examples/RESULTS.md";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -57,7 +57,7 @@ fn report(rows: &[Row], write: bool) -> Result<(), String> {
     let (rustc, qemu) = (version("rustc")?, version("qemu-system-arm")?);
     if !are_of(&root, &rustc, &qemu) {
         println!(
-            "The documents are of another compiler or emulator than rustc {rustc} and QEMU {qemu}."
+            "The figures in the documents were measured with another compiler or emulator than rustc {rustc} and QEMU {qemu}."
         );
         return Ok(());
     }
@@ -84,7 +84,7 @@ fn version(program: &str) -> Result<String, String> {
     let mut parts = numbers.unwrap_or_default().split('.');
     match (parts.next(), parts.next()) {
         (Some(major), Some(minor)) => Ok(format!("{major}.{minor}")),
-        _ => Err(format!("{program} says no version: {text}")),
+        _ => Err(format!("{program} prints no version: {text}")),
     }
 }
 
@@ -202,7 +202,8 @@ fn with(
 ) -> Result<Document, String> {
     let path = root.join(name);
     let kept = std::fs::read_to_string(&path).map_err(|error| format!("{name}: {error}"))?;
-    let measured = measured(&kept).ok_or_else(|| format!("{name}: no place for costs"))?;
+    let measured = measured(&kept)
+        .ok_or_else(|| format!("{name}: the marked place for the costs is missing"))?;
     Ok(Document {
         name,
         path,
@@ -221,9 +222,9 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
         let [flash, ram, stack] = [flash, ram, stack].map(|row| spaced(row.value));
         Some(format!("{flash}, {ram} and {stack} bytes"))
     };
-    let sweep = rows
-        .iter()
-        .position(|row| row.what == "a full sweep, message in to message out")?;
+    let sweep = rows.iter().position(|row| {
+        row.what == "a sweep message of 16 targets, from receiving to sending it"
+    })?;
     let [sweep, frame] = rows.get(sweep..sweep + 2)? else {
         return None;
     };
@@ -237,7 +238,7 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
             image("flash of the relay image, everything")?,
         ),
         (
-            "| a sweep of 16 targets, message in to message out | ",
+            "| one sweep message with 16 target SIRs, from receiving to sending it | ",
             format!(
                 "{} instructions, {} bytes on the wire",
                 spaced(sweep.value),

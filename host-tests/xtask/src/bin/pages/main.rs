@@ -67,7 +67,7 @@ fn main() -> ExitCode {
     match walk(root, &only, slow) {
         Ok(0) => ExitCode::SUCCESS,
         Ok(faults) => {
-            println!("pages: {faults} blocks do not print what the page says");
+            println!("pages: the output of {faults} blocks differs from the page");
             ExitCode::FAILURE
         }
         Err(line) => {
