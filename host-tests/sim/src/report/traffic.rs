@@ -48,6 +48,9 @@ pub struct TrafficDetails {
     /// Description of the access to the radio.
     #[serde(skip)]
     sharing: String,
+    /// True if the slots are fitted to the data of both directions.
+    #[serde(skip)]
+    fits_both: bool,
 }
 
 /// Traffic in one direction.
@@ -153,6 +156,7 @@ impl TrafficReport {
                     })
                     .collect(),
                 sharing: spec.link.radio.sharing(nodes),
+                fits_both: spec.link.is_fitted_to_both(),
             },
         }
     }
@@ -167,12 +171,13 @@ impl TrafficReport {
             flows,
             periods,
             sharing,
+            fits_both,
             ..
         } = &self.traffic;
-        let halves = if flows.len() > 1 {
-            ", each way half of the time"
-        } else {
-            ""
+        let halves = match flows.len() {
+            0 | 1 => "",
+            _ if *fits_both => ", both ways",
+            _ => ", each way half of the time",
         };
         let mut text = format!(
             "traffic from {from_s:.3} to {until_s:.3} s: {sharing}{halves}; packets of {packet_bytes} bytes, up to {queue_packets} in a queue\n"
