@@ -32,6 +32,9 @@ struct StandTold {
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
     /// SIR of every hop between relays that are on and have a position, linear, at that time. Empty without relays.
     sirs: Vec<f32>,
+    /// The same on the way back; empty for one direction.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    backs: Vec<f32>,
     /// Number of frames sent on all links until this time.
     messages: u64,
     /// Interferer as estimated by the first relay: W, m, m.
@@ -115,6 +118,11 @@ fn stands(run: &Prepared<'_>, changes: BTreeMap<Instant, Change>) -> Vec<StandTo
             at_s: seconds(at),
             relays: change.relays.into_iter().map(told).collect(),
             sirs: run.sirs_at(at, &chain).into_iter().map(narrow).collect(),
+            backs: run
+                .sirs_back_at(at, &chain)
+                .into_iter()
+                .map(narrow)
+                .collect(),
             messages,
             believed: match believed {
                 Some(InterferenceEstimate::Source { source, .. }) => {
