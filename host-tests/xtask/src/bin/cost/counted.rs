@@ -12,6 +12,7 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     let figure = |name: &str| figure(&counted, name);
     let settled = [
         "settled",
+        "settled_both_ways",
         "agreed",
         "joint_settled",
         "predicted_settled",
@@ -191,6 +192,25 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
+        "a full sweep both ways, message in to message out",
+        "instructions",
+        &["sweep_both_ways"],
+        None,
+    ),
+    ("its frame", "bytes", &["sweep_both_ways_bytes"], Some(100)),
+    (
+        "a full sweep both ways at the last relay, message in to verdict out",
+        "instructions",
+        &["sweep_both_ways_at_tail"],
+        None,
+    ),
+    (
+        "a full verdict both ways, message in to message out",
+        "instructions",
+        &["verdict_both_ways"],
+        None,
+    ),
+    (
         "a full verdict, message in to message out",
         "instructions",
         &["verdict"],
@@ -339,6 +359,10 @@ const CALLS: &[&str] = &[
     "begin_sweep",
     "sweep",
     "sweep_at_tail",
+    "begin_sweep_both_ways",
+    "sweep_both_ways",
+    "sweep_both_ways_at_tail",
+    "verdict_both_ways",
     "verdict",
     "verdict_at_head",
     "predict",

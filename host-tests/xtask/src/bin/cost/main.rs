@@ -210,7 +210,7 @@ fn with(
 }
 
 /// Returns the beginnings of the README's rows and their text.
-fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
+fn lines(rows: &[Row]) -> Option<[(&'static str, String); 4]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;
         let [flash, ram, stack] = rows.get(at..at + 3)? else {
@@ -219,11 +219,13 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
         let [flash, ram, stack] = [flash, ram, stack].map(|row| spaced(row.value));
         Some(format!("{flash}, {ram} and {stack} bytes"))
     };
-    let sweep = rows
-        .iter()
-        .position(|row| row.what == "a full sweep, message in to message out")?;
-    let [sweep, frame] = rows.get(sweep..sweep + 2)? else {
-        return None;
+    let sweep = |what: &str| {
+        let at = rows.iter().position(|row| row.what == what)?;
+        let [sweep, frame] = rows.get(at..at + 2)? else {
+            return None;
+        };
+        let (sweep, frame) = (spaced(sweep.value), frame.value);
+        Some(format!("{sweep} instructions, {frame} bytes on the wire"))
     };
     Some([
         (
@@ -236,11 +238,11 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
         ),
         (
             "| a sweep of 16 targets, message in to message out | ",
-            format!(
-                "{} instructions, {} bytes on the wire",
-                spaced(sweep.value),
-                frame.value
-            ),
+            sweep("a full sweep, message in to message out")?,
+        ),
+        (
+            "| the same for both directions | ",
+            sweep("a full sweep both ways, message in to message out")?,
         ),
     ])
 }
