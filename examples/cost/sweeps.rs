@@ -64,16 +64,53 @@ fn reach_in_noise() {
     hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
-/// Measures the instructions for a sweep message at relays 2 and 3 of 3, and for the verdict sent back.
+/// Largest costs of the calls of a sweep and its verdict.
+struct SweepCost {
+    begin: u32,
+    through: u32,
+    at_tail: u32,
+    back: u32,
+    next: u32,
+    /// Longest frame, bytes.
+    longest: usize,
+    /// True if the chain has agreed.
+    settled: bool,
+}
+
+/// Prints the costs of sweeps of one direction and of both.
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
+    const BOTH_WAYS: Mission = Mission::new(MissionConfig {
+        reverse: 1.0,
+        ..*THREE.config()
+    });
+    let cost = measured(THREE);
+    hprintln!("begin_sweep {}", cost.begin);
+    hprintln!("sweep_bytes {}", cost.longest);
+    hprintln!("sweep {}", cost.through);
+    hprintln!("sweep_at_tail {}", cost.at_tail);
+    hprintln!("verdict {}", cost.back);
+    hprintln!("verdict_at_head {}", cost.next);
+    hprintln!("settled {}", u32::from(cost.settled));
+    let cost = measured(BOTH_WAYS);
+    hprintln!("begin_sweep_both_ways {}", cost.begin);
+    hprintln!("sweep_both_ways_bytes {}", cost.longest);
+    hprintln!("sweep_both_ways {}", cost.through);
+    hprintln!("sweep_both_ways_at_tail {}", cost.at_tail);
+    hprintln!("verdict_both_ways {}", cost.back);
+    hprintln!("settled_both_ways {}", u32::from(cost.settled));
+}
+
+/// Measures a full sweep through a middle and the last relay of three, and the verdict on its way back.
+#[inline(never)]
+fn measured(mission: Mission) -> SweepCost {
     let settings = Settings {
         predict: false,
         ..Settings::default()
     };
-    let mut head = relay(1, settings, THREE);
-    let mut middle = relay(2, settings, THREE);
-    let mut tail = relay(3, settings, THREE);
+    let mut head = relay(1, settings, mission);
+    let mut middle = relay(2, settings, mission);
+    let mut tail = relay(3, settings, mission);
     let (mut now, mut begin) = (Instant::ZERO, 0);
     while head.phase() == Phase::Planning {
         now = head.poll_timeout().unwrap_or(now);
@@ -124,13 +161,15 @@ pub(crate) fn sweep() {
             begin = begin.max(instructions(|| head.handle_timeout(now)));
         }
     }
-    hprintln!("begin_sweep {}", begin);
-    hprintln!("sweep_bytes {}", longest);
-    hprintln!("sweep {}", through);
-    hprintln!("sweep_at_tail {}", at_tail);
-    hprintln!("verdict {}", back);
-    hprintln!("verdict_at_head {}", next);
-    hprintln!("settled {}", u32::from(head.phase() == Phase::Holding));
+    SweepCost {
+        begin,
+        through,
+        at_tail,
+        back,
+        next,
+        longest,
+        settled: head.phase() == Phase::Holding,
+    }
 }
 
 /// Measures the instructions for deframing and checking one sweep message, the first of eight relays.

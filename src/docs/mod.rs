@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`firmware`] | from an empty folder to a flying relay: in a loop, by interrupts, with RTIC or Embassy |
 //! | [`planning`] | number of relays, their positions, and whether the plan is proven optimal |
+//! | [`link`] | both directions, data rates, and access to the radio |
 //! | [`lost_relays`] | behaviour when a relay fails or comes back, or the chain is split |
 //! | [`uploads`] | new missions in flight |
 //! | [`sensing`] | estimation and tracking of an unknown interferer |
@@ -17,6 +18,9 @@ pub mod firmware {}
 
 #[doc = include_str!("planning.md")]
 pub mod planning {}
+
+#[doc = include_str!("link.md")]
+pub mod link {}
 
 #[doc = include_str!("lost_relays.md")]
 pub mod lost_relays {}

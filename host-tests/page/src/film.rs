@@ -38,6 +38,9 @@ struct StandTold {
     ///
     /// Relays that are off or have no position do not count.
     sirs: Vec<f32>,
+    /// The same on the way back; empty for one direction.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    backs: Vec<f32>,
     /// Number of frames sent on all links from the start until this time.
     messages: u64,
     /// Estimated interferer: power in W, x and y in m. `None` if no interferer is estimated.
@@ -123,6 +126,11 @@ fn stands(run: &Prepared<'_>, changes: BTreeMap<Instant, Change>) -> Vec<StandTo
             at_s: seconds(at),
             relays: change.relays.into_iter().map(told).collect(),
             sirs: run.sirs_at(at, &chain).into_iter().map(narrow).collect(),
+            backs: run
+                .sirs_back_at(at, &chain)
+                .into_iter()
+                .map(narrow)
+                .collect(),
             messages,
             believed: match believed {
                 Some(InterferenceEstimate::Source { source, .. }) => {

@@ -87,7 +87,7 @@ function handle(picture, signs, { moved, pressed, left, refused }) {
 /** Reads the form and returns an error line for each number out of its range. Valid fields are used. */
 function read() {
   const lines = [];
-  for (const key of ["uavs", "power", "loss"]) {
+  for (const key of ["uavs", "power", "reverse", "rx_w", "loss"]) {
     const field = byId(key);
     const good = field.value !== "" && field.checkValidity();
     field.setAttribute("aria-invalid", String(!good));
@@ -98,5 +98,6 @@ function read() {
   want.listen = byId("listen").checked;
   want.moving = byId("moving").checked && want.listen;
   byId("moving").disabled = !want.listen;
+  byId("rx_w").disabled = !(want.reverse > 0);
   return lines;
 }

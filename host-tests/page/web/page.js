@@ -20,10 +20,20 @@ function relays() {
   return [...there].map(one).filter(Boolean).sort((a, b) => a.x - b.x);
 }
 
-/** Returns the displayed SIR of every hop. */
-function sirs() {
+/** Returns the displayed SIRs of every hop to Rx (`there`) and, with a way back, toward Tx (`back`), and r. */
+function ways() {
   const { report } = shown.run;
-  return player.now && !player.ended ? player.now.sirs : [...(report.relays || []).map((relay) => relay.sir), report.rx_sir];
+  const reverse = report.reverse || 0;
+  if (player.now && !player.ended) return { there: player.now.sirs, back: player.now.backs, reverse };
+  const kept = report.relays || [];
+  const back = reverse > 0 ? [...kept.map((relay) => relay.sir_back), report.rx_sir_back] : [];
+  return { there: [...kept.map((relay) => relay.sir), report.rx_sir], back, reverse };
+}
+
+/** Returns the displayed SIR of every hop that counts: the smaller one of both directions, the way back divided by r. */
+function sirs() {
+  const { there, back, reverse } = ways();
+  return there.map((sir, hop) => (hop < back.length ? Math.min(sir, back[hop] / reverse) : sir));
 }
 
 /** Returns true if the run has the present input. */
@@ -41,7 +51,15 @@ function draw(moved) {
   // Exactly one relay can be reached by Tab.
   const stop = all.some(({ relay }) => relay === hand.relay) ? hand.relay : (all[0] || {}).relay;
   const marks = new Map();
-  if (wanted && values.length === chain.length + 1) for (const hop of worstHops(values)) marks.set(hop, "worst");
+  if (wanted && values.length === chain.length + 1) {
+    const { there, back } = ways();
+    const worst = new Set(worstHops(values));
+    values.forEach((value, hop) => {
+      const isBack = hop < back.length && value < there[hop] * (1 - EQUAL);
+      const kind = [worst.has(hop) ? "worst" : "", isBack ? "back" : ""].filter(Boolean).join(" ");
+      if (kind) marks.set(hop, kind);
+    });
+  }
   chain.forEach((relay, at) => {
     if (!relay.told) for (const hop of [at, at + 1]) marks.set(hop, "waits");
   });
@@ -86,8 +104,10 @@ function tell() {
   byId("summary").setAttribute("aria-live", player.playing ? "off" : "polite");
   const chain = relays().filter((relay) => relay.on);
   byId("summary").textContent = tick && !player.ended ? moment(tick, Math.min(...values), chain) : summary(run.report);
-  if (values.length === chain.length + 1) list(values, [...chain.map((relay) => relay.relay), "Rx"]);
-  else list([], []);
+  const both = ways();
+  list(values.length === chain.length + 1 ? rows(both, ["Tx", ...chain.map((relay) => relay.relay), "Rx"]) : []);
+  byId("ways").hidden = both.back.length === 0;
+  byId("ways").textContent = `Both directions; bars of the way back: SIR / ${both.reverse}. Dashed hop: the way back is the worse one.`;
   mark(tick ? tick.told : Infinity);
   byId("player").hidden = player.ticks.length < 2;
   byId("play").textContent = player.playing ? "Pause" : "Play";

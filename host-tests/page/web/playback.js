@@ -8,7 +8,7 @@ const PLAYED = { all: 10_000, least: 25, most: 120, pause: 450 };
 const BEFORE = 0.7;
 const FRAMES = 400;
 
-/** Returns the ticks of a playback: time, states of the relays, SIRs, and sender of a frame. */
+/** Returns the ticks of a playback: time, states of the relays, SIRs of both directions, and sender of a frame. */
 function ticks(film, timeline) {
   const moving = film.stands.filter((stand) => stand.relays.some(([, , place]) => place)).map((stand) => stand.at_s);
   let coming = 0;
@@ -18,7 +18,7 @@ function ticks(film, timeline) {
     if (coming < moving.length && moving[coming] - at_s < BEFORE && spoken.length < FRAMES) spoken.push({ at_s, says: [relay, to], messages: sent + 1 });
   }
   const all = [...film.stands, ...spoken].sort((a, b) => a.at_s - b.at_s);
-  let [relays, sirs, messages, believed] = [new Map(), [], 0, null];
+  let [relays, sirs, backs, messages, believed] = [new Map(), [], [], 0, null];
   let told = 0;
   return all.map((change) => {
     if (change.relays) {
@@ -26,12 +26,12 @@ function ticks(film, timeline) {
         relays = new Map(relays);
         for (const [relay, on, place] of change.relays) relays.set(relay, { on, place });
       }
-      [sirs, believed] = [change.sirs, change.believed || null];
+      [sirs, backs, believed] = [change.sirs, change.backs || [], change.believed || null];
     }
     messages = Math.max(messages, change.messages);
     const before = told;
     while (told < timeline.length && timeline[told].at_s <= change.at_s) told += 1;
-    return { at_s: change.at_s, relays, sirs, messages, believed, says: change.says || null, told, happens: told > before };
+    return { at_s: change.at_s, relays, sirs, backs, messages, believed, says: change.says || null, told, happens: told > before };
   });
 }
 

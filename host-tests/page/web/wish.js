@@ -1,7 +1,7 @@
 "use strict";
 // Input of the user, as options and a scenario of `cargo chain`.
 
-const BEGINNING = { tx: 0, rx: 1000, x: 500, y: 400, power: 80, uavs: 8, method: "align", loss: 0, listen: false, moving: false };
+const BEGINNING = { tx: 0, rx: 1000, x: 500, y: 400, power: 80, reverse: 0, rx_w: 80, uavs: 8, method: "align", loss: 0, listen: false, moving: false };
 
 /** Time at which relays that are switched off become silent, and duration of the measurements, s. */
 const SILENT_S = 20;
@@ -43,9 +43,10 @@ function scenario() {
     "[geometry]", `distance_m = ${real(want.rx - want.tx)}`, "altitude_m = 20.0", "min_separation_m = 4.0",
     ...(want.method === "align" ? [] : ["altitude_min_m = 20.0", "altitude_max_m = 300.0"]),
     ...(joint ? ["lateral_min_m = -280.0", "lateral_max_m = 280.0"] : []),
-    "[power]", "tx_w = 80.0", "uav_w = 1.0",
+    "[power]", "tx_w = 80.0", "uav_w = 1.0", ...(want.reverse > 0 ? [`rx_w = ${real(want.rx_w)}`] : []),
     "[[interferer]]", `power_w = ${real(want.power)}`, `x_m = ${real(want.x - want.tx)}`, `y_m = ${real(want.y)}`,
   ];
+  if (want.reverse > 0) lines.push("[link]", `reverse = ${real(want.reverse)}`);
   if (want.listen) lines.push("[listen]", `following = ${want.moving}`);
   return `${lines.join("\n")}\n`;
 }

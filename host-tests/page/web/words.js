@@ -5,10 +5,14 @@ const byId = (id) => document.getElementById(id);
 
 const decibels = (linear) => `${(10 * Math.log10(linear)).toFixed(2)} dB`;
 
+/** Returns the words for the direction that limits a chain of both directions. */
+const limitedBy = (direction) => ({ forward: "limited by the way to Rx", backward: "limited by the way back", both: "limited by both directions" })[direction];
+
 function summary(report) {
   if (report.sir === undefined) return "The relays have not agreed on positions.";
   const share = report.share_of_optimum === undefined ? "" : ` ${(100 * report.share_of_optimum).toFixed(1)} % of the optimum with the interferer known.`;
-  return `Worst hop: SIR ${report.sir.toPrecision(5)} (${decibels(report.sir)}) with ${report.relays.length} relays; ${report.messages} messages, ${report.bytes} bytes, ${report.virtual_s.toFixed(3)} s of virtual time.${share}`;
+  const ways = report.reverse === undefined ? "" : `, ${limitedBy(report.worst_direction)},`;
+  return `Worst hop: SIR ${report.sir.toPrecision(5)} (${decibels(report.sir)})${ways} with ${report.relays.length} relays; ${report.messages} messages, ${report.bytes} bytes, ${report.virtual_s.toFixed(3)} s of virtual time.${share}`;
 }
 
 /** Returns the summary of a tick before the last one. */
@@ -28,22 +32,36 @@ function worstHops(sirs) {
   return worst.length < sirs.length ? worst : [];
 }
 
-/** Fills the list of SIRs and marks the worst hops; `ends` names the end of each hop. */
-function list(sirs, ends) {
-  const [most, worst] = [Math.max(...sirs), new Set(worstHops(sirs))];
+/** Returns the rows of the list: name, SIR, the SIR that counts (`counted`), and true for the way back. `nodes` names Tx, the relays and Rx. */
+function rows({ there, back, reverse }, nodes) {
+  const all = [];
+  there.forEach((sir, hop) => {
+    all.push({ name: `to ${nodes[hop + 1]}`, sir, counted: sir, isBack: false });
+    if (hop < back.length) all.push({ name: `back to ${nodes[hop]}`, sir: back[hop], counted: back[hop] / reverse, isBack: true });
+  });
+  return all;
+}
+
+/** Fills the list of SIRs and marks the worst ones; bars have the length of the SIR that counts. */
+function list(told) {
+  const counted = told.map((row) => row.counted);
+  const [most, worst] = [Math.max(...counted), new Set(worstHops(counted))];
   const all = byId("hops");
-  while (all.childElementCount > sirs.length) all.lastChild.remove();
-  while (all.childElementCount < sirs.length) {
+  while (all.childElementCount > told.length) all.lastChild.remove();
+  while (all.childElementCount < told.length) {
     const item = document.createElement("li");
     item.append(...["span", "i", "span"].map((kind) => document.createElement(kind)));
     all.append(item);
   }
   [...all.children].forEach((item, at) => {
     const [name, bar, number] = item.children;
-    name.textContent = `to ${ends[at]}`;
-    bar.style.width = `${(100 * sirs[at]) / most}%`;
-    bar.className = worst.has(at) ? "worst" : "";
-    number.textContent = `${sirs[at].toPrecision(5)}, ${decibels(sirs[at])}`;
+    const row = told[at];
+    name.textContent = row.name;
+    bar.style.width = `${(100 * row.counted) / most}%`;
+    const kind = row.isBack ? "back" : "";
+    name.className = number.className = kind;
+    bar.className = [kind, worst.has(at) ? "worst" : ""].filter(Boolean).join(" ");
+    number.textContent = `${row.sir.toPrecision(5)}, ${decibels(row.sir)}`;
   });
 }
 

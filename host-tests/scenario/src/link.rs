@@ -8,7 +8,17 @@
 //! fitted     1 / R = sum over hops of 1 / (B b(SINR))    one frequency, each slot as long as its hop needs
 //! ```
 //!
-//! These formulas are defined only here ([`Radio::chain_bps`]). Where data goes both ways, each direction has half of the time.
+//! These formulas are defined only here ([`Radio::chain_bps`]).
+//!
+//! Where data goes both ways, each direction has half of the time: two slots for each hop. Fitted slots of a chain that is planned
+//! for both directions ([`Scenario::reverse`] r > 0) are as long as the data of both directions needs, r times as much on the way
+//! back ([`Radio::both_bps`]):
+//!
+//! ```text
+//! fitted     1 / R = sum over hops of (1 / (B b(F)) + r / (B b(B)))      R to Rx and r R back, with the SINRs F and B of a hop
+//! ```
+//!
+//! The larger min(R to Rx, R back / r), the better the chain ([`worse_bps`]).
 
 use std::fmt;
 
@@ -43,12 +53,13 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots in which every hop of a chain of `relays` relays sends once.
-    pub const fn slots(self, relays: u16) -> u32 {
-        match self {
+    /// Returns the number of time slots in which a chain of `relays` relays sends once per hop and direction.
+    pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
+        let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
             Self::Channels => 1,
-        }
+        };
+        if both_ways { 2 * hops } else { hops }
     }
 }
 
@@ -95,6 +106,29 @@ impl RateModel {
                 met.map_or(0.0, |step| step.bits_per_hz)
             }
         }
+    }
+
+    /// Returns the lowest SINR (linear) with at least `bits_per_hz` bit/s/Hz, above 0; `None` if no SINR carries that.
+    pub fn sinr(&self, bits_per_hz: f64) -> Option<f64> {
+        match self {
+            Self::Shannon { gap_db } => {
+                let sinr = libm::expm1(bits_per_hz * std::f64::consts::LN_2) * factor(*gap_db);
+                sinr.is_finite().then_some(sinr)
+            }
+            Self::Steps(steps) => {
+                let met = steps.iter().find(|step| step.bits_per_hz >= bits_per_hz);
+                met.map(|step| factor(step.sinr_db))
+            }
+        }
+    }
+}
+
+/// Returns the smaller of the rate to Rx and of the rate back divided by `reverse`, bit/s; the rate to Rx if `reverse` is 0.
+pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
+    if reverse > 0.0 {
+        there_bps.min(back_bps / reverse)
+    } else {
+        there_bps
     }
 }
 
@@ -188,6 +222,22 @@ impl Radio {
         }
     }
 
+    /// Returns the data rates to Rx and back, bit/s, of a chain that uses both directions.
+    ///
+    /// `there` and `back` are the SIRs (linear) of its hops. `reverse` is r of a chain that is planned for both directions, and 0
+    /// otherwise: then each direction has half of the time.
+    pub fn both_bps(&self, there: &[f64], back: &[f64], reverse: f64) -> [f64; 2] {
+        if reverse > 0.0 && self.link.access == Access::Fitted {
+            let time = |sirs| match self.chain_bps(sirs) {
+                rate_bps if rate_bps > 0.0 => 1.0 / rate_bps,
+                _ => f64::INFINITY,
+            };
+            let rate_bps = 1.0 / (time(there) + reverse * time(back));
+            return [rate_bps, reverse * rate_bps];
+        }
+        [there, back].map(|sirs| self.chain_bps(sirs) / 2.0)
+    }
+
     /// Returns a text that says how `hops` hops share the radio. It can begin a sentence.
     pub fn sharing(&self, hops: usize) -> String {
         match self.link.access {
@@ -205,7 +255,7 @@ impl Radio {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use super::{Access, BandwidthError, Link, Radio, RateModel, RateStep};
+    use super::{Access, BandwidthError, Link, Radio, RateModel, RateStep, worse_bps};
     use crate::Scenario;
 
     fn steps() -> RateModel {
@@ -267,6 +317,51 @@ mod tests {
             assert!(rate(access, &[10.0, 0.9]).abs() < f64::EPSILON);
             assert!(rate(access, &[]).abs() < f64::EPSILON);
         }
+    }
+
+    #[test]
+    fn an_efficiency_needs_an_sinr() {
+        let model = RateModel::Shannon { gap_db: 3.0 };
+        for bits in [1e-6, 0.3, 8.0] {
+            let again = model.bits_per_hz(model.sinr(bits).unwrap());
+            assert!((again / bits - 1.0).abs() < 1e-12, "{bits} {again}");
+        }
+        assert_eq!(model.sinr(1e4), None);
+        let found = [0.1, 0.5, 0.6, 2.0, 2.1].map(|bits| steps().sinr(bits));
+        assert_eq!(found, [Some(1.0), Some(1.0), Some(10.0), Some(10.0), None]);
+    }
+
+    #[test]
+    fn both_directions_share_the_time() {
+        let radio = |access| Radio {
+            link: Link {
+                access,
+                bandwidth_hz: None,
+                model: steps(),
+            },
+            bandwidth_hz: 1e6,
+        };
+        // Rates of 2 and 2, back 0.5 and 2 Mbit/s.
+        let (there, back) = ([10.0, 10.0], [1.0, 10.0]);
+        let is = |access, reverse, expected: [f64; 2]| {
+            let found = radio(access).both_bps(&there, &back, reverse);
+            let near = found
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-6);
+            assert!(near, "{access:?} {reverse}: {found:?}");
+        };
+        for reverse in [0.0, 0.5] {
+            is(Access::Slots, reverse, [5e5, 1.25e5]);
+            is(Access::Channels, reverse, [1e6, 2.5e5]);
+        }
+        is(Access::Fitted, 0.0, [5e5, 2e5]);
+        // One Mbit to Rx takes 1 s, half a Mbit back 1.25 s.
+        is(Access::Fitted, 0.5, [1e6 / 2.25, 0.5e6 / 2.25]);
+        assert!((worse_bps([4.0, 1.0], 0.5) - 2.0).abs() < 1e-12);
+        assert!((worse_bps([4.0, 1.0], 0.0) - 4.0).abs() < 1e-12);
+        let none = radio(Access::Fitted).both_bps(&there, &[0.1, 10.0], 0.5);
+        assert!(none.iter().all(|rate| rate.abs() < 1e-12), "{none:?}");
     }
 
     #[test]

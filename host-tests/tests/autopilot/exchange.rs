@@ -265,7 +265,7 @@ fn bearings_lead_to_the_neighbours_agreed_position() {
             vehicle.mode = Mode::Companion;
         }
         run(&mut vehicle, &mut first, 100);
-        talk(&mut first, &mut second, vehicle.now, 900.0, false);
+        exchange_fences(&mut first, &mut second, vehicle.now, 900.0, false);
     }
     let [own, next] = [&first, &second].map(|relay| relay.setpoint().unwrap());
     let ahead = first.bearing(Side::Downstream).unwrap();

@@ -27,7 +27,7 @@ fn the_stated_number_of_uploads_is_stored_in_a_flight() {
 }
 
 #[test]
-fn what_is_no_upload_is_none() {
+fn invalid_bytes_are_no_upload() {
     assert_eq!(unpack_upload(&pack_upload(&version(77))), Some(version(77)));
     assert_eq!(unpack_upload(&[]), None);
     assert_eq!(unpack_upload(&[u32::MAX; WORDS]), None);

@@ -34,7 +34,7 @@ fn the_stated_number_of_views_is_stored_before_an_erase() {
 /// Checks a power failure while a vote is recorded. The previous record stays valid, because the new vote was not
 /// sent.
 #[test]
-fn of_a_record_that_is_torn_the_one_before_holds() {
+fn after_a_torn_record_the_previous_one_is_read() {
     for written in 1..WORDS + OVERHEAD {
         let mut flash = Ram::blank(SECTOR, written as u64);
         let mut log = Journal::new(&mut flash, WORDS, 7);
@@ -51,7 +51,7 @@ fn of_a_record_that_is_torn_the_one_before_holds() {
 }
 
 #[test]
-fn what_is_no_record_is_none() {
+fn invalid_bytes_are_no_view_record() {
     assert_eq!(unpack_record(&[]), None);
     assert_eq!(unpack_record(&[u32::MAX; WORDS]), None);
     let other_format = 2;

@@ -189,9 +189,9 @@ pub(crate) fn around(
 }
 
 /// Returns random positions in order along x, with the least separation or more between neighbours.
-pub(crate) fn places(rng: &mut ChaCha8Rng, confines: &GuardConfig, relays: usize) -> Vec<Point> {
-    let distance = f64::from(confines.geofence.most_x_m);
-    let step = f64::from(confines.separation_m) + 5e-7 * distance;
+pub(crate) fn places(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
+    let distance = f64::from(config.geofence.most_x_m);
+    let step = f64::from(config.separation_m) + 5e-7 * distance;
     let slack = distance - step * (relays - 1) as f64;
     let (from, to) = match rng.random_range(0..4) {
         0 => (0.0, 0.05),
@@ -224,9 +224,9 @@ pub(crate) fn closer(
     mut at: Vec<Point>,
     wild: bool,
 ) -> Vec<Point> {
-    let rounding = 5e-7 * f64::from(confines.geofence.most_x_m);
-    let apart = 1.0001 * f64::from(confines.separation_m) + rounding;
-    let fence = confines.geofence;
+    let rounding = 5e-7 * f64::from(config.geofence.most_x_m);
+    let apart = 1.0001 * f64::from(config.separation_m) + rounding;
+    let fence = config.geofence;
     let inside = |y: f64, h: f64| {
         (f64::from(fence.least_y_m)..=f64::from(fence.most_y_m)).contains(&y)
             && (f64::from(fence.least_altitude_m)..=f64::from(fence.most_altitude_m)).contains(&h)

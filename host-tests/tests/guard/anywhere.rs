@@ -257,7 +257,7 @@ impl World {
                 }
                 drone
                     .guard
-                    .handle_fence(letter.side, node(letter.from), &letter.fence);
+                    .handle_fence(message.side, node(message.from), &message.fence);
             }
         }
         for k in 0..self.drones.len() {

@@ -217,7 +217,7 @@ impl Drone {
         };
         // The setpoint starts at the drone's position and enters the permitted box as soon as it may.
         let begun = *self.begun.get_or_insert(setpoint);
-        let fence = confines.geofence;
+        let fence = config.geofence;
         for (is, begun, least, most) in [
             (setpoint.x_m, begun.x_m, fence.least_x_m, fence.most_x_m),
             (setpoint.y_m, begun.y_m, fence.least_y_m, fence.most_y_m),

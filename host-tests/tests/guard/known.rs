@@ -12,7 +12,7 @@ use crate::world::World;
 const SPEED: f64 = 10.0;
 
 fn world(relays: usize, from_m: f64, step_m: f64) -> World {
-    let confines = GuardConfig {
+    let config = GuardConfig {
         geofence: Geofence {
             least_x_m: 0.0,
             most_x_m: 1000.0,

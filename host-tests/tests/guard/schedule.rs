@@ -113,10 +113,10 @@ fn line(rng: &mut ChaCha8Rng, mut config: GuardConfig, relays: usize) -> (GuardC
     } else {
         taken * rng.random_range(2.0..=20.0)
     };
-    confines.geofence.most_x_m = distance.max(10.0) as f32;
-    confines.relays = relays as u16;
-    let starts = places(rng, &confines, relays);
-    (confines, starts)
+    config.geofence.most_x_m = distance.max(10.0) as f32;
+    config.relays = relays as u16;
+    let starts = places(rng, &config, relays);
+    (config, starts)
 }
 
 /// Runs the first phase of the flight, with all random faults and events.
@@ -258,7 +258,7 @@ fn calm(rng: &mut ChaCha8Rng, world: &mut World, report: &mut Report) {
         }
         guard.commit(place(*target));
     }
-    let distance = f64::from(world.confines.geofence.most_x_m);
+    let distance = f64::from(world.config.geofence.most_x_m);
     let (begun_s, allowed_s) = (
         world.now_s,
         left.len() as f64 * (10.0 + length([distance, 120.0, 100.0]) / SLOWEST),

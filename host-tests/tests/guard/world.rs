@@ -74,8 +74,8 @@ impl World {
 
     /// Returns the permitted shortfall of the separation, m: four position errors and f32 rounding.
     pub(crate) fn allowed_m(&self) -> f64 {
-        let rounding = f64::from(self.confines.geofence.most_x_m) * f64::from(f32::EPSILON);
-        4.0 * f64::from(self.confines.hover_m) + 8.0 * rounding
+        let rounding = f64::from(self.config.geofence.most_x_m) * f64::from(f32::EPSILON);
+        4.0 * f64::from(self.config.hover_m) + 8.0 * rounding
     }
 
     pub(crate) fn step(&mut self) {
@@ -94,8 +94,8 @@ impl World {
         for message in self.medium.arrived(now_s) {
             let drone = &mut self.drones[message.to];
             if let Some(guard) = drone.guard.as_mut().filter(|_| drone.speaks && drone.flies) {
-                guard.handle_fence(letter.side, node(letter.from), &letter.fence);
-                let side = usize::from(letter.side == Side::Downstream);
+                guard.handle_fence(message.side, node(message.from), &message.fence);
+                let side = usize::from(message.side == Side::Downstream);
                 // Only a message of the present association counts.
                 let told = message.fence.flags & Fence::LEFT != 0
                     && message.fence.echo == drone.said[side];
@@ -184,7 +184,7 @@ impl World {
         let least = below.iter().map(|(_, high)| *high).fold(before, f64::max);
         let least = (least + apart_m).max(0.0);
         let most = above.iter().map(|(low, _)| *low).fold(after, f64::min);
-        let most = (most - apart_m).min(f64::from(self.confines.geofence.most_x_m));
+        let most = (most - apart_m).min(f64::from(self.config.geofence.most_x_m));
         let to = least + share * (most - least);
         if least < most {
             let [stop, ..] = self.drones[k].stopped();

@@ -83,11 +83,11 @@ impl MessageFields<'_> {
 }
 
 /// Returns the crate's message with the values that `wire_message` has by the tables of the format.
-pub(crate) fn message(said: &Said) -> Message {
-    let fields = said.fields();
-    let of = Of(&fields);
-    match said.name() {
-        "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(said.name(), &of)),
+pub(crate) fn message(wire_message: &WireMessage) -> Message {
+    let fields = wire_message.fields();
+    let of = MessageFields(&fields);
+    match wire_message.name() {
+        "Sweep" | "Measured" | "Aside" => Message::Sweep(sweep(wire_message.name(), &of)),
         "Verdict" => Message::Verdict(SweepVerdict {
             number: of.word("number"),
             view_digest: of.word("view_digest"),

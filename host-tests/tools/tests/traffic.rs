@@ -19,7 +19,8 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::route::{DataLink, TrueHops};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::traffic::{Flow, Traffic, TrafficSpec, traffic};
-use uav_relay_tools::plan::rate::Rates;
+use uav_relay_tools::plan::carried::Carried;
+use uav_relay_tools::plan::rate::{Rate, Rates};
 use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
 
 /// Relative tolerance of the chain's SIR, for planned and for simulated positions.
@@ -120,6 +121,60 @@ impl Case {
         [&plan.sirs, &back].map(|sirs| self.radio.chain_bps(sirs) / 2.0)
     }
 
+    /// Returns the planner's plan for the largest data rate.
+    fn planned(&self) -> Plan {
+        let ask = self.ask(Number::Of(self.relays));
+        match Carried::new(&self.scenario, &ask, &self.radio, self.relays) {
+            Some(carried) => carried.plan(self.relays).unwrap(),
+            None => plan(&self.scenario, &ask).unwrap(),
+        }
+    }
+
+    /// Sends packets through a chain whose relays are at the planned positions.
+    fn send_as_planned(
+        &self,
+        planned: &Plan,
+        both: bool,
+        offered_bps: Option<[f64; 2]>,
+    ) -> Traffic {
+        let (mission, profiles) = mission::mission(&self.scenario, self.relays, TOLERANCE).unwrap();
+        let setup = Setup {
+            profiles,
+            track: true,
+            ..Setup::new(mission)
+        };
+        let hops = TrueHops::new(&self.scenario, &setup, &mission);
+        let mut outcome = run(setup).unwrap();
+        let places: Vec<[f64; 3]> = planned
+            .places
+            .iter()
+            .map(|(at, _)| [at.x_m, at.y_m, at.altitude_m].map(f64::from))
+            .collect();
+        outcome.track = outcome.track.map(|track| track.moved_to(&places));
+        let rate = Rate::of(planned, &self.scenario, &self.radio);
+        let slowest = match rate {
+            Rate::There(rate_bps) => rate_bps,
+            Rate::Both([there_bps, back_bps]) => there_bps.min(back_bps),
+        };
+        let spec = TrafficSpec {
+            link: DataLink {
+                radio: self.radio.clone(),
+                packet_bits: if slowest > 0.0 {
+                    (10.0 * slowest).min(12_000.0)
+                } else {
+                    10.0
+                },
+                both,
+                reverse: self.scenario.reverse,
+            },
+            queue_packets: 50,
+            offered_bps,
+        };
+        traffic(&spec, &hops, &outcome, self.relays.into())
+            .unwrap()
+            .unwrap()
+    }
+
     /// Simulates a chain of `relays` relays that carries packets, toward Rx or in `both` directions.
     ///
     /// `offered_bps` are the data rates offered; `None` for the rates that the chain promises.
@@ -144,6 +199,7 @@ impl Case {
                 radio: self.radio.clone(),
                 packet_bits: (10.0 * slowest).min(12_000.0),
                 both,
+                reverse: 0.0,
             },
             queue_packets: 50,
             offered_bps,
@@ -219,6 +275,63 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
     }
     println!("{access:?}, steps {has_steps}: at least {worst:.4} delivered, {carried} carry data");
     assert!(carried > 0);
+}
+
+/// Chains that are planned for both directions, or for fitted slots, at the positions of the plan.
+fn every_plan_is_kept(access: Access, has_steps: bool) {
+    let first = number("SEED", 1);
+    let (mut worst, mut carried) = (1.0_f64, 0);
+    for seed in first..first + number("COUNT", 25) {
+        let mut case = Case::draw(seed, access, has_steps);
+        let reverses = [1.0, 0.02 + 0.98 * (0.618 * seed as f64).fract(), 0.0];
+        let fitted_one_way = usize::from(access == Access::Fitted);
+        for &reverse in &reverses[..2 + fitted_one_way] {
+            case.scenario.reverse = reverse;
+            let what = format!(
+                "SEED={seed} COUNT=1, {access:?}, steps {has_steps}, r = {reverse}, {} relays",
+                case.relays
+            );
+            let planned = case.planned();
+            let promised: Vec<f64> = match Rate::of(&planned, &case.scenario, &case.radio) {
+                Rate::There(rate_bps) => vec![rate_bps],
+                Rate::Both(rates_bps) => rates_bps.to_vec(),
+            };
+            carried += u32::from(promised.iter().all(|rate| *rate > 0.0));
+            let more = [promised[0], *promised.last().unwrap()].map(|rate| 1.5 * rate);
+            for offered in [None, Some(more)] {
+                if offered.is_some() && promised.contains(&0.0) {
+                    continue;
+                }
+                let sent = case.send_as_planned(&planned, reverse > 0.0, offered);
+                assert_eq!(sent.flows.len(), promised.len(), "{what}");
+                for (flow, promised_bps) in sent.flows.iter().zip(&promised) {
+                    worst = worst.min(share(flow, *promised_bps, 1e-12, &what));
+                }
+            }
+        }
+    }
+    println!(
+        "{access:?}, steps {has_steps}: at least {worst:.4} of the plan delivered, {carried} carry data"
+    );
+    assert!(carried > 0);
+}
+
+#[test]
+fn plans_in_equal_slots() {
+    every_plan_is_kept(Access::Slots, false);
+    every_plan_is_kept(Access::Slots, true);
+}
+
+#[test]
+fn plans_in_channels() {
+    every_plan_is_kept(Access::Channels, false);
+    every_plan_is_kept(Access::Channels, true);
+}
+
+#[test]
+fn plans_in_fitted_slots() {
+    every_plan_is_kept(Access::Fitted, false);
+    every_plan_is_kept(Access::Fitted, true);
 }
 
 #[test]

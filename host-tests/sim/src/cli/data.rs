@@ -80,6 +80,7 @@ impl Data {
                 radio,
                 packet_bits: 8.0 * f64::from(self.packet_bytes.unwrap_or(1_500)),
                 both: way == Way::Both,
+                reverse: scenario.reverse,
             },
             queue_packets: self.queue_packets.unwrap_or(100) as usize,
             offered_bps: self.offer_bps.map(|rate_bps| [rate_bps; 2]),

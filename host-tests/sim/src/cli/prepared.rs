@@ -1,7 +1,7 @@
 //! Run prepared from command-line options and a scenario.
 
 use clap::ValueEnum as _;
-use uav_relay::{Instant, Measure, Mission, Placement, Schedule, Sites, Wiring};
+use uav_relay::{Instant, Measure, Mission, Placement, Profile, Schedule, Sites, Wiring};
 use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::{Interference, Scenario};
@@ -213,6 +213,26 @@ impl<'a> Prepared<'a> {
     /// `places` has the relays' indices (from 1) and positions in the order of the chain. The mission is the one
     /// loaded at the start, even after an upload.
     pub fn sirs_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
+        let (mission, places) = self.chain_at(then, places);
+        report::hop_sirs(&mission, &places)
+    }
+
+    /// Returns the SIR of every hop on the way back, as [`Prepared::sirs_at`]. Empty in a mission of one direction.
+    pub fn sirs_back_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
+        let (mission, places) = self.chain_at(then, places);
+        if mission.reverse() > 0.0 {
+            report::hop_sirs_back(&mission, &places)
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// Returns the mission at `then`, and the positions with the relays' profiles.
+    fn chain_at(
+        &self,
+        then: Instant,
+        places: &[(u16, Placement)],
+    ) -> (Mission, Vec<(Placement, Profile)>) {
         let mission = self.options.listening.moved(self.told, then);
         let usual = mission.config().common;
         let own = |index: u16| {
@@ -220,11 +240,11 @@ impl<'a> Prepared<'a> {
             own.find(|(of, _)| *of == index)
                 .map_or(usual, |(_, profile)| *profile)
         };
-        let places: Vec<_> = places
+        let places = places
             .iter()
             .map(|(index, place)| (*place, own(*index)))
             .collect();
-        report::hop_sirs(&mission, &places)
+        (mission, places)
     }
 
     /// Returns the picture of the chain at the end of a run. [`report`](Self::report) must be called before.
@@ -311,6 +331,8 @@ fn picture_of(
 ) -> Picture {
     let mut hop_sir: Vec<f64> = report.relays.iter().map(|relay| relay.sir).collect();
     hop_sir.extend(report.rx_sir);
+    let back = report.relays.iter().filter_map(|relay| relay.sir_back);
+    let back = back.chain(report.back.map(|back| back.rx_sir_back));
     let silent = (1..)
         .zip(&outcome.relays)
         .filter(|(_, relay)| relay.killed.is_some());
@@ -359,6 +381,8 @@ fn picture_of(
         nodes,
         lateral_view,
         hop_sir,
+        hop_sir_back: report.back.map_or_else(Vec::new, |_| back.collect()),
+        reverse: report.back.map_or(0.0, |back| back.reverse),
         lost,
         left_out,
         events: timeline::words(&report.timeline),

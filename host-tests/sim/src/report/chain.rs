@@ -155,9 +155,9 @@ impl ChainReport {
         let places = places.unwrap_or_default();
         let sirs = hop_sirs(mission, &places);
         let sirs_back = hop_sirs_back(mission, &places);
-        let back = WorstBack::of(mission, &sirs_back);
+        let back = WorstBack::of(mission, &sirs, &sirs_back);
         let worst = sirs.iter().copied().reduce(f64::min);
-        let worst = worst.map(|sir| back.map_or(sir, |back| back.both(sir)));
+        let worst = worst.map(|sir| back.map_or(sir, |back| back.worst_both));
         let mut relays = hops::relays(&places, &sirs);
         let offered = outcome.offered();
         if back.is_some() {
@@ -242,7 +242,8 @@ impl ChainReport {
 
     /// Formats the report as text: the table of relays, the worst SIR, the messages and bytes, and the log.
     pub fn table(&self) -> String {
-        let mut text = hops::hops_table(&self.relays, &self.lost, self.rx_sir, self.room);
+        let rx = (self.rx_sir, self.back.map(|back| back.rx_sir_back));
+        let mut text = hops::hops_table(&self.relays, &self.lost, rx, self.room);
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
             _ = writeln!(
                 text,
@@ -254,8 +255,8 @@ impl ChainReport {
         if let Some(back) = self.back {
             _ = writeln!(
                 text,
-                "way back: worst hop SIR {:.6} ({:.3} dB); it needs {:?} of the SIR of the way there (link.reverse)",
-                back.worst_back, back.worst_back_db, back.reverse
+                "way back: worst hop SIR {:.6} ({:.3} dB); it needs {:?} of the SIR of the way there (link.reverse); worst direction: {}",
+                back.worst_back, back.worst_back_db, back.reverse, back.worst_direction
             );
         }
         text += &self.flown_text();

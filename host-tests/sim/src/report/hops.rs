@@ -118,23 +118,52 @@ pub struct WorstBack {
     pub worst_back: f64,
     /// SIR of the worst hop from Rx to Tx, dB.
     pub worst_back_db: f64,
+    /// SIR of the hop from Rx on the way back, linear.
+    pub rx_sir_back: f64,
+    /// The smaller of the worst SIR on the way there and of that on the way back divided by `reverse`.
+    pub worst_both: f64,
+    /// Direction of the worst hop, the way back divided by `reverse`: `forward`, from Tx to Rx, `backward`, or `both` if equal.
+    pub worst_direction: &'static str,
 }
 
 impl WorstBack {
-    /// Finds the worst of `sirs`, linear SIRs from Rx to Tx. `None` if the mission requires none.
-    pub fn of(mission: &Mission, sirs: &[f64]) -> Option<Self> {
+    /// Finds the worst hop of both directions linear SIRs from Rx to Tx. `None` if the mission requires none.
+    pub fn of(mission: &Mission, there: &[f64], back: &[f64]) -> Option<Self> {
         let reverse = f64::from(mission.config().reverse);
-        let worst_back = sirs.iter().copied().reduce(f64::min)?;
-        (reverse > 0.0).then(|| Self {
+        if reverse > 0.0 {
+            Self::with(reverse, there, back)
+        } else {
+            None
+        }
+    }
+
+    /// Returns the worst hop of both directions. `None` without hops.
+    pub fn with(reverse: f64, there: &[f64], back: &[f64]) -> Option<Self> {
+        let worst = |sirs: &[f64]| sirs.iter().copied().reduce(f64::min);
+        let (worst_there, worst_back) = (worst(there)?, worst(back)?);
+        let compared = worst_back / reverse;
+        Some(Self {
             reverse,
             worst_back,
             worst_back_db: db(worst_back),
+            rx_sir_back: back.last().copied()?,
+            worst_both: worst_there.min(compared),
+            worst_direction: direction(worst_there, compared),
         })
     }
+}
 
-    /// Returns the smaller of `sir`, linear from Tx to Rx, and the SIR from Rx to Tx divided by `reverse`.
-    pub fn both(&self, sir: f64) -> f64 {
-        sir.min(self.worst_back / self.reverse)
+/// Relative difference up to which the worst SIRs of both directions count as equal: 0.004 dB, above the rounding errors.
+const EQUAL: f64 = 1e-3;
+
+/// Returns the name of the direction with the lower SIR, `both` if they are equal; `back` is divided by `reverse`.
+pub const fn direction(there: f64, back: f64) -> &'static str {
+    if back < there * (1.0 - EQUAL) {
+        "backward"
+    } else if there < back * (1.0 - EQUAL) {
+        "forward"
+    } else {
+        "both"
     }
 }
 
@@ -156,12 +185,18 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
 }
 
 /// Formats the relays of the chain, lost relays and Rx as a table. With `room` it has a y column.
+///
+/// With `rx_sir_back` it has columns for the way back: hop k is received by the node before relay k.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],
-    rx_sir: Option<f64>,
+    (rx_sir, rx_sir_back): (Option<f64>, Option<f64>),
     room: bool,
 ) -> String {
+    let way_back = |sir: Option<f64>| {
+        sir.filter(|_| rx_sir_back.is_some())
+            .map_or_else(String::new, |sir| format!(" {sir:>12.6} {:>9.3}", db(sir)))
+    };
     let aside = |words: &dyn Fn() -> String| {
         if room {
             format!(" {:>12}", words())
@@ -173,23 +208,28 @@ pub fn hops_table(
     if !(relays.is_empty() && lost.is_empty()) {
         _ = writeln!(
             text,
-            "{:>6} {:>12}{} {:>10} {:>12} {:>9}",
+            "{:>6} {:>12}{} {:>10} {:>12} {:>9}{}",
             "relay",
             "x [m]",
             aside(&|| "y [m]".to_owned()),
             "h [m]",
             "SIR",
-            "SIR [dB]"
+            "SIR [dB]",
+            rx_sir_back.map_or_else(String::new, |_| format!(
+                " {:>12} {:>9}",
+                "SIR back", "back [dB]"
+            ))
         );
         let kept = relays.iter().map(|relay| {
             let line = format!(
-                "{:>6} {:>12.3}{} {:>10.2} {:>12.6} {:>9.3}",
+                "{:>6} {:>12.3}{} {:>10.2} {:>12.6} {:>9.3}{}",
                 relay.index,
                 relay.x_m,
                 aside(&|| format!("{:.3}", relay.y_m)),
                 relay.h_m,
                 relay.sir,
-                relay.sir_db
+                relay.sir_db,
+                way_back(relay.sir_back)
             );
             (relay.index, line)
         });
@@ -210,13 +250,14 @@ pub fn hops_table(
     if let Some(rx_sir) = rx_sir {
         _ = writeln!(
             text,
-            "{:>6} {:>12}{} {:>10} {:>12.6} {:>9.3}",
+            "{:>6} {:>12}{} {:>10} {:>12.6} {:>9.3}{}",
             "Rx",
             "",
             aside(&String::new),
             "",
             rx_sir,
-            db(rx_sir)
+            db(rx_sir),
+            way_back(rx_sir_back)
         );
     }
     text

@@ -9,7 +9,9 @@ pub mod traffic;
 
 pub use attack::AttackReport;
 pub use chain::{AirReport, AllInterferersReport, ChainReport, flown};
-pub use hops::{RelayReport, WorstBack, db, hop_sirs, hop_sirs_back, hops_table, relays};
+pub use hops::{
+    RelayReport, WorstBack, db, direction, hop_sirs, hop_sirs_back, hops_table, relays,
+};
 pub use sensing::SensingReport;
 pub use timeline::seconds;
 pub use traffic::TrafficReport;

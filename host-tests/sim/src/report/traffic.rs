@@ -49,6 +49,9 @@ pub struct TrafficDetails {
     /// Text that says how the hops share frequencies and time.
     #[serde(skip)]
     sharing: String,
+    /// True if the slots are fitted to the data of both directions.
+    #[serde(skip)]
+    fits_both: bool,
 }
 
 /// Data traffic of a run in one direction.
@@ -163,6 +166,7 @@ impl TrafficReport {
                     })
                     .collect(),
                 sharing: spec.link.radio.sharing(nodes),
+                fits_both: spec.link.is_fitted_to_both(),
             },
         }
     }
@@ -177,12 +181,13 @@ impl TrafficReport {
             flows,
             periods,
             sharing,
+            fits_both,
             ..
         } = &self.traffic;
-        let halves = if flows.len() > 1 {
-            ", each way half of the time"
-        } else {
-            ""
+        let halves = match flows.len() {
+            0 | 1 => "",
+            _ if *fits_both => ", both ways",
+            _ => ", each way half of the time",
         };
         let mut text = format!(
             "traffic from {from_s:.3} to {until_s:.3} s: {sharing}{halves}; packets of {packet_bytes} bytes, up to {queue_packets} in a queue\n"

@@ -12,7 +12,8 @@
 //! A frame has one slot for each hop, in the order of the hops, so a packet can pass the whole chain in one frame. With equal slots
 //! a slot is the time of one packet on the worst hop, and with fitted slots the time of one packet on its own hop. With a frequency
 //! for each hop all hops send all the time. If data goes both ways, the first half of each frame is for the way to Rx and the
-//! second half for the way back; the slots are then as long as the faster direction needs for one packet.
+//! second half for the way back; the slots are then as long as the faster direction needs for one packet. Fitted slots of a chain
+//! that is planned for both directions have the time of one packet on the way to Rx, and of r packets on the way back.
 //!
 //! Times are whole picoseconds since the start of the run, so slots do not drift.
 
@@ -101,6 +102,21 @@ impl Track {
             self.latest.insert(relay, state);
             self.changes.push((at, relay, state));
         }
+    }
+
+    /// Returns the record of relays that agree on `places`, m, in place of their own positions, at the same times.
+    #[must_use]
+    pub fn moved_to(mut self, places: &[Point]) -> Self {
+        let states = self
+            .changes
+            .iter_mut()
+            .map(|(_, relay, state)| (*relay, state));
+        for (relay, state) in states.chain(self.latest.iter_mut().map(|(at, state)| (*at, state))) {
+            let at = places.get(relay).copied();
+            state.observed.place = state.observed.place.and(at);
+            state.agreed = state.agreed.and(at);
+        }
+        self
     }
 }
 
@@ -411,6 +427,8 @@ pub struct DataLink {
     pub packet_bits: f64,
     /// True if data goes from Tx to Rx and from Rx to Tx; false if only to Rx.
     pub both: bool,
+    /// Rate of the way back relative to that to Rx, 0 to 1, for which the positions are chosen; 0 if for one direction.
+    pub reverse: f64,
 }
 
 impl DataLink {
@@ -427,9 +445,15 @@ impl DataLink {
 
     /// Returns the planner's data rate, bit/s, of each direction, from the linear SIRs of its hops.
     fn promised_bps(&self, sirs: &[Vec<f64>]) -> Vec<f64> {
-        let directions = sirs.len().max(1) as f64;
-        let rate = |sirs: &Vec<f64>| self.radio.chain_bps(sirs) / directions;
-        sirs.iter().map(rate).collect()
+        match sirs {
+            [there, back] => self.radio.both_bps(there, back, self.reverse).to_vec(),
+            _ => sirs.iter().map(|sirs| self.radio.chain_bps(sirs)).collect(),
+        }
+    }
+
+    /// Returns true if the slots are fitted to the data of both directions.
+    pub fn is_fitted_to_both(&self) -> bool {
+        self.radio.link.access == Access::Fitted && self.reverse > 0.0
     }
 
     /// Returns the time slots of each direction's hops, from `anchor` on, for the linear SIRs of the hops.
@@ -451,12 +475,22 @@ impl DataLink {
             Access::Fitted => packets.iter().map(own).sum(),
         };
         let shortest = packets.iter().map(half).min().unwrap_or(1);
-        let frame = shortest * packets.len() as Ps;
+        let span = |(direction, packets): (usize, &Vec<Option<Ps>>)| match direction {
+            _ if !self.is_fitted_to_both() => shortest,
+            0 => half(packets),
+            // Rounded up, and the slots down: neither direction gets more than it is promised.
+            _ => part(half(packets), self.reverse) + 1,
+        };
+        let spans: Vec<Ps> = packets.iter().enumerate().map(span).collect();
+        let frame = spans.iter().sum();
         let mut all = Vec::new();
         let mut begins = 0;
-        for packets in &packets {
+        for (direction, (packets, span)) in packets.iter().zip(spans).enumerate() {
             let fitted = |time: Ps| {
-                let share = u128::from(time) * u128::from(shortest) / u128::from(half(packets));
+                if self.is_fitted_to_both() {
+                    return part(time, if direction == 0 { 1.0 } else { self.reverse });
+                }
+                let share = u128::from(time) * u128::from(span) / u128::from(half(packets));
                 Ps::try_from(share).unwrap_or(Ps::MAX)
             };
             let mut opens = begins;
@@ -477,10 +511,20 @@ impl DataLink {
                 window
             });
             all.push(windows.collect());
-            begins += shortest;
+            begins += span;
         }
         all
     }
+}
+
+/// Returns a share of a time, 0 to 1, rounded down.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to the time itself"
+)]
+fn part(time: Ps, share: f64) -> Ps {
+    (time as f64 * share) as Ps
 }
 
 /// Returns the route of the data from the first agreement to `until`; `None` if there is no agreement.

@@ -238,7 +238,11 @@ fn draw_legend(canvas: &mut Canvas, picture: &Picture) {
         canvas.text((left + 22.0, row + 3.6), "start", words);
     }
     let row = bottom(picture) - 10.0;
-    canvas.text((24.0, row + 3.6), "start", "Numbers at hops: SIR in dB");
+    if picture.hop_sir_back.is_empty() {
+        canvas.text((24.0, row + 3.6), "start", "Numbers at hops: SIR in dB");
+    } else {
+        canvas.text((24.0, row + 3.6), "start", "At hops: SIR to Rx / back, dB");
+    }
     canvas.disc((180.0, row), 4.0, "relay");
     canvas.text((192.0, row + 3.6), "start", "relay");
     let silent = !picture.lost.is_empty();

@@ -1,7 +1,7 @@
 //! Tx, Rx and the relays.
 
 use super::canvas::{Area, Canvas, Frame, Labels, Point, round_step, width};
-use super::picture::{Picture, decibels, is_gone, length, placed, worst};
+use super::picture::{Picture, counted, decibels, is_gone, length, placed, worst};
 
 const SIZE: f64 = 9.0;
 
@@ -128,7 +128,12 @@ const FEW: usize = 21;
 pub(super) struct Hop {
     number: usize,
     line: [Point; 2],
+    /// SIR that counts, dB.
     decibels: Option<f64>,
+    /// SIR on the way to Rx and on the way back, dB.
+    ways: [Option<f64>; 2],
+    /// True in a picture of both directions.
+    has_back: bool,
     colour: (&'static str, f64),
     silent: bool,
 }
@@ -150,7 +155,10 @@ pub(super) fn hops(picture: &Picture, frame: &Frame) -> Vec<Hop> {
         let number = node.saturating_sub(passed.count());
         // The hops beside a relay without a position are unknown.
         if number == before.0 + 1 {
-            let decibels = picture.hop_sir.get(number - 1).copied().and_then(decibels);
+            let of = |sirs: &[f64]| sirs.get(number - 1).copied();
+            let there = of(&picture.hop_sir).and_then(decibels);
+            let back = of(&picture.hop_sir_back).and_then(decibels);
+            let decibels = counted(picture, number).and_then(decibels);
             let colour = decibels.zip(worst).map_or(UNKNOWN, |(here, worst)| {
                 let class = CLASSES
                     .into_iter()
@@ -161,6 +169,8 @@ pub(super) fn hops(picture: &Picture, frame: &Frame) -> Vec<Hop> {
                 number,
                 line: [frame.at(before.1), frame.at(place)],
                 decibels,
+                ways: [there, back],
+                has_back: !picture.hop_sir_back.is_empty(),
                 colour,
                 silent: picture.lost.contains(&node) || picture.lost.contains(&before.2),
             });
@@ -175,15 +185,16 @@ pub(super) fn draw_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop]) 
     let mut order: Vec<&Hop> = hops.iter().collect();
     order.sort_by(|a, b| a.colour.1.total_cmp(&b.colour.1));
     for hop in order {
-        let sir = hop
-            .decibels
-            .map_or_else(|| "unknown".to_owned(), |value| format!("{value:.2} dB"));
-        canvas.hop(
-            hop.line,
-            hop.colour,
-            hop.silent,
-            &format!("hop {}: SIR {sir}", hop.number),
-        );
+        let words = |sir: Option<f64>| {
+            sir.map_or_else(|| "unknown".to_owned(), |value| format!("{value:.2} dB"))
+        };
+        let [there, back] = hop.ways.map(words);
+        let tip = if hop.has_back {
+            format!("hop {}: SIR {there}, back {back}", hop.number)
+        } else {
+            format!("hop {}: SIR {there}", hop.number)
+        };
+        canvas.hop(hop.line, hop.colour, hop.silent, &tip);
         labels.take_line(hop.line);
     }
 }
@@ -210,9 +221,13 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
     }
     order.sort_by_key(|(rank, hop)| (*rank, hop.number));
     for (_, hop) in order {
-        let Some(value) = hop.decibels else { continue };
         // The addition turns -0 into 0.
-        let words = format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0);
+        let short = |value: f64| format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0);
+        let words = match hop.ways {
+            [Some(there), Some(back)] => format!("{} / {}", short(there), short(back)),
+            [Some(there), None] if !hop.has_back => short(there),
+            _ => continue,
+        };
         let size = (width(&words, SIR_SIZE) + 3.0, SIR_SIZE);
         // In a dense chain the numbers are in one row, each with a line to its hop.
         let in_row = dense && hop.number != 1 && hop.number != last;

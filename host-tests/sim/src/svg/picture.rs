@@ -36,6 +36,10 @@ pub struct Picture {
     pub lateral_view: Option<LateralView>,
     /// Linear SIR of every hop from Tx to Rx. A hop is grey if its value is not finite and positive.
     pub hop_sir: Vec<f64>,
+    /// Linear SIR of every hop on the way back, from Tx to Rx; empty if only the way to Rx counts.
+    pub hop_sir_back: Vec<f64>,
+    /// SIR that a hop needs on the way back relative to the way to Rx, 0 to 1.
+    pub reverse: f64,
     /// Numbers, 1 to N, of silent relays. They are crossed out, and their hops are dashed.
     pub lost: Vec<usize>,
     /// Numbers, 1 to N, of relays that are not in the chain. They are crossed out, and have no hops.
@@ -144,11 +148,21 @@ pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
 
+/// Returns the linear SIR of hop `number`, from 1, that counts: the smaller of both directions, the way back divided by `reverse`.
+pub(super) fn counted(picture: &Picture, number: usize) -> Option<f64> {
+    let at = number.checked_sub(1)?;
+    let there = picture.hop_sir.get(at).copied()?;
+    match picture.hop_sir_back.get(at) {
+        // NaN stays NaN, which is drawn as unknown.
+        Some(back) if !(back / picture.reverse >= there) => Some(back / picture.reverse),
+        _ => Some(there),
+    }
+}
+
+/// Returns the lowest linear SIR that counts, of the hops with a known one.
 pub(super) fn worst(picture: &Picture) -> Option<f64> {
-    let sirs = picture
-        .hop_sir
-        .iter()
-        .copied()
+    let sirs = (1..=picture.hop_sir.len())
+        .filter_map(|number| counted(picture, number))
         .filter(|sir| decibels(*sir).is_some());
     sirs.reduce(f64::min)
 }

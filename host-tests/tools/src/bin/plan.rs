@@ -4,16 +4,19 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
+use uav_relay::Placement;
 use uav_relay_scenario::deployment::{Companion, Deployment, agree};
 use uav_relay_scenario::link::{Access, BandwidthError, Radio};
+use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{Failure, number, whole};
 use uav_relay_sim::svg::{Picture, lateral_view};
 use uav_relay_sim::{command, svg};
 use uav_relay_tools::plan;
+use uav_relay_tools::plan::carried::Carried;
 use uav_relay_tools::plan::flown::{flown, planned, with_plan};
 use uav_relay_tools::plan::map::{Map, geojson, kml};
-use uav_relay_tools::plan::rate::Rates;
+use uav_relay_tools::plan::rate::{Rate, Rates};
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
 use uav_relay_tools::provision::block::probe_after_ms;
@@ -128,14 +131,6 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
     if !is_asked && scenario.link.is_none() {
         return Ok(None);
     }
-    if scenario.reverse > 0.0 {
-        return Err(Failure::input(format!(
-            "{}: link.reverse = {:?}: data rates are for one direction; allowed: link.reverse = 0.0, or no other key of link, --rates, \
-             --bandwidth-hz and --target-rate-bps",
-            options.file(),
-            scenario.reverse
-        )));
-    }
     let refused = |error: BandwidthError| {
         let asked = match (error, target_bps, options.rates) {
             (BandwidthError::Contradicts { .. }, ..) => options.file(),
@@ -151,11 +146,20 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
 
 /// Plans for a number of relays or an SIR. Adds the data rates over the link `radio`, if there is one.
 fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Result<Planned, NoPlan> {
-    let plan = plan::plan(scenario, ask)?;
+    let most = match ask.number {
+        Number::Of(relays) => relays,
+        Number::Meeting(_) => 1,
+    };
+    let by_rate = radio.and_then(|radio| Carried::new(scenario, ask, radio, most));
+    let plan = match (by_rate, ask.number) {
+        (Some(by_rate), Number::Of(relays)) => by_rate.proven(by_rate.plan(relays)?),
+        _ => plan::plan(scenario, ask)?,
+    };
     let rates = match radio {
         Some(radio) => {
             let Rates { best, all, .. } = Rates::new(scenario, ask, radio, None)?;
-            Some(RateReport::new(Some(&plan), radio, None, best, all))
+            let link = (scenario, radio);
+            Some(RateReport::new(Some(&plan), link, None, best, all))
         }
         None => None,
     };
@@ -173,7 +177,8 @@ fn by_rate(
     target_bps: f64,
 ) -> Result<Planned, NoPlan> {
     let Rates { best, all, meeting } = Rates::new(scenario, ask, radio, Some(target_bps))?;
-    let rates = RateReport::new(meeting.as_ref(), radio, Some(target_bps), best, all);
+    let link = (scenario, radio);
+    let rates = RateReport::new(meeting.as_ref(), link, Some(target_bps), best, all);
     let relays = meeting.as_ref().map_or(0, |plan| plan.places.len());
     Ok(Planned {
         plan: meeting,
@@ -220,8 +225,18 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
             &scenario.sources(),
         ),
         hop_sir: plan.sirs.clone(),
+        hop_sir_back: sirs_back(plan, scenario),
+        reverse: scenario.reverse,
         ..Picture::default()
     }
+}
+
+/// Returns the SIRs of the way back if the chain is planned for both directions.
+fn sirs_back(plan: &Plan, scenario: &Scenario) -> Vec<f64> {
+    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+    let places: Vec<Placement> = plan.places.iter().map(|(place, _)| *place).collect();
+    let scene = Scene::new(scenario, relays).filter(|_| plan.back.is_some());
+    scene.map_or_else(Vec::new, |scene| scene.hop_sirs_back(&places))
 }
 
 /// Prints the report as a table or as JSON.
@@ -424,7 +439,7 @@ fn write_out(
         )));
     }
     if let (Some(target_bps), Some(radio)) = (options.wanted.target_rate_bps, radio) {
-        let rate_bps = radio.chain_bps(&flown.plan.sirs);
+        let rate_bps = Rate::of(&flown.plan, scenario, radio).worse(scenario.reverse);
         if rate_bps < target_bps * (1.0 - options.tolerance) {
             return Err(Failure::unmet(format!(
                 "--out {}: not written: the positions on which {relays} relays agree carry {rate_bps:.6e} bit/s, below the target of {target_bps:.6e} bit/s; give a larger --uavs",

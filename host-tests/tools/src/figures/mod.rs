@@ -11,6 +11,7 @@
 //! | [`beta`], [`stochastic`] | fields of interference |
 //! | [`altitude`], [`adjust`], [`joint`] | altitudes |
 //! | [`sensing`] | an unknown interferer |
+//! | [`link`] | both directions, and data rates |
 //! | [`paper`] | the paper's scenarios, as missions |
 //! | [`walk`] | a chain computed without messages, for figures with thousands of chains; a simulated chain |
 //! | [`chart`], [`draw`] | a chart, its axes, its SVG |
@@ -27,6 +28,7 @@ pub mod draw;
 pub mod fewest;
 pub mod gain;
 pub mod joint;
+pub mod link;
 pub mod locus;
 pub mod paper;
 pub mod sensing;
@@ -47,7 +49,7 @@ pub struct Figure {
 }
 
 /// Figures that `cargo figures` can make: those of the paper in its order, then this project's own.
-pub const ALL: [Figure; 16] = [
+pub const ALL: [Figure; 17] = [
     figure("locus", locus::sheet),
     figure("single", single::sheet),
     figure("fewest-by-place", fewest::by_place_sheet),
@@ -64,6 +66,7 @@ pub const ALL: [Figure; 16] = [
     figure("aside", aside::places_sheet),
     figure("aside-gain", aside::gains_sheet),
     figure("sensing", sensing::sheet),
+    figure("link", link::sheet),
 ];
 
 const fn figure(name: &'static str, make: fn() -> Result<Sheet, FigureError>) -> Figure {

@@ -3,6 +3,8 @@
 //! | interference | file |
 //! | --- | --- |
 //! | one interferer | `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
+//! | one interferer, both directions | `one_both_ways`: closed forms for one relay; `source`: Algorithm 1, with a `bound` that proves it |
+//! | one interferer, data rates | `carried`: positions of the largest rate where they are not those of the largest SIR, by a shortest `path` |
 //! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
 //! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
 //!
@@ -10,9 +12,13 @@
 //! optimal.
 
 mod altitude;
+pub mod bound;
+pub mod carried;
 pub mod flown;
 pub mod map;
 mod multi_interferer;
+pub mod one_both_ways;
+pub mod path;
 pub mod rate;
 pub mod report;
 mod source;
@@ -110,7 +116,7 @@ pub const LOSS: f64 = 0.01;
 /// The theorem and case that placed the only relay.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Theorem {
-    /// 1 to 3; 4 for one relay beside the line, which is not in the paper.
+    /// 1 to 3; 4 for one relay beside the line and 5 for one relay both ways, which are not in the paper.
     pub number: u8,
     /// Number of the case in the paper; 0 for a case that the paper omits.
     pub case: u8,
@@ -221,7 +227,7 @@ impl Plan {
     /// Returns the SIR (linear) of the worst hop; for both directions the way back counts divided by r.
     pub fn sir(&self) -> f64 {
         let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
-        self.back.map_or(there, |back| back.both(there))
+        self.back.map_or(there, |back| back.worst_both)
     }
 
     fn chain(&self) -> Vec<Placement> {
@@ -275,10 +281,11 @@ impl ProfiledMission {
                 (*place, profile)
             })
             .collect();
+        let sirs = hop_sirs(&self.mission, &held);
         Plan {
             mission: self.mission,
-            sirs: hop_sirs(&self.mission, &held),
-            back: WorstBack::of(&self.mission, &hop_sirs_back(&self.mission, &held)),
+            back: WorstBack::of(&self.mission, &sirs, &hop_sirs_back(&self.mission, &held)),
+            sirs,
             places: held,
             how,
             proven,

@@ -1,14 +1,19 @@
 //! Data rates of a chain over the number of relays.
 //!
 //! The paper assumes one frequency, so each hop sends in one of N + 1 slots: more relays raise the SIR of the worst hop but shorten
-//! the slots. With a frequency for each hop only the SIR counts. Slots fitted to the hops change the rate, not the positions: these
-//! are those of the largest SIR of the worst hop. Frequencies that several hops use at the same time are not modelled.
+//! the slots. With a frequency for each hop only the SIR counts. Positions are those of the largest rate where the planner has them
+//! (`carried`), and those of the largest SIR of the worst hop otherwise. Frequencies that several hops use at the same time are not
+//! modelled.
+//!
+//! Where a chain is planned for both directions, the smaller of the rate to Rx and of the rate back divided by r counts.
 
 use serde::Serialize;
-use uav_relay_scenario::link::{Access, Radio, RateModel};
+use uav_relay_scenario::link::{Access, Radio, worse_bps};
+use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario};
 
-use super::{NoPlan, Number, Plan, PlanRequest};
+use super::carried::{Carried, carries_no};
+use super::{NoPlan, Number, Plan, PlanRequest, source};
 
 /// Largest number of relays tried where a plan takes milliseconds.
 const MOST_FAST: u16 = 200;
@@ -16,13 +21,68 @@ const MOST_FAST: u16 = 200;
 /// Largest number of relays tried where a plan takes seconds.
 const MOST_SLOW: u16 = 20;
 
+/// Largest number of relays tried where positions are searched for the rate.
+const MOST_SEARCHED: u16 = 60;
+
+/// Least number of relays up to which rates are listed, if the room allows it.
+const LEAST_LISTED: u16 = 10;
+
+/// Data rate of a chain, bit/s.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[serde(untagged)]
+pub enum Rate {
+    /// From Tx to Rx, with all of the time.
+    There(f64),
+    /// To Rx and back at the same time, of a chain that is planned for both directions.
+    Both([f64; 2]),
+}
+
+impl Rate {
+    /// Returns the data rate of `plan`.
+    pub fn of(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Self {
+        match Self::both_sirs(plan, scenario) {
+            Some([there, back]) => Self::Both(radio.both_bps(&there, &back, scenario.reverse)),
+            None => Self::There(radio.chain_bps(&plan.sirs)),
+        }
+    }
+
+    /// Returns the data rate of the worst hop while it sends.
+    pub fn of_hop(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Self {
+        let worst = |sirs: &[f64]| {
+            let worst = sirs.iter().copied().reduce(f64::min);
+            radio.hop_bps(worst.unwrap_or(0.0))
+        };
+        match Self::both_sirs(plan, scenario) {
+            Some(sirs) => Self::Both(sirs.map(|sirs| worst(&sirs))),
+            None => Self::There(worst(&plan.sirs)),
+        }
+    }
+
+    /// Returns the SIRs to Rx and of the way back if the chain is planned for both directions.
+    fn both_sirs(plan: &Plan, scenario: &Scenario) -> Option<[Vec<f64>; 2]> {
+        plan.back?;
+        let relays = u16::try_from(plan.places.len()).ok()?;
+        let places: Vec<Place> = plan.places.iter().map(|(at, _)| (*at).into()).collect();
+        let scene = Scene::new(scenario, relays)?;
+        Some([scene.hop_sirs(&places), scene.hop_sirs_back(&places)])
+    }
+
+    /// Returns the rate that counts: the smaller of the rate to Rx and of the rate back divided by `reverse`.
+    pub fn worse(self, reverse: f64) -> f64 {
+        match self {
+            Self::There(rate_bps) => rate_bps,
+            Self::Both(rates_bps) => worse_bps(rates_bps, reverse),
+        }
+    }
+}
+
 /// Data rate of one number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct RateOf {
     /// Number of relays.
     pub uavs: u16,
     /// Data rate of the chain, bit/s.
-    pub rate_bps: f64,
+    pub rate_bps: Rate,
 }
 
 /// The number of relays with the largest data rate among those tried.
@@ -30,7 +90,7 @@ pub struct RateOf {
 pub struct BestRate {
     /// Number of relays.
     pub best_uavs: u16,
-    /// Data rate, bit/s.
+    /// Data rate, bit/s; both ways the smaller of the rate to Rx and of the rate back divided by r.
     pub best_rate_bps: f64,
     /// Numbers tried: 1 to this one.
     pub tried_uavs: u16,
@@ -52,7 +112,7 @@ pub struct Rates {
 impl Rates {
     /// Plans 1, 2, 3 and more relays. It ends when no larger number can carry more, or at the limit for a few seconds.
     ///
-    /// `target_bps` is the wanted rate.
+    /// `target_bps` is the wanted rate to Rx; both ways the rate back is then at least r times it.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
@@ -60,14 +120,22 @@ impl Rates {
         target_bps: Option<f64>,
     ) -> Result<Self, NoPlan> {
         let most = most_tried(scenario, ask);
+        let searched = Carried::new(scenario, ask, radio, most.min(MOST_SEARCHED));
+        let fits = searched.is_some() && radio.link.access == Access::Fitted;
+        let most = match &searched {
+            Some(searched) if fits => searched.most_worth().clamp(LEAST_LISTED, MOST_SEARCHED),
+            Some(_) => most.min(MOST_SEARCHED),
+            None => most,
+        };
+        let reverse = scenario.reverse;
         let mut best: Option<BestRate> = None;
         let mut all = Vec::new();
         let mut meeting = None;
         let mut refused = None;
-        let mut receiver_bps = f64::INFINITY;
+        let mut most_bps = MostRate::default();
         for relays in 1..=most {
             if let Some(best) = &mut best {
-                best.best_is_proven = most_bps(radio, relays, receiver_bps) <= best.best_rate_bps;
+                best.best_is_proven = most_bps.of(radio, relays) <= best.best_rate_bps;
                 if best.best_is_proven {
                     break;
                 }
@@ -76,7 +144,13 @@ impl Rates {
                 number: Number::Of(relays),
                 ..*ask
             };
-            let plan = match super::plan(scenario, &one) {
+            let plan = match &searched {
+                Some(searched) => searched.plan(relays),
+                // Without the proof that the positions are best.
+                None if reverse > 0.0 => source::best(scenario, relays, ask.tolerance),
+                None => super::plan(scenario, &one),
+            };
+            let plan = match plan {
                 Ok(plan) => plan,
                 // More relays need more room.
                 Err(none) => {
@@ -85,26 +159,37 @@ impl Rates {
                 }
             };
             if relays == 1 {
-                receiver_bps = radio.hop_bps(most_at_receiver(scenario, &plan));
+                most_bps = MostRate::new(scenario, radio, &plan);
             }
-            let rate_bps = radio.chain_bps(&plan.sirs);
+            let rate_bps = Rate::of(&plan, scenario, radio);
             all.push(RateOf {
                 uavs: relays,
                 rate_bps,
             });
-            if best.is_none_or(|best| rate_bps > best.best_rate_bps) {
+            let worse_bps = rate_bps.worse(reverse);
+            if best.is_none_or(|best| worse_bps > best.best_rate_bps * (1.0 + RISE)) {
                 best = Some(BestRate {
                     best_uavs: relays,
-                    best_rate_bps: rate_bps,
+                    best_rate_bps: worse_bps,
                     ..BestRate::default()
                 });
             }
             if let Some(best) = &mut best {
                 best.tried_uavs = relays;
             }
-            if meeting.is_none() && target_bps.is_some_and(|target| rate_bps >= target) {
-                meeting = Some(plan);
+            if meeting.is_none() && target_bps.is_some_and(|target| worse_bps >= target) {
+                meeting = Some(match &searched {
+                    Some(searched) => searched.proven(plan),
+                    None => plan,
+                });
             }
+        }
+        if let Some(best) = &mut best {
+            let is_one_way = !(reverse > 0.0);
+            best.best_is_proven &= match radio.link.access {
+                Access::Fitted => !fits,
+                _ => is_one_way || carry_no_more(scenario, radio, *best, ask.tolerance),
+            };
         }
         match (best, refused) {
             (Some(best), _) => Ok(Self { best, all, meeting }),
@@ -127,20 +212,96 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     }
 }
 
-/// Returns an upper bound on the data rate of `relays` relays and more, bit/s.
-///
-/// `receiver_bps` is that on the rate of the hop to Rx.
-///
-/// Fitted slots have one below that only if the steps of the radio limit the rates of the other hops.
-fn most_bps(radio: &Radio, relays: u16, receiver_bps: f64) -> f64 {
-    let relays = f64::from(relays);
-    match (radio.link.access, &radio.link.model) {
-        (Access::Slots, _) => receiver_bps / (relays + 1.0),
-        (Access::Channels, _) | (Access::Fitted, RateModel::Shannon { .. }) => receiver_bps,
-        (Access::Fitted, RateModel::Steps(_)) => {
-            1.0 / (relays / radio.hop_bps(f64::INFINITY) + 1.0 / receiver_bps)
+/// Relative gain of a larger number of relays that counts as more: without a least separation more relays never carry less.
+const RISE: f64 = 1e-4;
+
+/// Largest number of relays for which [`carry_no_more`] looks for a proof.
+const MOST_PROVEN: u16 = MOST_FAST;
+
+/// Returns true if it is proven that no tried number of relays carries more than the best one, both ways in equal slots or channels.
+fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
+    let more_bps = best.best_rate_bps * (1.0 + 2.0 * tolerance);
+    best.tried_uavs <= MOST_PROVEN
+        && (1..=best.tried_uavs).all(|relays| {
+            let slots = f64::from(radio.link.access.slots(relays, true));
+            let bits_per_hz = more_bps * slots / radio.bandwidth_hz;
+            Scene::new(scenario, relays)
+                .is_some_and(|scene| carries_no(&scene, radio, scenario.reverse, bits_per_hz))
+        })
+}
+
+/// Upper bounds on the data rates of hops, bit/s, for any number of relays and any positions.
+#[derive(Clone, Copy, Default)]
+struct MostRate {
+    /// Of the hop to Rx.
+    receiver_bps: f64,
+    /// Of the hop from Tx.
+    first_bps: f64,
+    /// Of a hop between relays, which keep their least separation.
+    relay_bps: f64,
+    /// Number of directions.
+    ways: f64,
+}
+
+impl MostRate {
+    /// Computes the bounds; `plan` has any positions of one relay.
+    fn new(scenario: &Scenario, radio: &Radio, plan: &Plan) -> Self {
+        let [first, relay] = most_between(scenario);
+        Self {
+            receiver_bps: radio.hop_bps(most_at_receiver(scenario, plan)),
+            first_bps: radio.hop_bps(first),
+            relay_bps: radio.hop_bps(relay),
+            ways: if scenario.reverse > 0.0 { 2.0 } else { 1.0 },
         }
     }
+
+    /// Returns an upper bound on the rate that counts of `relays` relays and more.
+    fn of(&self, radio: &Radio, relays: u16) -> f64 {
+        let relays = f64::from(relays);
+        match radio.link.access {
+            Access::Slots => self.receiver_bps.min(self.first_bps) / (relays + 1.0) / self.ways,
+            Access::Channels => self.receiver_bps.min(self.first_bps) / self.ways,
+            Access::Fitted => {
+                let between = (relays - 1.0) / self.relay_bps;
+                1.0 / (1.0 / self.receiver_bps + 1.0 / self.first_bps + between)
+            }
+        }
+    }
+}
+
+/// Returns upper bounds on the SIR (linear) of the first hop and of a hop between relays, for any positions.
+///
+/// Relays keep their least separation, and the interferers are at most as far as from the farther end of the line. In a field: no
+/// bound.
+fn most_between(scenario: &Scenario) -> [f64; 2] {
+    let Some(scene) = Scene::new(scenario, 1) else {
+        return [f64::INFINITY; 2];
+    };
+    let own = scenario.relays.values();
+    let altitudes = own.clone().filter_map(|own| own.altitude_m);
+    let altitudes = altitudes.chain([scenario.altitude_m]);
+    let lowest = altitudes.clone().fold(scenario.altitude_min_m, f64::min);
+    let highest = altitudes.fold(scenario.altitude_max_m, f64::max);
+    let aside = scenario.lateral_max_m.max(-scenario.lateral_min_m);
+    let least_w: f64 = scene
+        .sources
+        .iter()
+        .map(|source| {
+            let along = source.x_m.abs().max((scene.distance_m - source.x_m).abs());
+            let across = source.y_m.abs() + aside;
+            let squared = along * along + across * across + highest * highest;
+            source.power_w / (scene.eta * squared)
+        })
+        .sum();
+    let disturbance_w = least_w + scene.noise_w;
+    let most_w = own
+        .filter_map(|own| own.power_w)
+        .fold(scenario.uav_w, f64::max);
+    let apart = scene.min_separation_m;
+    [
+        scene.tx_w / (scene.eta * lowest * lowest) / disturbance_w,
+        most_w / (scene.mu_los * apart * apart) / disturbance_w,
+    ]
 }
 
 /// Returns an upper bound on the SIR (linear) at Rx for any number of relays, from that of `plan`.

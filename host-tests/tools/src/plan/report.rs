@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use uav_relay::Placement;
-use uav_relay_scenario::link::Radio;
+use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Noise, Scenario};
-use uav_relay_sim::report::{RelayReport, db, hops_table, relays};
+use uav_relay_sim::report::{RelayReport, WorstBack, db, hops_table, relays};
 
-use super::rate::{BestRate, RateOf};
+use super::rate::{BestRate, Rate, RateOf};
 use super::{Number, Plan, Unit, Why};
 
 /// The hypothetical interferer that replaces several.
@@ -42,13 +42,13 @@ pub struct HypotheticalReport {
 /// Data rates of a chain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
-    /// Data rate of the chain, bit/s. Absent without a plan.
+    /// Data rate of the chain, bit/s; to Rx and back if it is planned for both directions. Absent without a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub rate_bps: Option<f64>,
-    /// Data rate of the worst hop while it sends, bit/s.
+    pub rate_bps: Option<Rate>,
+    /// Data rate of the worst hop while it sends, bit/s; as `rate_bps`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub hop_rate_bps: Option<f64>,
-    /// Number of time slots: one per hop on one frequency, 1 with a frequency for each hop.
+    pub hop_rate_bps: Option<Rate>,
+    /// Number of time slots: one per hop and direction on one frequency, one per direction with a frequency for each hop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
     /// Access of the hops to the radio, as in the file.
@@ -67,6 +67,9 @@ pub struct RateReport {
     /// Number of relays of the plan; 0 without a plan.
     #[serde(skip)]
     relays: u16,
+    /// Rate of the way back relative to that to Rx; 0 if only the way to Rx counts.
+    #[serde(skip)]
+    reverse: f64,
     /// Description of the access of the plan's hops to the radio.
     #[serde(skip)]
     sharing: String,
@@ -76,18 +79,26 @@ impl RateReport {
     /// Creates the report of `plan`; without a plan it has only the largest rate. `rates` are those to list.
     pub fn new(
         plan: Option<&Plan>,
-        radio: &Radio,
+        (scenario, radio): (&Scenario, &Radio),
         target_rate_bps: Option<f64>,
         best: BestRate,
         rates: Vec<RateOf>,
     ) -> Self {
         let relays = plan.map(|plan| u16::try_from(plan.places.len()).unwrap_or(u16::MAX));
         let relays = relays.unwrap_or(0);
+        let is_both = scenario.reverse > 0.0;
+        let sharing = radio.sharing(usize::from(relays) + 1);
+        let ways = match radio.link.access {
+            _ if !is_both => "",
+            Access::Fitted => ", both ways",
+            Access::Slots | Access::Channels => ", each way half of the time",
+        };
         Self {
-            rate_bps: plan.map(|plan| radio.chain_bps(&plan.sirs)),
-            hop_rate_bps: plan.map(|plan| radio.hop_bps(plan.sir())),
-            slots: plan.map(|_| radio.link.access.slots(relays)),
-            sharing: radio.sharing(usize::from(relays) + 1),
+            rate_bps: plan.map(|plan| Rate::of(plan, scenario, radio)),
+            hop_rate_bps: plan.map(|plan| Rate::of_hop(plan, scenario, radio)),
+            slots: plan.map(|_| radio.link.access.slots(relays, is_both)),
+            sharing: sharing + ways,
+            reverse: scenario.reverse,
             access: radio.link.access.name(),
             bandwidth_hz: radio.bandwidth_hz,
             target_rate_bps,
@@ -101,24 +112,31 @@ impl RateReport {
         if let (Some(rate_bps), Some(hop_bps)) = (self.rate_bps, self.hop_rate_bps) {
             _ = writeln!(
                 text,
-                "data rate: {rate_bps:.6e} bit/s: {}, and the worst hop carries {hop_bps:.6e} bit/s while it sends",
-                self.sharing
+                "data rate: {}: {}, and the worst hop carries {} while it sends",
+                bps(rate_bps),
+                self.sharing,
+                bps(hop_bps)
             );
         }
         if let Some(target_bps) = self.target_rate_bps {
+            let back = if self.reverse > 0.0 {
+                format!(" to Rx and {:.6e} back", self.reverse * target_bps)
+            } else {
+                String::new()
+            };
             _ = writeln!(
                 text,
-                "target: {target_bps:.6e} bit/s; fewer relays do not carry it"
+                "target: {target_bps:.6e} bit/s{back}; fewer relays do not carry it"
             );
         }
-        let mut before_bps = f64::NAN;
+        let mut before = None;
         for RateOf { uavs, rate_bps } in &self.rates {
             // With steps many numbers have the same rate; the first one is listed.
-            if rate_bps.total_cmp(&before_bps).is_ne() {
+            if before != Some(*rate_bps) {
                 let (relays, verb) = relays_carry(*uavs);
-                _ = writeln!(text, "{uavs:5} {relays} {verb} {rate_bps:.6e} bit/s");
+                _ = writeln!(text, "{uavs:5} {relays} {verb} {}", bps(*rate_bps));
             }
-            before_bps = *rate_bps;
+            before = Some(*rate_bps);
         }
         _ = writeln!(text, "{}", self.largest());
     }
@@ -153,9 +171,27 @@ impl RateReport {
         } else {
             format!(", of 1 to {tried_uavs} relays")
         };
+        let counted = if self.reverse > 0.0 {
+            format!(
+                " to Rx and at least {:?} of it back (link.reverse)",
+                self.reverse
+            )
+        } else {
+            String::new()
+        };
         format!(
-            "largest data rate: {best_uavs} {relays} {verb} {best_rate_bps:.6e} bit/s{fewer}{among}"
+            "largest data rate: {best_uavs} {relays} {verb} {best_rate_bps:.6e} bit/s{counted}{fewer}{among}"
         )
+    }
+}
+
+/// Formats a data rate.
+fn bps(rate: Rate) -> String {
+    match rate {
+        Rate::There(rate_bps) => format!("{rate_bps:.6e} bit/s"),
+        Rate::Both([there_bps, back_bps]) => {
+            format!("{there_bps:.6e} bit/s to Rx and {back_bps:.6e} back")
+        }
     }
 }
 
@@ -179,6 +215,12 @@ pub struct WayBack {
     /// SIR needed on the way back, relative to that on the way there, if the positions are chosen for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
+    /// The smaller of the worst SIR to Rx and of that of the way back divided by `reverse`, if the positions are chosen for both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_both: Option<f64>,
+    /// Direction of the worst hop, the way back divided by `reverse`: `forward`, from Tx to Rx, `backward`, or `both` if equal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_direction: Option<&'static str>,
     /// Node that receives the worst hop: 0 for Tx, otherwise the relay.
     #[serde(skip)]
     hop: usize,
@@ -199,7 +241,10 @@ impl WayBack {
             format!("relay {}", self.hop + 1)
         };
         let needed = self.reverse.map_or_else(String::new, |reverse| {
-            format!("; it needs {reverse:?} of the SIR of the way there (link.reverse)")
+            format!(
+                "; it needs {reverse:?} of the SIR of the way there (link.reverse); worst direction: {}",
+                self.worst_direction.unwrap_or("unknown")
+            )
         });
         format!(
             "way back: worst hop {}, from {sender} to {receiver}{needed}",
@@ -259,14 +304,15 @@ pub struct PlanReport {
     /// True if no positions are better and no fewer relays suffice; false if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
-    /// Theorem that placed the only relay, 1 to 3; 4 for one relay beside the line.
+    /// Theorem that placed the only relay, 1 to 3; 4 for one relay beside the line, 5 for one relay both ways.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
     /// Case number of the theorem in the paper; 0 for a case that the paper omits.
     ///
     /// For Theorem 3 the edge of the box: 1 lowest, 2 highest, 3 above Rx. For one relay beside the line: 1 where the circles of
     /// equal SIR touch, 2 the maximum of the first hop, 3 above Rx, 4 to 6 an edge of the corridor along x, along y or upward, 7
-    /// and 8 with the interferer at Tx or Rx.
+    /// and 8 with the interferer at Tx or Rx. For one relay both ways: 1 above Tx, 2 above Rx, 3 where two SIRs are equal, 4 the
+    /// maximum of one SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
     /// Explanation of the case for the user.
@@ -383,11 +429,16 @@ impl PlanReport {
             .copied()
             .enumerate()
             .min_by(|a, b| a.1.total_cmp(&b.1));
+        let both = Some(scenario.reverse)
+            .filter(|reverse| *reverse > 0.0)
+            .and_then(|reverse| WorstBack::with(reverse, &scene.hop_sirs(&places), &sirs));
         self.way_back = worst.zip(sirs.last()).map(|((hop, sir), rx_sir)| WayBack {
             rx_sir_back: *rx_sir,
             worst_back: sir,
             worst_back_db: db(sir),
-            reverse: Some(scenario.reverse).filter(|reverse| *reverse > 0.0),
+            reverse: both.map(|both| both.reverse),
+            worst_both: both.map(|both| both.worst_both),
+            worst_direction: both.map(|both| both.worst_direction),
             hop,
             relays,
         });
@@ -411,7 +462,11 @@ impl PlanReport {
 
     /// Returns the report as a table.
     pub fn table(&self) -> String {
-        let mut text = hops_table(&self.relays, &[], self.rx_sir, self.room);
+        let rx_sir_back = self
+            .way_back
+            .and_then(|back| back.reverse.map(|_| back.rx_sir_back));
+        let rx = (self.rx_sir, rx_sir_back);
+        let mut text = hops_table(&self.relays, &[], rx, self.room);
         let (Some(uavs), Some(sir)) = (self.uavs, self.sir) else {
             return text;
         };

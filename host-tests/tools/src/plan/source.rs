@@ -7,8 +7,13 @@ use uav_relay::planning::single::{Found, aside, theorems, without_interferer};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::Scene;
 
-use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, Theorem, Why, altitude, is_free};
+use super::bound::{Targets, excludes};
+use super::{
+    NoPlan, Number, Plan, PlanRequest, ProfiledMission, Theorem, Why, altitude, is_free,
+    one_both_ways,
+};
 
 /// Returns the fewest relays at their own altitudes, by eq. (Opt).
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
@@ -18,11 +23,54 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
         "eq. (Opt)"
     };
     let plan = fewest(scenario, target, tolerance, how)?;
-    let most = best(scenario, plan.mission.relays(), tolerance);
+    let relays = plan.mission.relays();
+    let most = best(scenario, relays, tolerance);
+    // Fewer relays are excluded one number after the other: with different powers fewer may do better.
+    let proven = plan.proven
+        || scenario.reverse > 0.0
+            && (1..relays)
+                .rev()
+                .all(|fewer| is_excluded_both_ways(scenario, fewer, target));
     Ok(Plan {
         most: most.ok().map(|best| best.sir()),
+        proven,
         ..plan
     })
+}
+
+/// Returns the best position of one relay for both directions, above the line at its altitude.
+fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> {
+    let briefed = ProfiledMission::new(scenario, 1, tolerance)?;
+    let altitude_m = briefed.profile(1).altitude_m;
+    let scene = Scene::new(scenario, 1).ok_or_else(nothing)?;
+    let best = one_both_ways::best(&scene, scenario.reverse).ok_or_else(nothing)?;
+    let place = Placement::on_line(narrow(best.x_m), altitude_m);
+    let plan = briefed.plan(&[place], "one relay both ways", true);
+    Ok(Plan {
+        theorem: Some(Theorem {
+            number: 5,
+            case: best.case,
+            words: best.words,
+        }),
+        ..plan
+    })
+}
+
+/// Returns true if no positions of `relays` relays meet `target` both ways, by a bound that shares no code with Algorithm 1.
+fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
+    let targets = Targets {
+        there: target,
+        back: scenario.reverse * target,
+    };
+    Scene::new(scenario, relays).is_some_and(|scene| excludes(&scene, targets))
+}
+
+/// Returns the best positions for both directions, with a proof if there is one.
+fn best_both_ways(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+    let plan = best(scenario, relays, tolerance)?;
+    let more = plan.sir() * (1.0 + 2.0 * tolerance);
+    let proven = is_excluded_both_ways(scenario, relays, more);
+    Ok(Plan { proven, ..plan })
 }
 
 /// Returns the best position of one relay, by a theorem or beside the line. With a fixed altitude it stays above the line.
@@ -219,9 +267,12 @@ fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     match ask.number {
-        // The theorems are for one direction.
-        Number::Of(1) if !(scenario.reverse > 0.0) => alone(scenario, ask),
+        Number::Of(1) if scenario.reverse > 0.0 => alone_both_ways(scenario, ask.tolerance),
+        Number::Of(1) => alone(scenario, ask),
         Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
+        Number::Of(relays) if scenario.reverse > 0.0 => {
+            best_both_ways(scenario, relays, ask.tolerance)
+        }
         Number::Of(relays) => best(scenario, relays, ask.tolerance),
         Number::Meeting(target) if ask.free_altitude => {
             altitude::fewest(scenario, target, ask.tolerance)

@@ -32,7 +32,7 @@ fn every_figure_is_written_and_the_page_names_every_file() {
             figure.name
         );
     }
-    assert_eq!(files.len(), ALL.len() + 19, "{files:?}");
+    assert_eq!(files.len(), ALL.len() + 20, "{files:?}");
     let page = fs::read_to_string(written().join("index.html")).unwrap();
     let named = |attribute: &str, ending: &str| -> BTreeSet<String> {
         let opening = format!("{attribute}=\"");

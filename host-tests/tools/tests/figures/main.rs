@@ -14,6 +14,7 @@
 mod altitudes;
 mod chains;
 mod files;
+mod link;
 mod single;
 
 use std::path::Path;

@@ -6,6 +6,7 @@
 //! | `opened` | the page in it, user actions, and comparison with the command |
 //! | `hand` | mouse, finger and keyboard input, and error messages |
 //! | `played` | playing a run |
+//! | `ways` | both directions of every hop |
 //! | `layout` | wide and narrow, light and dark, accessibility, and response times |
 #![allow(
     clippy::unwrap_used,
@@ -20,3 +21,4 @@ mod hand;
 mod layout;
 mod opened;
 mod played;
+mod ways;

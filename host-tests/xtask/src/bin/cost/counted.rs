@@ -12,6 +12,7 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     let figure = |name: &str| figure(&counted, name);
     let settled = [
         "settled",
+        "settled_both_ways",
         "agreed",
         "joint_settled",
         "predicted_settled",
@@ -208,6 +209,30 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     (
+        "a sweep message in both directions, from receiving to sending it",
+        "instructions",
+        &["sweep_both_ways"],
+        None,
+    ),
+    (
+        "length of its frame",
+        "bytes",
+        &["sweep_both_ways_bytes"],
+        Some(100),
+    ),
+    (
+        "a sweep message in both directions at the last relay, which sends the verdict",
+        "instructions",
+        &["sweep_both_ways_at_tail"],
+        None,
+    ),
+    (
+        "a verdict message in both directions, from receiving to sending it",
+        "instructions",
+        &["verdict_both_ways"],
+        None,
+    ),
+    (
         "a verdict message of 16 targets, from receiving to sending it",
         "instructions",
         &["verdict"],
@@ -370,6 +395,10 @@ const CALLS: &[&str] = &[
     "begin_sweep",
     "sweep",
     "sweep_at_tail",
+    "begin_sweep_both_ways",
+    "sweep_both_ways",
+    "sweep_both_ways_at_tail",
+    "verdict_both_ways",
     "verdict",
     "verdict_at_head",
     "predict",

@@ -213,7 +213,7 @@ fn with(
 }
 
 /// Returns the README's three table rows with costs, each as its fixed beginning and its measured text.
-fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
+fn lines(rows: &[Row]) -> Option<[(&'static str, String); 4]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;
         let [flash, ram, stack] = rows.get(at..at + 3)? else {
@@ -222,11 +222,13 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
         let [flash, ram, stack] = [flash, ram, stack].map(|row| spaced(row.value));
         Some(format!("{flash}, {ram} and {stack} bytes"))
     };
-    let sweep = rows.iter().position(|row| {
-        row.what == "a sweep message of 16 targets, from receiving to sending it"
-    })?;
-    let [sweep, frame] = rows.get(sweep..sweep + 2)? else {
-        return None;
+    let sweep = |what: &str| {
+        let at = rows.iter().position(|row| row.what == what)?;
+        let [sweep, frame] = rows.get(at..at + 2)? else {
+            return None;
+        };
+        let (sweep, frame) = (spaced(sweep.value), frame.value);
+        Some(format!("{sweep} instructions, {frame} bytes on the wire"))
     };
     Some([
         (
@@ -239,11 +241,11 @@ fn lines(rows: &[Row]) -> Option<[(&'static str, String); 3]> {
         ),
         (
             "| one sweep message with 16 target SIRs, from receiving to sending it | ",
-            format!(
-                "{} instructions, {} bytes on the wire",
-                spaced(sweep.value),
-                frame.value
-            ),
+            sweep("a sweep message of 16 targets, from receiving to sending it")?,
+        ),
+        (
+            "| the same for both directions | ",
+            sweep("a sweep message in both directions, from receiving to sending it")?,
         ),
     ])
 }

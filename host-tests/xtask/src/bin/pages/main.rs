@@ -34,7 +34,7 @@ use clap::Parser;
 use page::{Block, Kind};
 
 /// Pages of the documentation whose commands are run, in the order in which a new user reads them.
-const PAGES: [&str; 12] = [
+const PAGES: [&str; 13] = [
     "README.md",
     "examples/LINUX.md",
     "examples/BOARDS.md",
@@ -43,6 +43,7 @@ const PAGES: [&str; 12] = [
     "examples/CAPTURES.md",
     "src/docs/firmware.md",
     "src/docs/flight.md",
+    "src/docs/link.md",
     "src/docs/lost_relays.md",
     "src/docs/planning.md",
     "src/docs/sensing.md",

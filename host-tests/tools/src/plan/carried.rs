@@ -1,0 +1,207 @@
+//! Positions of the largest data rate along the line.
+//!
+//! | hops | directions | positions |
+//! | --- | --- | --- |
+//! | equal slots or own channels | one, or both with r = 1 | those of the largest SIR, by Algorithm 1 |
+//! | equal slots or own channels | both, r < 1 | Algorithm 1 with the ratio of SIRs that both rates need, and a shortest path |
+//! | fitted slots | one or both | a shortest path (`path`) |
+//!
+//! A rate R to Rx and r R back need the SINRs g(R) and g(r R). Their ratio depends on R, and is not r: the logarithm of a rate flattens. So
+//! Algorithm 1 is repeated with the ratio of the rate that it has reached, by bisection.
+
+use std::cell::OnceCell;
+
+use uav_relay::optimiser::plan as silent;
+use uav_relay::{Mission, MissionConfig, Placement, Profile, Schedule};
+use uav_relay_scenario::link::{Access, Radio};
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::{Interference, Scenario};
+use uav_relay_sim::report::WorstBack;
+
+use super::bound::{Targets, excludes};
+use super::path::{Table, Times};
+use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
+
+/// Loss on the grid up to which a number of relays is worth a search.
+const WORTH: f64 = 0.05;
+
+/// Steps of the bisection of a rate.
+const HALVINGS: u8 = 18;
+
+/// Planner of positions for data rates.
+#[derive(Debug)]
+pub struct Carried<'a> {
+    scenario: &'a Scenario,
+    radio: &'a Radio,
+    tolerance: f64,
+    /// Number of relays for which the table is computed at once.
+    most: u16,
+    table: OnceCell<Option<Table>>,
+}
+
+impl<'a> Carried<'a> {
+    /// Creates the planner for up to `most` relays. `None` if the positions of the largest SIR are those of the largest rate, or no
+    /// others are searched for: with free altitudes, a given place, a field or several interferers.
+    pub fn new(
+        scenario: &'a Scenario,
+        ask: &PlanRequest,
+        radio: &'a Radio,
+        most: u16,
+    ) -> Option<Self> {
+        let is_alone =
+            matches!(&scenario.interference, Interference::Sources(sources) if sources.len() == 1);
+        let is_between = scenario.reverse > 0.0 && scenario.reverse < 1.0;
+        let differs = radio.link.access == Access::Fitted || is_between;
+        (is_alone && differs && !ask.free_altitude && ask.x_m.is_none()).then(|| Self {
+            scenario,
+            radio,
+            tolerance: ask.tolerance,
+            most,
+            table: OnceCell::new(),
+        })
+    }
+
+    fn table(&self) -> Option<&Table> {
+        let table = self.table.get_or_init(|| {
+            let most = Scene::new(self.scenario, self.most)?;
+            Some(Table::new(&Times::new(
+                &most,
+                self.radio,
+                self.scenario.reverse,
+            )))
+        });
+        table.as_ref()
+    }
+
+    /// Returns the largest number of relays, up to that of the table, that is worth a search in fitted slots.
+    ///
+    /// More relays take so much longer on the grid that no refinement makes up for it.
+    pub fn most_worth(&self) -> u16 {
+        self.table().map_or(0, |table| table.largest_within(WORTH))
+    }
+
+    /// Returns the positions of `relays` relays with the largest data rate; at most as many as in [`Carried::new`].
+    ///
+    /// # Errors
+    /// [`NoPlan`] if there is no mission, or if no positions give every hop an SIR above 0.
+    pub fn plan(&self, relays: u16) -> Result<Plan, NoPlan> {
+        let by_sir = source::best(self.scenario, relays, self.tolerance)?;
+        let briefed = ProfiledMission::new(self.scenario, relays, self.tolerance)?;
+        let Some(scene) = Scene::new(self.scenario, relays) else {
+            return Ok(by_sir);
+        };
+        let times = Times::new(&scene, self.radio, self.scenario.reverse);
+        let table = self.table();
+        let x = |places: &[Placement]| places.iter().map(|at| at.x_m.into()).collect::<Vec<f64>>();
+        let mut starts = vec![x(&by_sir.chain())];
+        if self.radio.link.access != Access::Fitted {
+            let rate = 1.0 / times.total(&x(&by_sir.chain()));
+            if let Some(places) = self.by_ratio(&briefed, rate) {
+                starts = vec![x(&places)];
+            }
+        }
+        starts.extend(
+            table
+                .and_then(|table| table.start(relays))
+                .map(<[f64]>::to_vec),
+        );
+        let best = starts.iter().map(|start| times.refined(start));
+        let best = best.min_by(|one, other| one.0.total_cmp(&other.0));
+        let Some((_, x)) = best.filter(|(time, _)| time.is_finite()) else {
+            return Ok(by_sir);
+        };
+        let places: Vec<Placement> = (1..)
+            .zip(&x)
+            .map(|(index, &x)| Placement::on_line(narrow(x), briefed.profile(index).altitude_m))
+            .collect();
+        let fits = self.radio.link.access == Access::Fitted;
+        let how = if fits {
+            "a shortest path for fitted slots"
+        } else {
+            "Algorithm 1 for the rates of both directions"
+        };
+        let plan = briefed.plan(&places, how, false);
+        let sirs = scene.hop_sirs(&places);
+        let back = WorstBack::of(&plan.mission, &sirs, &scene.hop_sirs_back(&places));
+        Ok(Plan { sirs, back, ..plan })
+    }
+
+    /// Returns `plan` with a proof that no positions carry more, if there is one. There is none for fitted slots.
+    #[must_use]
+    pub fn proven(&self, plan: Plan) -> Plan {
+        let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+        let Some(scene) = Scene::new(self.scenario, relays) else {
+            return plan;
+        };
+        let x: Vec<f64> = plan.places.iter().map(|(at, _)| at.x_m.into()).collect();
+        let reverse = self.scenario.reverse;
+        let time = Times::new(&scene, self.radio, reverse).total(&x);
+        let more = (1.0 + 2.0 * self.tolerance) / time;
+        let proven = self.radio.link.access != Access::Fitted
+            && carries_no(&scene, self.radio, reverse, more);
+        Plan { proven, ..plan }
+    }
+
+    /// Returns the positions of Algorithm 1 with the ratio of SIRs that both rates need; `least`, bit/s/Hz, is a rate that is met.
+    fn by_ratio(&self, briefed: &ProfiledMission, least: f64) -> Option<Vec<Placement>> {
+        let reverse = self.scenario.reverse;
+        let model = &self.radio.link.model;
+        let ratio = |rate: f64| Some((model.sinr(rate)?, model.sinr(reverse * rate)?));
+        let placed = |rate: f64| {
+            let (there, back) = ratio(rate)?;
+            let mission = &briefed.mission;
+            let config = MissionConfig {
+                reverse: narrow((back / there).min(1.0)),
+                ..*mission.config()
+            };
+            let mission = Mission::try_new(config).ok()?;
+            let profile_of = |index| briefed.profile(index);
+            let agreed = silent::solve(&mission, Schedule::Bracketed, profile_of).ok()?;
+            (f64::from(agreed.target) >= there).then_some(())?;
+            chain(&mission, agreed.target, profile_of)
+        };
+        let mut best = None;
+        let (mut low, mut high) = (least, if least > 0.0 { 1.25 * least } else { 1.0 });
+        while let Some(places) = placed(high)
+            && high < 1e3
+        {
+            best = Some(places);
+            low = high;
+            high *= 2.0;
+        }
+        for _ in 0..HALVINGS {
+            let middle = f64::midpoint(low, high);
+            match placed(middle) {
+                Some(places) => (low, best) = (middle, Some(places)),
+                None => high = middle,
+            }
+        }
+        best
+    }
+}
+
+fn chain(
+    mission: &Mission,
+    target: f32,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Option<Vec<Placement>> {
+    let mut places = vec![Placement::default(); usize::from(mission.relays())];
+    mission
+        .places_for(target, profile_of, &mut places)
+        .then_some(places)
+}
+
+/// Returns true if it is proven that no positions give every hop the rate `bits_per_hz`, and `reverse` times it on the way back.
+pub fn carries_no(scene: &Scene, radio: &Radio, reverse: f64, bits_per_hz: f64) -> bool {
+    let model = &radio.link.model;
+    let Some(there) = model.sinr(bits_per_hz) else {
+        return true;
+    };
+    let back = if reverse > 0.0 {
+        model.sinr(reverse * bits_per_hz)
+    } else {
+        Some(0.0)
+    };
+    back.is_none_or(|back| excludes(scene, Targets { there, back }))
+}

@@ -1,0 +1,207 @@
+//! Best position of one relay for both directions against one interferer, at its altitude above the line: closed forms.
+//!
+//! With l1 and l2 the squared lengths of the hops, s the relay's squared distance from the interferer, nu = N eta / P and constants
+//! a, b, c, e of the powers and of the interference at Tx and Rx, the SIRs that count are
+//!
+//! ```text
+//! F1 = a s / (l1 (1 + nu s))    F2 = b / l2    B1 / r = c / l1    B2 / r = e s / (l2 (1 + nu s))
+//! ```
+//!
+//! The largest minimum of these four smooth functions is at an end of the line, where one of them has a maximum, or where two are
+//! equal. Each of these conditions is a polynomial of degree 5 or less in x, of degree 3 or less without noise:
+//!
+//! | condition | polynomial |
+//! | --- | --- |
+//! | F1 = F2 | a s l2 - b l1 (1 + nu s) |
+//! | F1 = B1 | a s - c (1 + nu s) |
+//! | F1 = B2 | a l2 - e l1 |
+//! | F2 = B1 | b l1 - c l2 |
+//! | F2 = B2 | b (1 + nu s) - e s |
+//! | B1 = B2 | c l2 (1 + nu s) - e s l1 |
+//! | F1 largest | s' l1 - s l1' (1 + nu s) |
+//! | B2 largest | s' l2 - s l2' (1 + nu s) |
+//!
+//! F2 and B1 are monotonic. The best of all their real roots is the optimum. `one_relay_both_ways` in `host-tests/tools/tests`
+//! compares it with a scan.
+
+use uav_relay_scenario::scene::Scene;
+
+/// Best position of the only relay.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Best {
+    /// Distance from Tx, m.
+    pub x_m: f64,
+    /// Number of the case: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
+    pub case: u8,
+    /// Explanation of the case for the user.
+    pub words: String,
+}
+
+/// Descriptions of F1, F2, B1 and B2.
+const NAMES: [&str; 4] = [
+    "the first hop",
+    "the second hop",
+    "the first hop on the way back",
+    "the second hop on the way back",
+];
+
+/// Relative difference of SIRs that count as equal.
+const EQUAL: f64 = 1e-6;
+
+/// Polynomial, coefficients from the constant on.
+type Polynomial = Vec<f64>;
+
+/// Returns the best position of the scene's only relay for `reverse` r above 0. `None` if no position gives an SIR above 0.
+pub fn best(scene: &Scene, reverse: f64) -> Option<Best> {
+    let ([relay], [source]) = (scene.relays.as_slice(), scene.sources.as_slice()) else {
+        return None;
+    };
+    let (d, h) = (scene.distance_m, relay.altitude_m);
+    let squared = |at: f64, aside: f64| vec![at * at + aside, -2.0 * at, 1.0];
+    let l1 = squared(0.0, h * h);
+    let l2 = squared(d, h * h);
+    let s = squared(source.x_m, source.y_m * source.y_m + h * h);
+    let nu = scene.noise_w * scene.eta / source.power_w;
+    let noisy = sum(&scaled(&s, nu), &[1.0]);
+    let received = |ground_w: f64| relay.power_w / (scene.eta * (ground_w + scene.noise_w));
+    let a = scene.tx_w / source.power_w;
+    let b = received(scene.interference_rx_w());
+    let c = received(scene.interference_on_ground_w(0.0)) / reverse;
+    let e = scene.rx_w / source.power_w / reverse;
+    let less = |one: Polynomial, other: Polynomial| sum(&one, &scaled(&other, -1.0));
+    let hill = |l: &Polynomial| {
+        less(
+            product(&slope(&s), l),
+            product(&product(&s, &slope(l)), &noisy),
+        )
+    };
+    let conditions = [
+        less(
+            scaled(&product(&s, &l2), a),
+            scaled(&product(&l1, &noisy), b),
+        ),
+        less(scaled(&s, a), scaled(&noisy, c)),
+        less(scaled(&l2, a), scaled(&l1, e)),
+        less(scaled(&l1, b), scaled(&l2, c)),
+        less(scaled(&noisy, b), scaled(&s, e)),
+        less(
+            scaled(&product(&l2, &noisy), c),
+            scaled(&product(&s, &l1), e),
+        ),
+        hill(&l1),
+        hill(&l2),
+    ];
+    let sirs = |x: f64| {
+        let [l1, l2, s, noisy] = [&l1, &l2, &s, &noisy].map(|of| value(of, x));
+        [a * s / (l1 * noisy), b / l2, c / l1, e * s / (l2 * noisy)]
+    };
+    let worst = |x: f64| sirs(x).into_iter().fold(f64::INFINITY, f64::min);
+    let inside = conditions.iter().flat_map(|condition| roots(condition, d));
+    let x_m = [0.0, d]
+        .into_iter()
+        .chain(inside)
+        .max_by(|one, other| worst(*one).total_cmp(&worst(*other)))?;
+    let sir = worst(x_m);
+    if !(sir > 0.0) {
+        return None;
+    }
+    let limits: Vec<&str> = sirs(x_m)
+        .into_iter()
+        .zip(NAMES)
+        .filter(|(own, _)| *own <= sir * (1.0 + EQUAL))
+        .map(|(_, name)| name)
+        .collect();
+    let limit = limits.first().copied().unwrap_or_default();
+    let (case, words) = if x_m <= 0.0 {
+        let words = format!("the drone stays right above Tx: {limit} is the weakest even there");
+        (1, words)
+    } else if x_m >= d {
+        let words = format!("the drone goes right above Rx: {limit} is the weakest even there");
+        (2, words)
+    } else if limits.len() > 1 {
+        let words = format!(
+            "the drone goes where {} are equally good: to either side one of them would be worse",
+            limits.join(" and ")
+        );
+        (3, words)
+    } else {
+        let words = format!("the drone goes where {limit} is best: that is the weakest even there");
+        (4, words)
+    };
+    Some(Best { x_m, case, words })
+}
+
+fn value(of: &[f64], x: f64) -> f64 {
+    of.iter()
+        .rev()
+        .fold(0.0, |sum, coefficient| sum * x + coefficient)
+}
+
+fn scaled(of: &[f64], by: f64) -> Polynomial {
+    of.iter().map(|coefficient| coefficient * by).collect()
+}
+
+fn sum(one: &[f64], other: &[f64]) -> Polynomial {
+    let of = |of: &[f64], at: usize| of.get(at).copied().unwrap_or_default();
+    let terms = one.len().max(other.len());
+    (0..terms).map(|at| of(one, at) + of(other, at)).collect()
+}
+
+fn product(one: &[f64], other: &[f64]) -> Polynomial {
+    let mut terms = vec![0.0; one.len() + other.len()];
+    for (at, left) in one.iter().enumerate() {
+        for (to, right) in other.iter().enumerate() {
+            if let Some(term) = terms.get_mut(at + to) {
+                *term += left * right;
+            }
+        }
+    }
+    terms
+}
+
+fn slope(of: &[f64]) -> Polynomial {
+    let terms = (0_u32..).zip(of).skip(1);
+    terms
+        .map(|(power, coefficient)| f64::from(power) * coefficient)
+        .collect()
+}
+
+/// Returns the real roots within 0 to `end`, found between those of the derivative.
+fn roots(of: &[f64], end: f64) -> Vec<f64> {
+    let size = of.iter().rposition(|coefficient| *coefficient != 0.0);
+    let Some(of) = size.and_then(|degree| of.get(..=degree)) else {
+        return Vec::new();
+    };
+    if of.len() < 2 {
+        return Vec::new();
+    }
+    let turns = roots(&slope(of), end);
+    let mut edges = vec![0.0];
+    edges.extend(turns);
+    edges.push(end);
+    let mut found = Vec::new();
+    for pair in edges.windows(2) {
+        let &[mut low, mut high] = pair else { continue };
+        let rises = value(of, high) > value(of, low);
+        // A double root has no change of sign: its turn is a candidate.
+        found.push(high);
+        if value(of, low) * value(of, high) > 0.0 {
+            continue;
+        }
+        for _ in 0..200 {
+            let middle = f64::midpoint(low, high);
+            if !(middle > low && middle < high) {
+                break;
+            }
+            if (value(of, middle) > 0.0) == rises {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        found.push(low);
+        found.push(high);
+    }
+    found.sort_by(f64::total_cmp);
+    found
+}

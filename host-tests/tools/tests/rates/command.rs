@@ -1,0 +1,204 @@
+//! `cargo plan` for both directions, run as a program.
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// Returns the default scenario with a power of Rx and `[link]`.
+fn scenario(rx_w: f64, link: &str) -> tempfile::NamedTempFile {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let powers = format!("uav_w = 1.0\nrx_w = {rx_w:?}\n");
+    let text = uav_relay_scenario::DEFAULT.replace("uav_w = 1.0", &powers);
+    assert!(text.contains("rx_w"));
+    std::fs::write(&file, format!("{text}\n[link]\n{link}\n")).unwrap();
+    file
+}
+
+fn plan(file: &tempfile::NamedTempFile, options: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_plan"))
+        .args(["--scenario", file.path().to_str().unwrap()])
+        .args(options.split_whitespace())
+        .output()
+        .unwrap()
+}
+
+fn text(file: &tempfile::NamedTempFile, options: &str) -> String {
+    let output = plan(file, options);
+    assert!(output.status.success(), "{options}: {output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(file: &tempfile::NamedTempFile, options: &str) -> Value {
+    serde_json::from_str(&text(file, &format!("--json {options}"))).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value}"))
+}
+
+/// Returns the SIRs of all hops to Rx, and back.
+fn sirs(report: &Value) -> [Vec<f64>; 2] {
+    [("sir", "rx_sir"), ("sir_back", "rx_sir_back")].map(|(of, of_rx)| {
+        let relays = report["relays"].as_array().unwrap().iter();
+        let relays = relays.map(|relay| number(&relay[of]));
+        relays.chain([number(&report[of_rx])]).collect()
+    })
+}
+
+fn worst(sirs: &[f64]) -> f64 {
+    sirs.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn relays_are_planned_for_both_directions_on_request() {
+    for (reverse, uavs) in [(0.5, 1), (0.5, 3), (0.5, 8), (1.0, 3), (0.1, 20)] {
+        let one_way = json(&scenario(5.0, "reverse = 0.0"), &format!("--uavs {uavs}"));
+        assert!(one_way["reverse"].is_null() && one_way["worst_both"].is_null());
+        let file = scenario(5.0, &format!("reverse = {reverse:?}"));
+        let report = json(&file, &format!("--uavs {uavs}"));
+        let both = |report: &Value| {
+            let [there, back] = sirs(report).map(|sirs| worst(&sirs));
+            there.min(back / reverse)
+        };
+        let sir = number(&report["sir"]);
+        assert!((both(&report) / sir - 1.0).abs() < 1e-5, "{report}");
+        assert!((number(&report["worst_both"]) / sir - 1.0).abs() < 1e-5);
+        assert!(sir > 1.2 * both(&one_way), "{report} {one_way}");
+        assert!(sir < number(&one_way["sir"]), "{report} {one_way}");
+        assert_eq!(number(&report["reverse"]), reverse);
+        // The bound of intervals proves it.
+        assert_eq!(report["proven"], true, "{report}");
+        let how = if uavs == 1 {
+            "one relay both ways"
+        } else {
+            "Algorithm 1 for both directions"
+        };
+        assert_eq!(report["how"], how);
+        let fewest = json(&file, &format!("--target-sir {}", sir * 0.999));
+        assert_eq!(
+            (&fewest["uavs"], &fewest["proven"]),
+            (&uavs.into(), &true.into()),
+            "{fewest}"
+        );
+        assert!(number(&fewest["sir"]) > sir * 0.9985, "{fewest}");
+    }
+}
+
+#[test]
+fn both_directions_are_in_the_table_and_in_the_picture() {
+    let file = scenario(5.0, "reverse = 0.5");
+    let svg = tempfile::NamedTempFile::new().unwrap();
+    let options = format!("--uavs 3 --svg {}", svg.path().display());
+    let table = text(&file, &options);
+    let report = json(&file, "--uavs 3");
+    for part in [
+        "SIR [dB]     SIR back back [dB]\n",
+        "it needs 0.5 of the SIR of the way there (link.reverse); worst direction: both\n",
+        "in this model no positions are better; not modelled: terrain and obstacles\n",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+    assert_eq!(report["worst_direction"], "both");
+    let picture = std::fs::read_to_string(svg.path()).unwrap();
+    assert!(roxmltree::Document::parse(&picture).is_ok());
+    let [there, back] = sirs(&report);
+    let db = |sir: f64| 10.0 * sir.log10();
+    for (hop, (there, back)) in (1..).zip(there.iter().zip(&back)) {
+        let (there, back) = (db(*there), db(*back));
+        let tip = format!("hop {hop}: SIR {there:.2} dB, back {back:.2} dB");
+        assert!(picture.contains(&tip), "{tip}");
+        assert!(
+            picture.contains(&format!(">{there:.1} / {back:.1}<")),
+            "{hop}"
+        );
+        assert!(table.contains(&format!(" {back:.3}\n")), "{table}");
+    }
+    assert!(picture.contains("At hops: SIR to Rx / back, dB"));
+    // One way: as before.
+    let one_way = text(&scenario(5.0, "reverse = 0.0"), "--uavs 3");
+    assert!(!one_way.contains("SIR back"), "{one_way}");
+}
+
+#[test]
+fn data_rates_count_both_directions() {
+    for (access, slots) in [("slots", 8), ("channels", 2), ("fitted", 8)] {
+        let link = format!("reverse = 0.5\naccess = \"{access}\"\nbandwidth_hz = 1e6");
+        let report = json(&scenario(5.0, &link), "--uavs 3 --rates");
+        let [there, back] = sirs(&report);
+        let bits = |sirs: &[f64]| {
+            sirs.iter()
+                .map(|sir| (1.0 + sir).log2())
+                .collect::<Vec<f64>>()
+        };
+        let time = |sirs: &[f64]| bits(sirs).iter().map(|bits| 1.0 / bits).sum::<f64>();
+        let expected = match access {
+            "slots" => [&there, &back].map(|sirs| 1e6 * worst(&bits(sirs)) / 8.0),
+            "channels" => [&there, &back].map(|sirs| 1e6 * worst(&bits(sirs)) / 2.0),
+            _ => {
+                let rate = 1e6 / (time(&there) + 0.5 * time(&back));
+                [rate, 0.5 * rate]
+            }
+        };
+        let found = report["rate_bps"].as_array().unwrap();
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((number(found) / expected - 1.0).abs() < 1e-5, "{report}");
+        }
+        assert_eq!(report["slots"], slots);
+        assert_eq!(report["proven"], access != "fitted", "{report}");
+        let rates = report["rates"].as_array().unwrap();
+        let worse =
+            |rate: &Value| number(&rate["rate_bps"][0]).min(number(&rate["rate_bps"][1]) / 0.5);
+        let best = rates.iter().map(worse).fold(0.0, f64::max);
+        let named = number(&report["best_rate_bps"]);
+        assert!(named <= best && named > 0.9998 * best, "{report}");
+        // The fewest relays that carry a target to Rx, and half of it back.
+        let file = scenario(5.0, &link);
+        let target = 0.999 * best;
+        let met = json(&file, &format!("--target-rate-bps {target:?}"));
+        let uavs = met["uavs"].as_u64().unwrap();
+        assert!(
+            number(&met["rate_bps"][0]) >= target && number(&met["rate_bps"][1]) >= 0.5 * target
+        );
+        for (_, fewer) in (1..uavs).zip(rates) {
+            assert!(worse(fewer) < target, "{met}");
+        }
+        let refused = plan(&file, &format!("--target-rate-bps {:?}", 1.01 * best));
+        let line = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(refused.status.code(), Some(1), "{line}");
+        assert!(
+            line.contains("to Rx and at least 0.5 of it back (link.reverse)"),
+            "{line}"
+        );
+    }
+    let table = text(
+        &scenario(5.0, "reverse = 0.5\nbandwidth_hz = 1e6"),
+        "--uavs 3 --rates",
+    );
+    for part in [
+        " back: 4 hops share one frequency in 4 equal time slots, each way half of the time, and the worst hop carries ",
+        "\n    2 relays carry ",
+        " of it back (link.reverse), more than 3 relays do; no other number carries more\n",
+    ] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+}
+
+#[test]
+fn what_has_no_way_back_is_refused_by_name() {
+    let file = scenario(5.0, "reverse = 0.5");
+    for options in ["--uavs 1 --x-m 5", "--uavs 3 --altitude free"] {
+        let output = plan(&file, options);
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        assert!(line.contains("link.reverse"), "{line}");
+    }
+    let several = scenario(
+        5.0,
+        "reverse = 0.5\n[[interferer]]\npower_w = 1.0\nx_m = 0.0\ny_m = 90.0",
+    );
+    let line = String::from_utf8(plan(&several, "--uavs 3").stderr).unwrap();
+    assert!(
+        line.contains("link.reverse above 0 needs one [[interferer]]"),
+        "{line}"
+    );
+}

@@ -1,0 +1,260 @@
+//! Judge of data rates: dynamic programming on a grid of its own in f64, then one relay after the other. It shares no code with the
+//! planner or the crate.
+
+/// Spectral efficiency.
+#[derive(Debug, Clone)]
+pub(crate) enum Model {
+    /// Gap to Shannon's limit, linear.
+    Gap(f64),
+    /// Least SINR (linear) and bit/s/Hz of each step.
+    Steps(Vec<(f64, f64)>),
+}
+
+/// Chain of relays at one altitude above the line from Tx (0) to Rx.
+#[derive(Debug, Clone)]
+pub(crate) struct Chain {
+    /// Distance from Tx to Rx, m.
+    pub(crate) distance_m: f64,
+    /// Altitude of the relays, m.
+    pub(crate) altitude_m: f64,
+    /// Least distance of relays, m.
+    pub(crate) apart_m: f64,
+    /// Powers of Tx, the relays and Rx, W.
+    pub(crate) powers_w: Vec<f64>,
+    /// Power of the interferer, W, its x and its y, m.
+    pub(crate) interferer: [f64; 3],
+    /// Path-loss factors in the air and on the ground, 1/m^2.
+    pub(crate) loss: [f64; 2],
+    /// Noise power of every receiver, W.
+    pub(crate) noise_w: f64,
+    /// Rate of the way back relative to that to Rx; 0 for one direction.
+    pub(crate) reverse: f64,
+    /// True if each slot is as long as its hop needs; otherwise the worst hop counts.
+    pub(crate) fitted: bool,
+    /// Spectral efficiency.
+    pub(crate) model: Model,
+}
+
+/// Points of the even part of the grid.
+const EVEN: usize = 171;
+
+/// Golden ratio.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+impl Chain {
+    /// Number of relays.
+    pub(crate) fn relays(&self) -> usize {
+        self.powers_w.len() - 2
+    }
+
+    fn bits(&self, sinr: f64) -> f64 {
+        match &self.model {
+            Model::Gap(gap) => (1.0 + sinr / gap).log2(),
+            Model::Steps(steps) => {
+                let met = steps.iter().filter(|step| sinr >= step.0);
+                met.map(|step| step.1).fold(0.0, f64::max)
+            }
+        }
+    }
+
+    fn disturbance_w(&self, on_ground: bool, x: f64) -> f64 {
+        let [power_w, xi, yi] = self.interferer;
+        let (h, loss) = if on_ground {
+            (0.0, self.loss[1])
+        } else {
+            (self.altitude_m, self.loss[0])
+        };
+        power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
+    }
+
+    /// Returns the time of a bit on the hop between nodes `node` - 1 at `from` and `node` at `to`; the last node is `last`.
+    fn time(&self, node: usize, last: usize, from: f64, to: f64) -> f64 {
+        let (first, end) = (node == 1, node == last);
+        let least = if first || end { 0.0 } else { self.apart_m };
+        if to - from < least - 1.2e-7 * self.distance_m {
+            return f64::INFINITY;
+        }
+        let climb = if first || end { self.altitude_m } else { 0.0 };
+        let gain = 1.0 / (self.loss[0] * ((to - from).powi(2) + climb * climb));
+        let receiver_w = if end {
+            self.powers_w[self.powers_w.len() - 1]
+        } else {
+            self.powers_w[node]
+        };
+        let there = 1.0 / self.bits(self.powers_w[node - 1] * gain / self.disturbance_w(end, to));
+        if self.reverse == 0.0 {
+            return there;
+        }
+        let back = self.reverse / self.bits(receiver_w * gain / self.disturbance_w(first, from));
+        if self.fitted {
+            there + back
+        } else {
+            there.max(back)
+        }
+    }
+
+    fn fold(&self, sofar: f64, hop: f64) -> f64 {
+        if self.fitted {
+            sofar + hop
+        } else {
+            sofar.max(hop)
+        }
+    }
+
+    /// Returns the time of a chain with relays at `x`.
+    fn total(&self, x: &[f64]) -> f64 {
+        let last = x.len() + 1;
+        let mut from = 0.0;
+        let mut total = 0.0;
+        for (node, &to) in (1..).zip(x.iter().chain([&self.distance_m])) {
+            total = self.fold(total, self.time(node, last, from, to));
+            from = to;
+        }
+        total
+    }
+
+    /// Returns the rate of relays at `x` in bit/s/Hz: both ways the smaller one to Rx, and back divided by `reverse`.
+    pub(crate) fn rate(&self, x: &[f64]) -> f64 {
+        self.rate_of(self.total(x), x.len())
+    }
+
+    fn rate_of(&self, total: f64, relays: usize) -> f64 {
+        match (self.fitted, self.reverse > 0.0) {
+            (true, _) => 1.0 / total,
+            (false, false) => 1.0 / total / (relays as f64 + 1.0),
+            (false, true) => 0.5 / total / (relays as f64 + 1.0),
+        }
+    }
+
+    /// Returns the same chain with fewer relays.
+    pub(crate) fn with(&self, relays: usize) -> Self {
+        let mut powers_w = self.powers_w[..=relays].to_vec();
+        powers_w.extend(self.powers_w.last());
+        Self {
+            powers_w,
+            ..self.clone()
+        }
+    }
+
+    fn grid(&self) -> Vec<f64> {
+        let d = self.distance_m;
+        // Denser toward both ends.
+        let even = (0..EVEN).map(|i| {
+            let t = i as f64 / (EVEN - 1) as f64;
+            d * (0.5 * t + 0.5 * t * t * (3.0 - 2.0 * t))
+        });
+        let mut points: Vec<f64> = even.collect();
+        for about in [0.0, d, self.interferer[1]] {
+            for i in 0..16 {
+                let off = 2e-4 * d * 1.6_f64.powi(i);
+                points.extend([about - off, about + off]);
+            }
+        }
+        points.retain(|x| (0.0..=d).contains(x));
+        points.sort_by(f64::total_cmp);
+        points
+    }
+
+    /// Returns the best positions on the grid for 1 relay up to all relays.
+    fn on_grid(&self) -> Vec<Vec<f64>> {
+        let grid = self.grid();
+        let never = usize::MAX - 1;
+        let mut best: Vec<f64> = grid.iter().map(|&x| self.time(1, never, 0.0, x)).collect();
+        let mut tables: Vec<Vec<usize>> = Vec::new();
+        let mut all = Vec::new();
+        for relays in 1..=self.relays() {
+            if relays > 1 {
+                let mut next = vec![f64::INFINITY; grid.len()];
+                let mut table = vec![0; grid.len()];
+                for (to, &x) in grid.iter().enumerate() {
+                    for (from, &y) in grid[..=to].iter().enumerate() {
+                        if best[from] >= next[to] {
+                            continue;
+                        }
+                        let time = self.fold(best[from], self.time(relays, never, y, x));
+                        if time < next[to] {
+                            (next[to], table[to]) = (time, from);
+                        }
+                    }
+                }
+                best = next;
+                tables.push(table);
+            }
+            let end = |at: &usize| {
+                let last = self.time(relays + 1, relays + 1, grid[*at], self.distance_m);
+                self.fold(best[*at], last)
+            };
+            let ends = (0..grid.len()).min_by(|a, b| end(a).total_cmp(&end(b)));
+            let mut path = vec![ends.unwrap()];
+            for table in tables.iter().rev() {
+                path.push(table[*path.last().unwrap()]);
+            }
+            all.push(path.iter().rev().map(|at| grid[*at]).collect());
+        }
+        all
+    }
+
+    /// Improves positions: golden sections over groups of neighbours that move together.
+    fn improved(&self, start: &[f64]) -> Vec<f64> {
+        let mut x = start.to_vec();
+        let mut best = self.total(&x);
+        let mut span = 0.03 * self.distance_m;
+        while span > 1e-6 * self.distance_m {
+            let before = best;
+            for group in (1..=x.len()).take(4) {
+                for first in 0..=x.len() - group {
+                    let moved = |by: f64| {
+                        let mut moved = x.clone();
+                        for x in &mut moved[first..first + group] {
+                            *x = (*x + by).clamp(0.0, self.distance_m);
+                        }
+                        moved
+                    };
+                    let (mut low, mut high) = (-span, span);
+                    for _ in 0..14 {
+                        let one = high - GOLDEN * (high - low);
+                        let other = low + GOLDEN * (high - low);
+                        if self.total(&moved(one)) < self.total(&moved(other)) {
+                            high = other;
+                        } else {
+                            low = one;
+                        }
+                    }
+                    let next = moved(f64::midpoint(low, high));
+                    let total = self.total(&next);
+                    if total < best {
+                        (x, best) = (next, total);
+                    }
+                }
+            }
+            if !(best < before * (1.0 - 1e-6)) {
+                span *= 0.3;
+            }
+        }
+        x
+    }
+
+    /// Returns the largest rate found for all relays, also from positions `others`.
+    pub(crate) fn best(&self, others: &[f64]) -> f64 {
+        let grid = self.on_grid();
+        let starts = [grid.last().unwrap().as_slice(), others];
+        let rates = starts.map(|start| self.rate(&self.improved(start)));
+        rates[0].max(rates[1])
+    }
+
+    /// Returns the largest rate found for 1 relay up to all relays, and its number.
+    pub(crate) fn best_number(&self) -> (f64, usize) {
+        let grid = self.on_grid();
+        let mut starts: Vec<&Vec<f64>> = grid.iter().collect();
+        let rate = |x: &[f64]| self.with(x.len()).rate(x);
+        starts.sort_by(|a, b| rate(b).total_cmp(&rate(a)));
+        let best = starts.iter().take(3).map(|start| {
+            let chain = self.with(start.len());
+            (chain.rate(&chain.improved(start)), start.len())
+        });
+        best.fold(
+            (0.0, 0),
+            |one, other| if other.0 > one.0 { other } else { one },
+        )
+    }
+}
