@@ -120,7 +120,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Checks a chain with a surplus relay, which is placed above Rx. All other hops are shortened in proportion.
+/// Checks that a surplus relay is placed above Rx, and all other hops are shortened in proportion.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);
@@ -146,7 +146,7 @@ fn the_relay_of_the_weaker_ground_station_is_above_it() {
     assert!(off(1000.0 - places[59], last * 1000.0 / whole) < 1e-9);
 }
 
-/// Compares the mean SIR of two relays at random positions with its integral over all positions.
+/// Checks that the mean SIR of two relays at random positions is its integral over all positions.
 #[test]
 fn the_mean_of_random_chains_is_the_integral() {
     // With an interferer near Tx and relays with a long range, the order of relays matters.

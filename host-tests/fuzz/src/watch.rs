@@ -130,7 +130,9 @@ impl Watched {
         self.held
     }
 
-    /// Forgets which pass gave the relay its position, because a restarted leader numbers its passes anew.
+    /// Forgets which pass (round of messages) gave the relay its position.
+    ///
+    /// A restarted leader numbers its passes anew, so that equal numbers may be different passes.
     pub const fn forget_pass(&mut self) {
         self.held = None;
     }

@@ -132,7 +132,9 @@ fn a_tag_for_other_nonces_counts_as_forged() {
     assert_eq!(link.send_with_counter(5), Some("received"));
 }
 
-/// Checks the warning at `Auth::epoch`: a relay with a reused epoch is ignored, and accepts old frames.
+/// Checks what the documentation of `Auth::epoch` warns of: a relay must not start with a used epoch.
+///
+/// Its neighbour then ignores its frames as replayed, and the relay accepts old frames of the neighbour.
 #[test]
 fn a_reused_epoch_is_not_accepted_as_a_restart() {
     let mut link = Link::new();

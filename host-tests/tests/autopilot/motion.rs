@@ -236,7 +236,9 @@ fn a_restarted_companion_engages_no_drone() {
     }
 }
 
-/// Checks a GPS outage of 30 s: the PX4 lands, and does not return to OFFBOARD afterwards.
+/// Checks that a PX4 that lands in a GPS outage does not return to OFFBOARD afterwards.
+///
+/// The outage lasts 30 s.
 #[test]
 fn a_px4_with_gps_again_does_not_resume_its_flight() {
     let mut rig = Rig::new(Kind::Px4);
@@ -252,8 +254,9 @@ fn a_px4_with_gps_again_does_not_resume_its_flight() {
     assert!(rig.events.iter().any(failsafe), "{:?}", rig.events);
 }
 
-/// Checks an autopilot clock that is 1 % slow or loses 1.5 s. The autopilot link has no valid position then, but for
-/// seconds at most.
+/// Checks that an autopilot clock that is slow or loses time stops valid positions for seconds at most.
+///
+/// The clock is 1 % slow, or loses up to 1.5 s.
 #[test]
 fn a_wrong_clock_stops_positions_for_seconds_at_most() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -342,7 +345,9 @@ fn requests_of_absent_messages_end() {
     }
 }
 
-/// Checks a target outside the fence: the ArduCopter flies on, and the link reports refusal and return.
+/// Checks that the link reports the fence breach and the return of an ArduCopter.
+///
+/// The drone follows a moving target out of its fence.
 #[test]
 fn a_fence_breach_by_a_moving_target_is_named() {
     let mut rig = Rig::new(Kind::ArduCopter);
@@ -361,7 +366,7 @@ fn a_fence_breach_by_a_moving_target_is_named() {
     assert_eq!(rig.text_count("relay: released, returns (RTL): fence"), 1);
 }
 
-/// Checks a drone whose pilot hands over at full speed: it overshoots, stops, and flies on from there.
+/// Checks that a drone whose pilot hands over at full speed overshoots by less than 40 m and stops.
 #[test]
 fn a_drone_handed_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -403,8 +408,9 @@ fn late_positions_do_not_disturb_the_flight() {
     }
 }
 
-/// Checks a drone that drifts while the autopilot link has no position. The next targets begin at the drone's new
-/// position.
+/// Checks that a drone that drifts while the link has no position is led from its true position later.
+///
+/// The next flight targets must begin at the drone's new position.
 #[test]
 fn a_drone_that_drifted_is_led_from_its_true_position() {
     let mut rig = Rig::new(Kind::ArduCopter);

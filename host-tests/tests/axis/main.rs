@@ -283,8 +283,9 @@ fn distances_agree_with_geodesics() {
     }
 }
 
-/// Checks the distance of a drone that is too far away for coordinates on the line. Examples are swapped latitude and
-/// longitude, and the other side of the earth.
+/// Checks that a drone too far away for coordinates on the line has a distance from it.
+///
+/// Examples are swapped latitude and longitude, and the other side of the earth.
 #[test]
 fn a_point_too_far_for_a_position_has_a_distance() {
     let site = |lat, lon| Geodetic::from_degrees(lat, lon, 420.0).unwrap();

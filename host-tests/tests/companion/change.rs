@@ -173,8 +173,9 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
     assert!(!bench.0.relays[0].has_printed("uploaded: "));
 }
 
-/// Checks `--from-loaded`, which uploads the relays' loaded mission with the given changes. The ground station shows
-/// every earlier change that this upload reverts.
+/// Checks that an upload with `--from-loaded` shows every earlier change that it reverts.
+///
+/// Such an upload consists of the mission with which the relays were loaded, and the given changes.
 #[test]
 fn an_upload_based_on_loaded_values_shows_reverted_keys() {
     let mut bench = Bench::new();

@@ -7,8 +7,9 @@ const ONE: &str = "1111111122222222333333334444444455555555666666667777777788888
 /// MAVLink signing key of the other party, which differs in one digit and has white space around it.
 const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788888889\n";
 
-/// Checks a drone and a relay with different signing keys, or with only one key. The relay logs the mismatch, does
-/// not use the drone's frames, and never logs a key.
+/// Checks that a relay reports that keys differ, ignores the drone's frames, and never logs a key.
+///
+/// In some cases only one of drone and relay has a key.
 #[test]
 fn different_mavlink_keys_are_reported_and_frames_ignored() {
     let unsigned = "signs its frames and ignores unsigned ones: give --autopilot-key-file";

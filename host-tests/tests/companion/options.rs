@@ -113,7 +113,7 @@ fn wrong_options_of_an_autopilot_are_named() {
     insta::assert_snapshot!(refusals(&good, WRONG_AUTOPILOT));
 }
 
-/// Checks the error of a start with an autopilot link that cannot be opened: it names the link.
+/// Checks that the error line names an autopilot link that cannot be opened at the start.
 #[test]
 fn an_absent_autopilot_at_the_start_is_an_error() {
     for (autopilot, why) in [

@@ -63,8 +63,9 @@ fn a_relay_with_a_different_key_is_ignored() {
     );
 }
 
-/// Checks the error lines about useless key and epoch files. An epoch that cannot be stored is refused, because it
-/// must not be used twice.
+/// Checks that the error lines name a useless key file or epoch file.
+///
+/// An epoch that cannot be stored is refused, because it must not be used twice.
 #[test]
 fn a_bad_key_or_epoch_is_named() {
     let files = Files::new();

@@ -131,7 +131,7 @@ fn a_silent_tty_is_logged_once() {
     unanswered.check_no_repetition();
 }
 
-/// Checks the report on bytes that are not MAVLink 2, as at a wrong baud rate.
+/// Checks that bytes that are not MAVLink 2, as at a wrong baud rate, are reported as such.
 #[test]
 fn noise_is_distinguished_from_silence() {
     let ports = Ports::apart(1_000);
@@ -148,7 +148,9 @@ fn noise_is_distinguished_from_silence() {
     assert!(!unanswered.relay.has_printed("no answer"), "bytes came");
 }
 
-/// Checks the report on frames of a ground station, a radio or a plane. The companion can control none of them.
+/// Checks that frames of other systems are reported as not from a PX4 or an ArduCopter.
+///
+/// Other systems are a ground station, a radio or a plane, none of which the companion can control.
 #[test]
 fn other_systems_are_distinguished_from_an_autopilot() {
     let ports = Ports::apart(1_000);

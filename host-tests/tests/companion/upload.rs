@@ -74,8 +74,9 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     }
 }
 
-/// Checks an upload from the receiver on one channel. A relay that restarts without an upload file receives the
-/// mission again.
+/// Checks that a relay that restarts without its upload file receives the uploaded mission again.
+///
+/// The mission was uploaded from the receiver, on one channel.
 #[test]
 fn a_relay_without_its_upload_is_offered_it_again() {
     let uploaded = simulated(&new(), 2);

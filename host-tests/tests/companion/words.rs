@@ -55,7 +55,9 @@ fn the_reason_why_a_port_cannot_be_opened_is_logged() {
     }
 }
 
-/// Checks the log line about refused frames, for two relays on one wire that differ in one option.
+/// Checks that a relay logs the reason for which it rejects a neighbour's frames, and logs it once.
+///
+/// The two relays on one wire differ in one option.
 #[test]
 fn reasons_of_rejected_frames_are_logged() {
     let files = Files::new();
@@ -95,8 +97,9 @@ fn upload_fails(files: &Files, tty: &str, key: &str, more: &str, why: &str) {
 
 const QUICK: &str = "--probe-after-ms 300 --dead-after-ms 900";
 
-/// Checks the likely reasons that a ground station on a wire gives for a failed upload. Relays do not answer
-/// strangers there, so that only the relays' logs have the true reason.
+/// Checks that a ground station on a wire names the likely reason for a failed upload.
+///
+/// It does not know the true reason: relays on a wire do not answer strangers, and only log why they reject frames.
 #[test]
 fn on_a_wire_the_ground_names_the_likely_cause() {
     let chain = Chain::with_ground(1, QUIET).with(QUICK);
@@ -130,8 +133,9 @@ fn on_a_wire_the_ground_names_the_likely_cause() {
     );
 }
 
-/// Checks the likely reasons that a ground station on a shared channel gives for a failed upload. It receives the
-/// frames of all relays there.
+/// Checks that a ground station on a shared channel names the likely reason for a failed upload.
+///
+/// It receives the frames of all relays there.
 #[test]
 fn on_a_channel_the_ground_names_the_likely_cause() {
     let chain = Chain::on_channel(2, Medium::new(3, QUIET)).with(QUICK);

@@ -70,7 +70,9 @@ fn upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf() {
     assert!(worst < 1e-12);
 }
 
-/// Checks the integral for Upsilon = E[1/I] against distributions with a known E[1/I].
+/// Checks that the integral for Upsilon = E[1/I] gives the known values of some distributions of I.
+///
+/// I is the interference power.
 #[test]
 fn the_integral_gives_known_values_of_distributions() {
     let constant = |level: f64| upsilon_by_mgf(move |t| (t * level).exp()).unwrap();

@@ -81,8 +81,9 @@ fn no_estimate_without_enough_samples_or_spread() {
     assert_eq!(scaled(0.8e-12), None);
 }
 
-/// Returns the estimate of Upsilon = E[1/I] from powers around `mean_w`. The largest permitted power, `I_max`, is
-/// 1e-6 W.
+/// Returns the estimate of Upsilon = E[1/I] from sampled interference powers I around `mean_w`, in W.
+///
+/// The largest permitted power, `I_max`, is 1e-6 W.
 fn scaled(mean_w: f32) -> Option<Estimate> {
     let mut estimator = Estimator::new(1e-6);
     for k in 0..1_000_u16 {
@@ -113,7 +114,7 @@ fn an_invalid_bound_accepts_no_sample() {
     }
 }
 
-/// Checks the estimate from two million samples around one value, where f32 sums would lose accuracy.
+/// Checks that an estimate from two million similar samples is accurate, unlike sums in f32.
 #[test]
 fn many_similar_samples_lose_no_precision() {
     let mut estimator = Estimator::new(1.0);

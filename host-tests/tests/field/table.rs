@@ -11,7 +11,10 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Table of the mean inverse interference Upsilon in a firmware, with one point from a closed form.
+/// Table of an interference field as in a firmware: positions x, each with Upsilon.
+///
+/// Upsilon = E[1/I], where I is the interference power. One point is computed by the closed form for a Beta
+/// distribution.
 const POINTS: [FieldPoint; 3] = [
     at(0.0, 4.0),
     match FieldPoint::from_beta(100.0, 2.0, 2.0, 1.5) {

@@ -31,8 +31,9 @@ fn the_stated_number_of_views_is_stored_before_an_erase() {
     assert_eq!(found(&mut start), Some(voted(7, 5, 1_000, true)));
 }
 
-/// Checks a power failure while a vote is recorded. The previous record stays valid, because the new vote was not
-/// sent.
+/// Checks that the previous record stays valid if the power fails while a vote is recorded.
+///
+/// That is right because the new vote was not sent yet.
 #[test]
 fn after_a_torn_record_the_previous_one_is_read() {
     for written in 1..WORDS + OVERHEAD {

@@ -155,7 +155,9 @@ fn the_fewest_in_a_field_are_those_of_a_grid_search() {
     assert!(same > 300 && none > 20 && fewer > 10 && largest > 30);
 }
 
-/// Checks the best target SIR of N identical relays against the closed form and Algorithm 4.
+/// Checks that the best target SIR of N identical relays is that of the closed form, or of Algorithm 4.
+///
+/// The closed form applies to a constant field.
 #[test]
 fn identical_relays_in_a_field_are_optimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));

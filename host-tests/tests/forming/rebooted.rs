@@ -35,8 +35,9 @@ fn a_rebooted_leader_is_answered_for_any_seed() {
     }
 }
 
-/// Checks that a relay that reboots during the leader's second pass gets a position by a new view. The view is a new
-/// agreement on the members of the chain.
+/// Checks that a relay that reboots during the leader's second round of messages gets a position.
+///
+/// It gets the position by a new view, which is a new agreement on the members of the chain.
 #[test]
 fn a_relay_rebooted_in_a_pass_gets_a_position_in_a_new_view() {
     let settings = Settings {

@@ -18,7 +18,7 @@ use uav_relay_fuzz::{TARGETS, setting};
 
 use super::folder;
 
-/// Number of recorded frames of a simulated flight: a few passes of every kind of message.
+/// Number of recorded frames of a simulated flight: several of every kind of message along the chain.
 const FRAMES: usize = 24;
 
 const MOST_WAKES: u8 = 64;
@@ -202,7 +202,7 @@ fn refused() -> Vec<u8> {
     [&head[..], &other, &bare].concat()
 }
 
-/// Returns an input: the second of four relays receives its leader's first pass twice.
+/// Returns an input: the second of four relays receives its leader's first sweep message twice.
 fn again() -> Vec<u8> {
     let head = [0, 3, 0, 1, 0, 0, 0, 0, 0, 1, 0];
     let pass = [9, 192, 0, 250, 64, 0, 0, 0];

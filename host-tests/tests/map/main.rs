@@ -122,7 +122,7 @@ fn without_a_geoid_no_height_is_written() {
     assert_eq!(found["geojson_dimensions"], json!([2]));
 }
 
-/// Checks a line across the antimeridian: the hop in its middle is cut in two there.
+/// Checks that a chain across the antimeridian is drawn with its middle hop cut in two.
 #[test]
 fn a_line_across_the_antimeridian_is_cut() {
     let text = "[geometry]\naltitude_m = 30\naltitude_max_m = 90\nlateral_min_m = -200\nlateral_max_m = 200\n\

@@ -27,8 +27,9 @@ fn settles(setup: &Setup, left: &[u16], name: &str) -> Outcome {
     outcome
 }
 
-/// Compares the positions of the relays `left` with those of a chain of only these relays. Returns the difference as
-/// an error.
+/// Checks that the relays `left` have the positions of a chain of only these relays.
+///
+/// Returns the difference as an error.
 fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {
     ledger::judge(setup, outcome, left, 0, *setup.mission.config())
 }

@@ -40,7 +40,9 @@ pub(crate) struct Ledger {
     pub(crate) pass: Option<u16>,
     /// Number of the last pass (round of messages along the chain) of the relay before each of its reboots.
     pub(crate) passes_before: Vec<u16>,
-    /// Largest Upsilon = E[1/I] that the relay has measured, also before its reboots, 1/W.
+    /// Largest Upsilon = E[1/I] (I is the interference power) that the relay has ever measured, 1/W.
+    ///
+    /// Measurements from before its reboots count, too.
     pub(crate) measured_per_w: Option<f64>,
     /// Epoch of the relay since its last start: at least 1, increasing, different for all relays.
     pub(crate) epoch: u32,
@@ -68,7 +70,7 @@ pub(crate) struct Turn<'a> {
     pub(crate) relay: &'a Relay,
     pub(crate) sent: u32,
     pub(crate) events: &'a [Event],
-    /// Largest Upsilon = E[1/I] that any relay has measured, 1/W.
+    /// Largest Upsilon = E[1/I] (I is the interference power) that any relay has measured, 1/W.
     pub(crate) measured_per_w: Option<f64>,
 }
 

@@ -51,10 +51,10 @@ pub(crate) enum Operation {
     Measure(u8, u8),
 }
 
-/// Difference of seeds that raises the number of a leader's first pass by 64, the least possible.
+/// Difference of a leader's random seeds that raises its first message number by 64, the least step.
 const NEXT_LIFE: u32 = 54_336;
 
-/// Draws a relay's seed: any, or one with pass numbers close to those before a leader's reboot.
+/// Draws a relay's random seed, sometimes one with which a rebooted leader repeats recent numbers.
 pub(crate) fn seeds() -> impl Strategy<Value = u32> {
     prop_oneof![any::<u32>(), (0..4_u32).prop_map(|life| life * NEXT_LIFE)]
 }

@@ -24,8 +24,9 @@ const FIRST: u16 = 64;
 /// numbers.
 const NEAR: u16 = 32;
 
-/// Returns what a membership view adds to the digest in its passes. It is the lower half plus the byte-swapped upper
-/// half.
+/// Returns what a membership view adds to the mission digest in its messages along the chain.
+///
+/// It is the lower half of the view's 32-bit name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

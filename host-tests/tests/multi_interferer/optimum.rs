@@ -147,8 +147,9 @@ fn crowded_and_long_chains_are_placed() {
     assert!(found.sir > 40.0, "more than a hundred relays reach");
 }
 
-/// Checks the best common altitudes of the paper's scenario against known values. The interferer is at y = 150 m,
-/// altitudes are 20 m to 300 m, and the separation is 4 m.
+/// Checks that the best common altitudes of the paper's scenario are those of known values.
+///
+/// The interferer is at y = 150 m, altitudes are 20 m to 300 m, and the separation is 4 m.
 #[test]
 fn known_best_common_altitudes_are_found() {
     for (n, sir, altitude_m) in [

@@ -15,7 +15,7 @@ fn close(ours: f64, theirs: f64, what: &str) {
     );
 }
 
-/// Checks the cases of one hop in the paper's errata and in the public reference.
+/// Checks the farthest position of a hop against the paper's errata and a public reference.
 #[test]
 fn reference_cases_of_one_hop_hold() {
     let mut checked = 0;

@@ -205,7 +205,7 @@ fn over_the_judge(number: u32, optimum: f64) -> f64 {
     joint::sir(&link, &places).unwrap() / optimum
 }
 
-/// Compares plans for forty scenarios of up to 30 relays with their stored optima.
+/// Checks that plans for forty scenarios of up to 30 relays come near the stored optima.
 ///
 /// `COUNT=2000` runs all scenarios, with up to 100 relays. No plan reaches less than 0.98 of the optimum, and these are short
 /// of it by more than a thousandth:

@@ -71,8 +71,10 @@ fn with_wrong(wild: &RandomScene, node: u16, says: BrokenReading) -> Outcome {
     run(wrong).unwrap()
 }
 
-/// Checks how much SIR each kind of wrong sensor costs, and which sensors are reported as wrong. `sound` has the
-/// fractions of the optimum without faults; `node` gives the node with the wrong sensor.
+/// Checks that no kind of wrong sensor costs much SIR, and that the right sensor is reported as wrong.
+///
+/// `node` gives the node with the wrong sensor for each scene. `sound` has the fraction of the optimum SIR that each
+/// scene reaches without faults.
 fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
     for (what, says) in KINDS {
         let one = |seed: usize| {

@@ -77,8 +77,9 @@ fn without_lateral_range_there_is_one_view() {
     assert!(all(&document, "line", "edge").is_empty());
 }
 
-/// Checks the view from above of an interferer beside a straight chain. In a side view it would seem to be below the
-/// chain.
+/// Checks that the view from above shows an interferer beside a straight chain.
+///
+/// A side view would show it below the chain.
 #[test]
 fn the_view_from_above_shows_an_interferer_at_its_offset() {
     let (mission, _) = mission::mission(&Scenario::default(), 8, 1e-4).unwrap();

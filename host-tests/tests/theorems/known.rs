@@ -100,7 +100,9 @@ fn the_reference_cases_hold() {
     }
 }
 
-/// Checks scenes in which the printed Theorem 3 is wrong, and degenerate positions of the interferer.
+/// Checks that the best position is found where the printed Theorem 3 is wrong.
+///
+/// Degenerate positions of the interferer are checked, too.
 #[test]
 fn counterexamples_and_degenerate_places() {
     let link = |d: f64, x_i: f64, y_i: f64, tx_w: f64, power_w: f64, kappa: f64| Link {

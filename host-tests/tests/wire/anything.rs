@@ -19,7 +19,9 @@ use super::message::{WireMessage, plain_of};
 use super::strategies::messages;
 use super::votes::mark;
 
-/// Sets the pass number and the mission digest of a message, in messages that have them.
+/// Sets the number and the mission digest of a message, in messages that have them.
+///
+/// The number counts the rounds of messages along the chain.
 fn renamed(message: &WireMessage, number: u16, mission: u16) -> WireMessage {
     // The view of that number proposed by relay 1; proposed numbers are above 0.
     let view = u32::from(number.max(1)) << 10 | 1;

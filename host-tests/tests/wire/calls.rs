@@ -7,8 +7,9 @@ use super::bench::Bench;
 use super::kinds::{FIRST, beat, one_of_each};
 use super::votes::*;
 
-/// Checks a relay in the middle of a group without a quorum. It forwards the refusing decision, has no setpoint, and
-/// requests no further membership view.
+/// Checks that a relay without a quorum has no setpoint and requests no further membership view.
+///
+/// The relay is in the middle of its group, and forwards the decision that refuses the view.
 #[test]
 fn a_part_without_quorum_stops_requesting_views() {
     let mut bench = Bench::new(4, 8, Wiring::Pair);

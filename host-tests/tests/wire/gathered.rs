@@ -123,8 +123,9 @@ fn a_full_roster_is_continued_by_the_next_pass() {
     assert_eq!(bench.receive(UP, &next), [(DOWN, own)]);
 }
 
-/// Checks that a relay that does not know the collected profiles refuses a pass and requests a view. Such a relay has
-/// missed a collection, for example by a reboot.
+/// Checks that a relay that has missed the collection of profiles refuses a sweep that needs them.
+///
+/// It requests a new view then. A relay misses a collection, for example, by a reboot.
 #[test]
 fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
     let fresh = fourth(false);

@@ -54,7 +54,9 @@ proptest! {
         prop_assert_eq!(message.encode(&mut body), None);
     }
 
-    /// Checks the lengths of the longest messages. An offer fills a frame except for the tag.
+    /// Checks that the longest messages have the documented lengths.
+    ///
+    /// An offer fills a frame except for the tag.
     #[test]
     fn the_longest_messages_have_the_documented_lengths(
         offer in kinds(&["Offer"]),

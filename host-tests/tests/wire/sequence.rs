@@ -133,9 +133,10 @@ fn a_token_is_forwarded_and_its_result_returned() {
     assert_eq!(bench.counted(), ["received"]);
 }
 
-/// Checks that messages that the relay does not await are stale. These are answers to another pass or of another
-/// kind, and passes that are over. Tokens (messages of Algorithm 2) are stale without a position, in a field, or
-/// beyond Rx.
+/// Checks that messages that the relay does not await are stale.
+///
+/// These are answers to another message or of another kind, and messages of rounds along the chain that are over.
+/// Tokens (messages of Algorithm 2) are stale without a position, in a field, or beyond Rx.
 #[test]
 fn unexpected_or_unfit_messages_are_stale() {
     for config in missions() {
@@ -166,7 +167,9 @@ fn unexpected_or_unfit_messages_are_stale() {
     }
 }
 
-/// Checks a pass in a field by which the sender would have to be beyond Rx: no target SIR can be met.
+/// Checks that a sweep message in a field loses the targets that need its sender beyond Rx.
+///
+/// The message lists the position that its sender needs for each target SIR. Here the relay forwards an empty list.
 #[test]
 fn a_reach_beyond_rx_leaves_no_feasible_target() {
     let (mut bench, from, to) = relay_4(mission(Interference::Field(FIELD)));

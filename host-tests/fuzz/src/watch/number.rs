@@ -2,7 +2,9 @@
 
 use uav_relay::wire::message::Message;
 
-/// Returns the pass number of a message; `None` for messages without one, as those of leases.
+/// Returns the number of a message's pass, which is a round of messages along the chain.
+///
+/// `None` for a message without such a number, as those of leases.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,

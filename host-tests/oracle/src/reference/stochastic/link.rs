@@ -17,7 +17,8 @@ pub struct StochasticLink {
     pub eta: f64,
     /// Table of the interference field: strictly rising positions x, m, each with Upsilon, 1/W.
     ///
-    /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant beyond the first and the last one.
+    /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant
+    /// beyond the first and the last one.
     pub upsilon: Vec<(f64, f64)>,
     /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,
