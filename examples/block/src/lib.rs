@@ -196,7 +196,7 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
         return Err(ConfigError::Method);
     }
     let is_one_way = !(mission.config().reverse > 0.0);
-    if !(is_one_way || method == Method::Align && listen.is_none()) {
+    if !(is_one_way || method != Method::Joint && listen.is_none()) {
         return Err(ConfigError::Reverse);
     }
     Ok(Config {

@@ -82,10 +82,6 @@ fn methods_for_one_direction_are_refused() {
             ..Settings::default()
         },
         Settings {
-            method: Method::Adjust(uav_relay::Adjust::default()),
-            ..Settings::default()
-        },
-        Settings {
             listen: Some(Listen::default()),
             ..Settings::default()
         },

@@ -132,6 +132,7 @@ pub(crate) fn message(said: &Said) -> Message {
             place: of.place(),
             position_changed: of.flag("position_changed", 0),
             worst_sir: of.real("worst_sir"),
+            power_w: of.real("power_w"),
         }),
         "Hello" => Message::Hello(hello(&of)),
         "Proposal" | "Decision" => vote(said.name(), &of),
