@@ -50,7 +50,7 @@ pub struct MissionConfig {
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
     /// SIR that a hop needs on the way back from Rx to Tx, relative to that on the way there (r): 0 to 1. 0 is the paper, with one
-    /// direction; otherwise the worse of SIR and backward SIR / r counts. Above 0 it needs a known interferer.
+    /// direction; otherwise the worse of SIR and backward SIR / r counts. Above 0 it needs a known interferer or a field.
     pub reverse: f32,
     /// Transmit power of the ground receiver on the way back, W: 1e-6 to 1e6. Without effect if `reverse` is 0.
     pub rx_power_w: f32,
@@ -82,7 +82,7 @@ impl MissionConfig {
         if self.reverse > 0.0 && !cfg!(feature = "reverse") {
             return Err(MissionError::ReverseFeature);
         }
-        if self.reverse > 0.0 && !matches!(self.interference, Interference::Source(_)) {
+        if self.reverse > 0.0 && matches!(self.interference, Interference::Unknown) {
             return Err(MissionError::ReverseInterference);
         }
         Ok(())
@@ -122,7 +122,7 @@ pub enum MissionError {
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
-    /// `reverse` is above 0, and the interference is a field or an unknown interferer.
+    /// `reverse` is above 0, and the interferer is unknown.
     ReverseInterference,
     /// `reverse` is above 0, and the crate was built without its feature `reverse`.
     ReverseFeature,
@@ -158,7 +158,7 @@ impl core::fmt::Display for MissionError {
             Self::Field => "a field of interference needs the feature `field`",
             Self::Reverse => "reverse must be within 0 to 1",
             Self::ReverseInterference => {
-                "a reverse above 0 needs a known interferer: no field of interference, and none that relays locate"
+                "a reverse above 0 needs a known interferer or a field of interference: none that relays locate"
             }
             Self::ReverseFeature => "a reverse above 0 needs the feature `reverse`",
             Self::RxPower => "rx_power_w must be within 1e-6 to 1e6",

@@ -18,7 +18,7 @@ use crate::{Interference, Scenario, Source};
 pub enum Refusal {
     /// No single hypothetical interferer can replace the scenario's interferers.
     NoHypothetical,
-    /// Several interferers and a way back: the hypothetical interferer is fitted to one direction.
+    /// A plan for several interferers and a way back: their sum is searched for one direction.
     ReverseSources,
     /// The relays do not fit on the distance with their least separation.
     NoRoom {
@@ -44,7 +44,7 @@ impl fmt::Display for Refusal {
                 f.write_str("no single interferer has the same effect as these [[interferer]]")
             }
             Self::ReverseSources => f.write_str(
-                "link.reverse above 0 needs one [[interferer]]: one that replaces several is fitted for one direction",
+                "link.reverse above 0 needs one [[interferer]]: several are planned for one direction; cargo chain flies both, with one that replaces them",
             ),
             Self::NoRoom {
                 relays,
@@ -81,8 +81,6 @@ pub fn mission(
         Interference::Sources(sources) => {
             let one = if let [source] = sources.as_slice() {
                 interferer(source)
-            } else if scenario.reverse > 0.0 {
-                return Err(Refusal::ReverseSources);
             } else {
                 let one = hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
                 interferer(&one.source())

@@ -1,10 +1,12 @@
 //! Both directions of a chain: relays placed for the way there and the way back.
 
+mod field;
 mod flown;
 mod judge;
 mod placed;
 mod refused;
 mod scenes;
+mod several;
 mod shares;
 mod turns;
 mod unchanged;
