@@ -168,6 +168,8 @@ local messages = {
         { name = "lateral_min_m", kind = "f32", unit = "m", text = "least y" },
         { name = "lateral_max_m", kind = "f32", unit = "m", text = "greatest y" },
         { name = "noise_w", kind = "f32", unit = "W", text = "noise power at every receiver; 0 for none" },
+        { name = "reverse", kind = "f32", unit = "", text = "r, the relative SIR of the way back; 0 for one direction" },
+        { name = "rx_power_w", kind = "f32", unit = "W", text = "power of Rx on the way back" },
         { name = "tx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Tx, positive north", per = 10000000, base = "degrees" },
         { name = "tx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Tx, positive east", per = 10000000, base = "degrees" },
         { name = "tx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Tx above mean sea level" },

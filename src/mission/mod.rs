@@ -50,7 +50,7 @@ pub struct MissionConfig {
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
     /// SIR that a hop needs on the way back from Rx to Tx, relative to that on the way there (r): 0 to 1. 0 is the paper, with one
-    /// direction; otherwise the worse of SIR and backward SIR / r counts. Above 0 it needs a known interferer or a field.
+    /// direction; otherwise the worse of SIR and backward SIR / r counts, as soon as the interference is known.
     pub reverse: f32,
     /// Transmit power of the ground receiver on the way back, W: 1e-6 to 1e6. Without effect if `reverse` is 0.
     pub rx_power_w: f32,
@@ -81,9 +81,6 @@ impl MissionConfig {
         }
         if self.reverse > 0.0 && !cfg!(feature = "reverse") {
             return Err(MissionError::ReverseFeature);
-        }
-        if self.reverse > 0.0 && matches!(self.interference, Interference::Unknown) {
-            return Err(MissionError::ReverseInterference);
         }
         Ok(())
     }
@@ -122,8 +119,6 @@ pub enum MissionError {
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
-    /// `reverse` is above 0, and the interferer is unknown.
-    ReverseInterference,
     /// `reverse` is above 0, and the crate was built without its feature `reverse`.
     ReverseFeature,
     /// `rx_power_w` is not within 1e-6 to 1e6.
@@ -157,9 +152,6 @@ impl core::fmt::Display for MissionError {
             Self::NoiseFeature => "a noise_w above 0 needs the feature `noise`",
             Self::Field => "a field of interference needs the feature `field`",
             Self::Reverse => "reverse must be within 0 to 1",
-            Self::ReverseInterference => {
-                "a reverse above 0 needs a known interferer or a field of interference: none that relays locate"
-            }
             Self::ReverseFeature => "a reverse above 0 needs the feature `reverse`",
             Self::RxPower => "rx_power_w must be within 1e-6 to 1e6",
             Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
@@ -586,9 +578,10 @@ impl Mission {
 
     /// r: the SIR that a hop needs on the way back, relative to that on the way there. 0 for one direction.
     ///
-    /// A constant without the feature `reverse`, so that the compiler drops what is for two directions.
+    /// A constant without the feature `reverse`, so that the compiler drops what is for two directions. 0 while the interferer is
+    /// unknown: relays then spread evenly.
     pub const fn reverse(&self) -> f32 {
-        if cfg!(feature = "reverse") {
+        if cfg!(feature = "reverse") && !matches!(self.config.interference, Interference::Unknown) {
             self.config.reverse
         } else {
             0.0

@@ -70,7 +70,7 @@ pub struct Hops {
     after: HopEnd,
     /// Gain A of the node before.
     gain: f32,
-    /// Gain of the relay times the inverse interference at the node after by [`crate::sir::quiet`], or K of the hop to Rx, m^2.
+    /// Gain of the relay times the inverse interference at the node after, or K of the hop to Rx, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
@@ -81,7 +81,7 @@ pub struct Hops {
 /// Way back over both hops; infinite gains without one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// Gain of the relay times the inverse interference at the node before, over r; `K_tx` / r of the hop to Tx, m^2.
+    /// Gain of the relay times the inverse interference at the node before, over r, m^2. `K_tx` / r to Tx.
     returned: f32,
     /// Gain A' of the node after, over r.
     gain: f32,

@@ -64,7 +64,7 @@ pub struct Retreat<'a> {
     /// Smallest x of the sender, m.
     end_m: f32,
     to_rx: bool,
-    /// Gain A' / Upsilon of the receiver's power on the way back, and the interference at the sender; `None` for one direction.
+    /// Gain A' / Upsilon on the way back, and interference at the sender; `None` for one direction.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
@@ -89,7 +89,9 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns this hop for a mission with a way back. The receiver sends with `power_w`, or is Rx; the sender measured `measured_per_w`.
+    /// Returns this hop for a mission with a way back.
+    ///
+    /// The receiver sends with `power_w`, or is Rx if that is `None`. The sender has measured `measured_per_w`.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,
@@ -148,7 +150,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the x closest to Tx, `place` or more, at which the sender hears the receiver at `from_m` on the way back.
+    /// Returns the first x from `place` on at which the sender hears the receiver at `from_m`.
     ///
     /// `c` is A' / gamma without Upsilon. At most one root for each field point in between.
     #[inline(never)] // keeps a sweep of one direction small

@@ -39,8 +39,6 @@ pub enum UploadError {
     Relays,
     /// The base or the new mission is in a field.
     Field,
-    /// `reverse` of the base or of the new mission is above 0.
-    Reverse,
     /// A parameter is outside its range.
     Mission(MissionError),
     /// The upload is for relays with another base.
@@ -64,9 +62,6 @@ impl core::fmt::Display for UploadError {
             }
             Self::Field => {
                 "an upload, and the mission it replaces, must have one interferer and no field"
-            }
-            Self::Reverse => {
-                "an upload, and the mission it replaces, must have a reverse of 0: relays are loaded with a way back before flight"
             }
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",
@@ -92,19 +87,11 @@ impl Upload {
         if base.field().is_some() {
             return Err(UploadError::Field);
         }
-        if base.config().reverse > 0.0 {
-            return Err(UploadError::Reverse);
-        }
         if config.relays != base.relays() {
             return Err(UploadError::Relays);
         }
         let channel = config.channel.ordered();
-        let config = MissionConfig {
-            channel,
-            // Without effect, and not part of the bytes.
-            rx_power_w: config.tx_power_w,
-            ..config
-        };
+        let config = MissionConfig { channel, ..config };
         Self::checked(version, digest(base), config, None)
     }
 
@@ -137,9 +124,6 @@ impl Upload {
             return Err(UploadError::Field);
         }
         Mission::try_new(config).map_err(UploadError::Mission)?;
-        if config.reverse > 0.0 {
-            return Err(UploadError::Reverse);
-        }
         Ok(Self {
             version,
             base,

@@ -1,6 +1,6 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Bytes stored per piece. The longest frame has 137; a longer piece is noise, and only its start is kept.
+/// Bytes stored per piece. The longest frame has 145; a longer piece is noise, and only its start is kept.
 pub const MOST: usize = 1_024;
 
 /// Bytes between two delimiters, including the final one.

@@ -46,7 +46,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unended => f.write_str("it has no delimiter at its end"),
-            Self::Oversized(len) => write!(f, "too long: {len} bytes, a frame has at most 137"),
+            Self::Oversized(len) => write!(f, "too long: {len} bytes, a frame has at most 145"),
             Self::Truncated => f.write_str("cut short: the delimiter comes inside a COBS run"),
             Self::Short(len) => write!(f, "too short: {len} bytes without COBS"),
             Self::Crc(has, is) => write!(f, "CRC {has:08x}, but its bytes give {is:08x}"),

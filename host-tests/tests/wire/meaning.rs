@@ -299,6 +299,8 @@ fn upload(said: &Said, of: &Of<'_>) -> Upload {
         ("tx_power_w", config.tx_power_w),
         ("tolerance", config.tolerance),
         ("noise_w", config.noise_w),
+        ("reverse", config.reverse),
+        ("rx_power_w", config.rx_power_w),
     ];
     for (name, number) in numbers {
         assert_eq!(number, of.real(name), "{name}");

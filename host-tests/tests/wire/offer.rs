@@ -15,14 +15,15 @@ pub(crate) const SITES: [&str; 6] = [
     "rx_amsl_mm",
 ];
 
-/// Offsets in the body: number of relays, noise, and sites.
+/// Offsets in the body: number of relays, noise, way back, and sites.
 const RELAYS: usize = 5;
 const NOISE: usize = 83;
-const SITES_AT: usize = 87;
+const BACK: usize = 87;
+const SITES_AT: usize = 95;
 
 /// Length of the body, and of the part stored across a reboot, without the answered hello.
-pub(crate) const BYTES: usize = 113;
-pub(crate) const KEPT: usize = 111;
+pub(crate) const BYTES: usize = 121;
+pub(crate) const KEPT: usize = 119;
 
 /// Returns an offer that eight relays loaded with `base` can fly.
 pub(crate) fn upload(version: u16, base: u16) -> Said {
@@ -32,7 +33,7 @@ pub(crate) fn upload(version: u16, base: u16) -> Said {
         "interferer_power_w": 62.5, "interferer_x_m": 600.0, "interferer_y_m": -250.5, "tolerance": 1e-4,
         "mu_los": 7000.0, "mu_nlos": 900_000.5, "eta": 7000.25,
         "altitude_min_m": 20.0, "altitude_max_m": 300.0, "lateral_min_m": -60.0, "lateral_max_m": 40.5,
-        "noise_w": 0.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
+        "noise_w": 0.0, "reverse": 0.0, "rx_power_w": 80.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
         "rx_lat_e7": 0, "rx_lon_e7": 0, "rx_amsl_mm": 0, "offer_number": 0,
     });
     Said::new("Offer", &fields)
@@ -51,13 +52,16 @@ pub(crate) fn kept(offer: &Said) -> Vec<u8> {
 
 /// Returns the mission's digest and version. The digest is a CRC-32C of the mission, and of that with the sites, if any.
 pub(crate) fn mission_id(offer: &Said) -> (u16, u16) {
-    // Zero noise is left out.
-    let end = if offer.number("noise_w") > 0.0 {
-        SITES_AT
-    } else {
-        NOISE
-    };
-    let digest = between(offer, low_half(&offer.body()[RELAYS..end]));
+    let body = offer.body();
+    let mut covered = body[RELAYS..NOISE].to_vec();
+    // Noise and a relative SIR of 0 are left out.
+    if offer.number("noise_w") > 0.0 {
+        covered.extend(&body[NOISE..BACK]);
+    }
+    if offer.number("reverse") > 0.0 {
+        covered.extend(&body[BACK..SITES_AT]);
+    }
+    let digest = between(offer, low_half(&covered));
     (digest, offer.number("version") as u16)
 }
 

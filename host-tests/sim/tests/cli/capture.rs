@@ -115,7 +115,7 @@ fn uploads_of_either_end_are_in_the_capture() {
         let (_, frames) = captured(&format!("{arguments} {wire}"));
         let offers = frames
             .iter()
-            .filter(|frame| frame.interface == name && frame.bytes.len() == 137);
+            .filter(|frame| frame.interface == name && frame.bytes.len() == 145);
         assert!(offers.count() > 0, "{end} {wire:?}");
     }
 }
