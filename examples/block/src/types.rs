@@ -151,7 +151,7 @@ pub enum ConfigError {
     Measure,
     /// Sensing settings out of range, or together with a field.
     Listen,
-    /// A way back together with the joint method or with sensing.
+    /// A way back together with the joint method.
     Reverse,
     /// Interferer is not 0 in a block with a field.
     Interferer,

@@ -190,7 +190,7 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Reverse => {
-            error!("configuration refused: a way back needs align or adjust, and no listen");
+            error!("configuration refused: a way back needs align or adjust");
         }
         ConfigError::Interferer => {
             error!("configuration refused: it has both an interferer and a field");

@@ -52,6 +52,8 @@ pub struct Scene {
     pub tx_w: f64,
     /// Transmit power of Rx on the way back, W, > 0.
     pub rx_w: f64,
+    /// SIR needed on the way back, relative to that on the way there; 0 for one direction.
+    pub reverse: f64,
     /// Interferers; at least one.
     pub sources: Vec<Source>,
     /// Path-loss factor between two relays, 1/m^2, > 0.
@@ -119,6 +121,7 @@ impl Scene {
             min_separation_m: scenario.min_separation_m,
             tx_w: scenario.tx_w,
             rx_w: scenario.rx_w,
+            reverse: scenario.reverse,
             sources: sources.clone(),
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
@@ -204,9 +207,16 @@ impl Scene {
     }
 
     /// Returns the SIR (linear) of the worst hop; 0 if [`Scene::hop_sirs`] is empty.
+    ///
+    /// With a way back it is that of the worse direction, the way back divided by `reverse`.
     pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
-        sirs.reduce(f64::min).unwrap_or(0.0)
+        let there = sirs.reduce(f64::min).unwrap_or(0.0);
+        if !(self.reverse > 0.0) {
+            return there;
+        }
+        let back = self.hop_sirs_back(places).into_iter();
+        back.fold(there, |worst, sir| worst.min(sir / self.reverse))
     }
 
     /// Returns the SIR (linear) of the worst hop. Relays are at `along`, m from Tx, at their own altitudes above the line.

@@ -6,6 +6,7 @@ mod judge;
 mod placed;
 mod refused;
 mod scenes;
+mod sensing;
 mod several;
 mod shares;
 mod turns;
