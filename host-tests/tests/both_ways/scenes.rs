@@ -105,7 +105,7 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
 /// Draws a scene in a field: even, random within a factor, or that of some interferers.
 pub(crate) fn in_field(rng: &mut impl Rng, ends: [f64; 2], reverse: f64, kind: usize) -> Chain {
     let mut chain = usual(rng, ends, reverse);
-    let points = [1, rng.random_range(2..=9), 41][kind];
+    let points: usize = [1, rng.random_range(2..=9), 41][kind];
     let sources: Vec<[f64; 3]> = (0..rng.random_range(1..=3))
         .map(|_| {
             [

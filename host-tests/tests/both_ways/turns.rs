@@ -18,6 +18,9 @@ use super::shares::Shares;
 /// Position along the line and altitude, m.
 type Place = [f64; 2];
 
+/// Rounds of turns of a flown chain.
+const ROUNDS: u16 = 6;
+
 /// Grid points along x and in altitude.
 const GRID: [usize; 2] = [240, 25];
 
@@ -250,7 +253,6 @@ fn flown_turns_gain_what_turns_by_a_dense_grid_gain() {
                 .collect();
             (outcome, places)
         };
-        const ROUNDS: u16 = 6;
         let (outcome, ours) = flown(chain.reverse, ROUNDS);
         let reached = value(&chain, &ours);
         let promised = f64::from(*outcome.rounds.last().unwrap());
