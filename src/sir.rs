@@ -129,12 +129,16 @@ pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     reason = "a float that fits by the ranges of the mission"
 )]
 pub(crate) fn transmitter_gain(mission: &Mission, power_w: f32) -> f32 {
-    let (config, Some(interferer)) = (mission.config(), mission.known_source()) else {
+    let config = mission.config();
+    let (eta, mu_nlos) = (config.channel.eta(), config.channel.mu_nlos());
+    if let Some(field) = mission.heard() {
+        return (f64::from(power_w) * f64::from(field.upsilon(0.0)) / eta) as f32;
+    }
+    let Some(interferer) = mission.known_source() else {
         return 0.0;
     };
     let (x, y) = (f64::from(interferer.x_m), f64::from(interferer.y_m));
     let squared = x * x + y * y;
-    let (eta, mu_nlos) = (config.channel.eta(), config.channel.mu_nlos());
     // P / mu_nlos / squared + N, times squared.
     let heard = f64::from(interferer.power_w) / mu_nlos + f64::from(config.noise_w) * squared;
     (f64::from(power_w) * squared / (eta * heard)) as f32

@@ -6,7 +6,7 @@
 local messages = {
     [0x00] = { name = "Sweep", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "anchor", kind = "f32", unit = "linear SIR", text = "anchor of the ladder; negative for a plain pass" },
         { name = "gap", kind = "u8", unit = "", text = "gap code of the ladder" },
         { name = "growth", kind = "u8", unit = "", text = "growth code of the ladder" },
@@ -16,7 +16,7 @@ local messages = {
     } },
     [0x01] = { name = "Verdict", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the sweep" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "own", kind = "bool", unit = "", text = "true if the sender or a relay after it has a profile of its own: another power than the mission's common one, or a fixed altitude where relays choose theirs" },
         { name = "commit", kind = "option", of = { kind = "u8" }, unit = "", text = "index of the target for which every relay now takes its position" },
         { name = "slack_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m", text = "slack of target 0, 1, ...: distance by which the chain overshoots Rx, in a field Tx" },
@@ -32,7 +32,7 @@ local messages = {
     } },
     [0x04] = { name = "Measured", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "anchor", kind = "f32", unit = "linear SIR", text = "anchor of the ladder; negative for a plain pass" },
         { name = "gap", kind = "u8", unit = "", text = "gap code of the ladder" },
         { name = "growth", kind = "u8", unit = "", text = "growth code of the ladder" },
@@ -43,7 +43,7 @@ local messages = {
     } },
     [0x05] = { name = "Aside", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "anchor", kind = "f32", unit = "linear SIR", text = "anchor of the ladder; negative for a plain pass" },
         { name = "gap", kind = "u8", unit = "", text = "gap code of the ladder" },
         { name = "growth", kind = "u8", unit = "", text = "growth code of the ladder" },
@@ -54,7 +54,7 @@ local messages = {
     } },
     [0x06] = { name = "Gather", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "after", kind = "u16", unit = "", text = "index of the last relay in earlier passes; 0 in the first pass" },
         { name = "seats", kind = "list", most = 8, of = { kind = "group", fields = {
             { name = "relay", kind = "u16", unit = "", text = "index of the relay in the view, 1 next to Tx" },
@@ -64,7 +64,7 @@ local messages = {
     } },
     [0x07] = { name = "Gathered", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "after", kind = "u16", unit = "", text = "index of the last relay in earlier passes; 0 in the first pass" },
         { name = "seats", kind = "list", most = 8, of = { kind = "group", fields = {
             { name = "relay", kind = "u16", unit = "", text = "index of the relay in the view, 1 next to Tx" },
@@ -74,7 +74,7 @@ local messages = {
     } },
     [0x08] = { name = "Token", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "x_m", kind = "f32", unit = "m from Tx", text = "current x of the sender" },
         { name = "altitude_m", kind = "f32", unit = "m", text = "current altitude of the sender" },
         { name = "power_w", kind = "f32", unit = "W", text = "transmit power of the sender" },
@@ -86,11 +86,12 @@ local messages = {
     } },
     [0x09] = { name = "Moved", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "x_m", kind = "f32", unit = "m from Tx", text = "current x of the sender" },
         { name = "altitude_m", kind = "f32", unit = "m", text = "current altitude of the sender" },
         { name = "position_changed", kind = "bool", unit = "", text = "true if the sender or any relay after it has moved" },
         { name = "worst_sir", kind = "f32", unit = "linear SIR", text = "SIR of the worst hop after the sender" },
+        { name = "power_w", kind = "f32", unit = "W", text = "transmit power of the sender" },
     } },
     [0x0a] = { name = "Hello", fields = {
         { name = "mission", kind = "digest", unit = "", text = "digest of the sender's mission as loaded before flight" },
@@ -167,6 +168,8 @@ local messages = {
         { name = "lateral_min_m", kind = "f32", unit = "m", text = "least y" },
         { name = "lateral_max_m", kind = "f32", unit = "m", text = "greatest y" },
         { name = "noise_w", kind = "f32", unit = "W", text = "noise power at every receiver; 0 for none" },
+        { name = "reverse", kind = "f32", unit = "", text = "r, the relative SIR of the way back; 0 for one direction" },
+        { name = "rx_power_w", kind = "f32", unit = "W", text = "power of Rx on the way back" },
         { name = "tx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Tx, positive north", per = 10000000, base = "degrees" },
         { name = "tx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Tx, positive east", per = 10000000, base = "degrees" },
         { name = "tx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Tx above mean sea level" },
@@ -177,17 +180,17 @@ local messages = {
     } },
     [0x0f] = { name = "Pulse", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "lease_ds", kind = "u16", unit = "0.1 s", text = "duration of the lease after a member has taken part in a renewal", per = 10, base = "s" },
     } },
     [0x10] = { name = "Pulsed", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed: it has reached the last relay, and the acknowledgement has come back from there" },
     } },
     [0x11] = { name = "Sense", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "estimate_number", kind = "u16", unit = "", text = "number of the estimate, which the leader increments, wrapping" },
         { name = "estimate", kind = "words", words = { [0] = "that of the mission", [1] = "none, the relays spread evenly", [2] = "none, the first hop half as long as the others", [3] = "none, the last hop half as long as the others", [4] = "one source" }, unit = "", text = "estimate: 0 that of the mission; 1 none, the relays spread evenly; 2 none, the first hop half as long as the others; 3 none, the last hop half as long as the others; 4 one source" },
         { name = "source_power_w", kind = "f32", unit = "W", text = "power of the source" },
@@ -206,7 +209,7 @@ local messages = {
     } },
     [0x12] = { name = "Sensed", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
-        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view, see Views" },
+        { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "estimate_number", kind = "u16", unit = "", text = "number of the estimate, which the leader increments, wrapping" },
         { name = "estimate", kind = "words", words = { [0] = "that of the mission", [1] = "none, the relays spread evenly", [2] = "none, the first hop half as long as the others", [3] = "none, the last hop half as long as the others", [4] = "one source" }, unit = "", text = "estimate: 0 that of the mission; 1 none, the relays spread evenly; 2 none, the first hop half as long as the others; 3 none, the last hop half as long as the others; 4 one source" },
         { name = "source_power_w", kind = "f32", unit = "W", text = "power of the source" },

@@ -183,9 +183,14 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
             Placement::on_line(rng.random_range(low..high), rng.random_range(30.0..200.0))
         };
         let (a, b, c) = (place(50.0, 250.0), place(380.0, 550.0), place(680.0, 950.0));
-        let beside = |place| HopEnd { place, apart_m };
-        let gain = mission.relay_gain(1.0);
-        let hops = Hops::new(&mission, &interferer, beside(a), gain, 1.0, Some(beside(c)));
+        let beside = |place| {
+            Some(HopEnd {
+                place,
+                apart_m,
+                power_w: 1.0,
+            })
+        };
+        let hops = Hops::new(&mission, &interferer, beside(a), 1.0, beside(c));
         let mut find = |local| {
             let search = LocalSearch::new(local, hops, b, 20.0, (30.0, 200.0));
             let to = searched(search).unwrap_or(b);
@@ -214,27 +219,14 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
 
 /// Returns the hops of relay `at` (from 0) in a chain of 1 W relays at `places`.
 fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
-    let apart_m = mission.config().min_separation_m;
-    let beside = |place| HopEnd { place, apart_m };
-    let (before, gain) = match at.checked_sub(1) {
-        None => (
-            HopEnd {
-                place: Placement::default(),
-                apart_m: 0.0,
-            },
-            mission.tx_gain(),
-        ),
-        Some(before) => (beside(places[before]), mission.relay_gain(1.0)),
+    let beside = |place: &Placement| HopEnd {
+        place: *place,
+        apart_m: mission.config().min_separation_m,
+        power_w: 1.0,
     };
-    let after = places.get(at + 1).map(|&place| beside(place));
-    Hops::new(
-        mission,
-        mission.interferer().unwrap(),
-        before,
-        gain,
-        1.0,
-        after,
-    )
+    let before = at.checked_sub(1).map(|before| beside(&places[before]));
+    let after = places.get(at + 1).map(beside);
+    Hops::new(mission, mission.interferer().unwrap(), before, 1.0, after)
 }
 
 /// Checks that no relay has a better position when Algorithm 2 ends before its last permitted round.

@@ -51,8 +51,8 @@ pub struct MissionConfig {
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
     /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 is one
-    /// direction only, as in the paper; above 0 the worse of the SIR and the backward SIR / r counts, and the
-    /// interferer must be known.
+    /// direction only, as in the paper; above 0 the worse of the SIR and the backward SIR / r counts,
+    /// once the interference is known.
     pub reverse: f32,
     /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
     /// 0.
@@ -84,9 +84,6 @@ impl MissionConfig {
         }
         if self.reverse > 0.0 && !cfg!(feature = "reverse") {
             return Err(MissionError::ReverseFeature);
-        }
-        if self.reverse > 0.0 && !matches!(self.interference, Interference::Source(_)) {
-            return Err(MissionError::ReverseInterference);
         }
         Ok(())
     }
@@ -126,8 +123,6 @@ pub enum MissionError {
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
-    /// `reverse` is above 0, and the interference is a field or an unknown interferer.
-    ReverseInterference,
     /// `reverse` is above 0, and the crate was built without its feature `reverse`.
     ReverseFeature,
     /// `rx_power_w` is not within 1e-6 to 1e6.
@@ -161,9 +156,6 @@ impl core::fmt::Display for MissionError {
             Self::NoiseFeature => "a noise_w above 0 needs the feature `noise`",
             Self::Field => "a field of interference needs the feature `field`",
             Self::Reverse => "reverse (SIR of the direction Rx to Tx, as a share of that from Tx to Rx) must be within 0 to 1",
-            Self::ReverseInterference => {
-                "a reverse above 0 needs a known interferer, not an interference field or an interferer that the relays locate"
-            }
             Self::ReverseFeature => "a reverse above 0 needs the feature `reverse`",
             Self::RxPower => "rx_power_w must be within 1e-6 to 1e6",
             Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
@@ -598,9 +590,10 @@ impl Mission {
 
     /// Ratio r: SIR that a hop needs from Rx to Tx, relative to that from Tx to Rx. 0 for one direction.
     ///
-    /// A constant without the feature `reverse`, so that the compiler drops the code for two directions.
+    /// A constant without the feature `reverse`, so that the compiler drops the code for two directions. 0 while the interferer is
+    /// unknown: relays then spread evenly.
     pub const fn reverse(&self) -> f32 {
-        if cfg!(feature = "reverse") {
+        if cfg!(feature = "reverse") && !matches!(self.config.interference, Interference::Unknown) {
             self.config.reverse
         } else {
             0.0

@@ -399,9 +399,6 @@ impl MissionUpdate {
         {
             return Err(UploadError::Base);
         }
-        if member.mission.reverse() > 0.0 {
-            return Err(UploadError::Reverse);
-        }
         let is_other = config.distance_m.to_bits() != loaded.loaded_m.to_bits();
         loaded
             .encloses(member, config, upload.sites().is_some())

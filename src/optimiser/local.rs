@@ -5,15 +5,18 @@
 //! next five; for each altitude the x where the SIRs of both hops are equal is found by bisection. Where all hops are equal, as
 //! after Algorithm 1, a grid has no better point, but this method finds one.
 //!
+//! With a way back each hop counts by its worse direction, and close to the interferer the relay also hears the next one worse. So
+//! a row may have a maximum on each side of the interferer, and each is searched from even samples.
+//!
 //! Accuracy and effect: `host-tests/tests/adjust.rs`.
 
 use core::task::Poll;
 
+use super::reverse::Back;
 use crate::mission::{Interferer, Mission};
-use crate::place::Placement;
-use crate::power_ratio::PowerRatio;
+use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
-use crate::sir::{in_noise, square};
+use crate::sir::{Sender, in_noise, square};
 
 /// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
 const ROWS: u8 = 5;
@@ -24,13 +27,16 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
+/// Intervals of a row's samples on each side of the interferer, with a way back.
+const SAMPLES: u8 = 12;
+
 const ROUNDING: f32 = 3e-7;
 
 /// Method by which one relay searches its best position between its neighbours (Algorithm 2).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Search from coarse to fine altitudes: at most 1080 evaluations of both hops.
+    /// Search from coarse to fine altitudes: at most 1080 evaluations of both hops, with a way back 4770.
     #[default]
     Fine,
     /// Search on the paper's grid of positions: `columns` by `rows` evaluations of both hops.
@@ -42,80 +48,135 @@ pub enum Local {
     },
 }
 
-/// Neighbour of the searching relay: another relay, or a ground station.
+/// Neighbouring relay of the searching relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
-    /// Position of the neighbour; at altitude 0 for a ground station.
+    /// Position of the neighbouring relay.
     pub place: Placement,
-    /// Minimum distance between the relay and this node, m; 0 for a ground station.
+    /// Minimum distance between the relay and this one, m.
     pub apart_m: f32,
+    /// Transmit power, W.
+    pub power_w: f32,
 }
 
 /// Hops to and from one relay, whose SIRs the local search evaluates.
+///
+/// With the squared lengths l of both hops and the inverse interference q at the relay, the SIRs of the hop from the node before
+/// are A q / l and `returned` / l, those of the hop to the node after `received` / l and A' q / l. The second one of each is of
+/// the way back, divided by r.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    gain_in: PowerRatio,
-    /// Gain of the hop from the relay: to another relay, or K in m^2 for the hop to Rx.
-    gain_out: f32,
-    to_rx: bool,
+    /// Gain A of the node before.
+    gain: f32,
+    /// Gain of the relay times the inverse interference at the node after, or K of the hop to Rx, m^2.
+    received: f32,
+    back: WayBack,
     interferer: Interferer,
     /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
     noise: f32,
-    /// Inverse interference at the next relay, by [`crate::sir::quiet`], m^2.
-    quiet_after: f32,
+}
+
+/// Way back over both hops; infinite gains without one.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct WayBack {
+    /// Gain of the relay times the inverse interference at the node before, over r, m^2. `K_tx` / r to Tx.
+    returned: f32,
+    /// Gain A' of the node after, over r.
+    gain: f32,
+}
+
+impl WayBack {
+    const NONE: Self = Self {
+        returned: f32::INFINITY,
+        gain: f32::INFINITY,
+    };
+
+    #[inline(never)] // keeps turns of one direction small
+    fn new(
+        mission: &Mission,
+        before: Option<HopEnd>,
+        power_w: f32,
+        after: Option<HopEnd>,
+    ) -> Option<Self> {
+        let reverse = mission.reverse();
+        if !(reverse > 0.0) {
+            return None;
+        }
+        let to = before.map_or(CrossSection::on_line(0.0), |relay| {
+            relay.place.cross_section()
+        });
+        let back = Back::new(mission, to, power_w, before.is_none())?;
+        let gain = match after {
+            Some(relay) => mission.relay_gain(relay.power_w),
+            None => Sender::receiver(mission).gain,
+        };
+        Some(Self {
+            returned: back.hears(before.map_or(0.0, |relay| relay.place.x_m)),
+            gain: gain.value() / reverse,
+        })
+    }
 }
 
 impl Hops {
-    /// Returns both hops of a relay of `power_w` watts. `before` is its sender, whose hop has the gain `gain_in`;
-    /// `after` is its receiver, `None` for Rx.
+    /// Returns the hops of a relay of `power_w` watts. `before` is `None` for relay 1, `after` for relay N.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
-        before: HopEnd,
-        gain_in: PowerRatio,
+        before: Option<HopEnd>,
         power_w: f32,
         after: Option<HopEnd>,
     ) -> Self {
-        let rx = HopEnd {
-            place: Placement::on_line(mission.config().distance_m, 0.0),
+        let ground = |x_m| HopEnd {
+            place: Placement::on_line(x_m, 0.0),
             apart_m: 0.0,
+            power_w: 0.0,
         };
-        let to = after.unwrap_or(rx).place;
+        let noise = mission.noise_at_a_metre();
         Self {
-            before,
-            after: after.unwrap_or(rx),
-            gain_in,
-            gain_out: match after {
-                Some(_) => mission.relay_gain(power_w).value(),
+            before: before.unwrap_or(ground(0.0)),
+            after: after.unwrap_or(ground(mission.config().distance_m)),
+            gain: match before {
+                Some(relay) => mission.relay_gain(relay.power_w).value(),
+                None => mission.tx_gain().value(),
+            },
+            received: match after {
+                Some(HopEnd { place: to, .. }) => {
+                    let s = square(interferer.x_m - to.x_m)
+                        + square(interferer.y_m)
+                        + square(to.altitude_m);
+                    mission.relay_gain(power_w).value() * in_noise(s, noise)
+                }
                 None => mission.receiver_gain(power_w),
             },
-            to_rx: after.is_none(),
+            back: WayBack::new(mission, before, power_w, after).unwrap_or(WayBack::NONE),
             interferer: *interferer,
-            noise: mission.noise_at_a_metre(),
-            quiet_after: in_noise(
-                square(interferer.x_m - to.x_m) + square(interferer.y_m) + square(to.altitude_m),
-                mission.noise_at_a_metre(),
-            ),
+            noise,
         }
     }
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
+    ///
+    /// With a way back, those of each hop's worse direction, the way back divided by r.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
         let quiet = in_noise(s, self.noise);
-        let (from, to) = (self.before.place, self.after.place);
-        let incoming =
-            self.gain_in.value() * quiet / (square(x - from.x_m) + square(h - from.altitude_m));
-        let (step, climb) = (square(to.x_m - x), square(to.altitude_m - h));
-        let outgoing = if self.to_rx {
-            self.gain_out / (step + climb)
-        } else {
-            self.gain_out * self.quiet_after / (step + climb)
-        };
-        (incoming, outgoing)
+        let squared = |of: Placement| square(x - of.x_m) + square(h - of.altitude_m);
+        let (before, after) = (squared(self.before.place), squared(self.after.place));
+        let (incoming, outgoing) = (self.gain * quiet, self.received);
+        if !self.is_both_ways() {
+            return (incoming / before, outgoing / after);
+        }
+        (
+            incoming.min(self.back.returned) / before,
+            outgoing.min(self.back.gain * quiet) / after,
+        )
+    }
+
+    fn is_both_ways(&self) -> bool {
+        cfg!(feature = "reverse") && self.back.gain < f32::INFINITY
     }
 
     /// Returns the smaller SIR of both hops with the relay at `at`: the paper's local SIR.
@@ -181,7 +242,7 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus one row of 24.
+    /// Continues the search by at most `budget` evaluations of both hops, plus one row of 24, with a way back of 106.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -241,7 +302,11 @@ impl LocalSearch {
             self.best_row = (altitude_m, sir);
         }
         self.row += 1;
-        Some(u16::from(HALVINGS) + 4)
+        Some(if self.hops.is_both_ways() {
+            2 * (2 * u16::from(HALVINGS) + u16::from(SAMPLES) + 1)
+        } else {
+            u16::from(HALVINGS) + 4
+        })
     }
 
     /// Searches the x at `altitude_m` at which both hops have equal SIRs. Returns the SIR of the worse hop at the
@@ -258,6 +323,11 @@ impl LocalSearch {
         if !(low <= high) {
             return -1.0;
         }
+        if self.hops.is_both_ways() {
+            let middle = self.hops.interferer.x_m.max(low).min(high);
+            let side = self.peak(altitude_m, low, middle);
+            return side.max(self.peak(altitude_m, middle, high));
+        }
         let at = |x_m| Placement::on_line(x_m, altitude_m);
         // Beyond the interferer the incoming hop may improve with its length; then an end of the row is best.
         let ends = self.weigh(at(low)).max(self.weigh(at(high)));
@@ -271,6 +341,35 @@ impl LocalSearch {
             }
         }
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
+    }
+
+    /// Searches `low` to `high` of a row with a way back for the largest worse SIR, which it returns.
+    ///
+    /// The best of even samples is improved by steps that halve. It is the maximum if there is one maximum around that sample.
+    fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
+        let mut step = (high - low) / f32::from(SAMPLES);
+        if !(step > 0.0) {
+            return -1.0;
+        }
+        let (mut best, mut top) = (-1.0, low);
+        let mut try_at = |search: &mut Self, x_m: f32| {
+            let x_m = x_m.max(low).min(high);
+            let sir = search.weigh(Placement::on_line(x_m, altitude_m));
+            if sir > best {
+                (best, top) = (sir, x_m);
+            }
+            top
+        };
+        let mut from = low;
+        for at in 0..=SAMPLES {
+            from = try_at(self, low + step * f32::from(at));
+        }
+        for _ in 0..HALVINGS {
+            step *= 0.5;
+            _ = try_at(self, from - step);
+            from = try_at(self, from + step);
+        }
+        best
     }
 
     /// Evaluates the next point of the grid, altitudes first. Returns the number of evaluations, 1, or `None` after
@@ -298,10 +397,9 @@ impl LocalSearch {
 mod tests {
     use core::task::Poll;
 
-    use super::{HopEnd, Hops, Local, LocalSearch};
+    use super::{HopEnd, Hops, Local, LocalSearch, WayBack};
     use crate::mission::Interferer;
     use crate::place::Placement;
-    use crate::power_ratio::PowerRatio;
 
     /// Returns a search by a relay at `altitude_m`, between two relays at `beside_m`, 100 m apart. `apart_m` is the
     /// minimum separation, and `band` the allowed altitudes, m.
@@ -310,20 +408,20 @@ mod tests {
         let beside = |x_m| HopEnd {
             place: at(x_m, beside_m),
             apart_m,
+            power_w: 1.0,
         };
         let hops = Hops {
             before: beside(0.0),
             after: beside(100.0),
-            gain_in: PowerRatio::new(1.0),
-            gain_out: 1.0,
-            to_rx: false,
+            gain: 1.0,
+            received: 1e6,
+            back: WayBack::NONE,
             interferer: Interferer {
                 power_w: 1.0,
                 x_m: 50.0,
                 y_m: 10.0,
             },
             noise: 0.0,
-            quiet_after: 1e6,
         };
         LocalSearch::new(Local::Fine, hops, at(50.0, altitude_m), 1e5, band)
     }

@@ -20,7 +20,7 @@ use super::spacing::{Hop, RequiredPosition, receiver_reach};
 use crate::mission::{Heading, Mission, Profile};
 use crate::place::Station;
 use crate::root::sqrt_in_place;
-use crate::sir::{Sender, square};
+use crate::sir::{Sender, square, transmitter_gain};
 
 /// Maximum number of positions that the last relay tries in order to receive Rx. Only for traffic in both directions.
 const HOLDS: u8 = 4;
@@ -86,7 +86,7 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
     }
 }
 
-impl Link<'_> {
+impl<'a> Link<'a> {
     /// Appends this relay's reaches for the rising `targets` to `reaches`, after those already there.
     ///
     /// A reach is the farthest x in the direction of the pass that meets a target. `from` has the reaches of the
@@ -142,7 +142,7 @@ impl Link<'_> {
         reaches.first().copied()
     }
 
-    fn onward(&self) -> Option<Onward> {
+    fn onward(&self) -> Option<Onward<'a>> {
         let mission = self.mission;
         if let Some(interferer) = mission.interferer() {
             let sender = self.behind.map_or(Sender::transmitter(mission), |behind| {
@@ -167,7 +167,12 @@ impl Link<'_> {
         let altitude_m = self
             .behind
             .map(|behind| behind.relay.cross_section.altitude_m);
-        let hop = Retreat::new(mission, self.own, self.index, altitude_m);
+        let power_w = self.behind.map(|behind| behind.relay.power_w);
+        let hop = Retreat::new(mission, self.own, self.index, altitude_m).both_ways(
+            mission,
+            power_w,
+            self.measured_per_w,
+        );
         Some(Onward::Tx(if self.plain {
             hop
         } else {
@@ -185,7 +190,7 @@ impl Link<'_> {
 
     /// Returns the hop from this relay that starts closest to Tx, for a receiver from `low` to `high`, m. In a plain
     /// pass the receiver is at `low`. `None` if no such hop meets `target`.
-    fn longest(&self, hop: &Retreat, target: f32, low: f32, high: f32) -> Option<Step> {
+    fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
         mission.field()?;
@@ -223,9 +228,16 @@ impl Link<'_> {
         }
         let c = mission.tx_gain().value() / target;
         let beyond = square(self.own.cross_section.altitude_m);
+        // Tx hears the first hop of the way back up to this squared length.
+        let returned = if mission.reverse() > 0.0 {
+            transmitter_gain(mission, self.own.power_w) / mission.reverse() / target
+        } else {
+            f32::INFINITY
+        };
         let value = |place: f32, quiet: f32| {
             // Limited to 1e9 m, as the last hop toward Rx, since an infinite slack cannot be sent.
-            let squared = (mission.tx_gain().value() * quiet / target).min(1e18) - beyond;
+            let squared = mission.tx_gain().value() * quiet / target;
+            let squared = squared.min(returned).min(1e18) - beyond;
             // If no position is close enough, the root of the negated square keeps the slack continuous in the target.
             Some(place - sqrt_in_place(squared.abs()).copysign(squared))
         };
@@ -242,7 +254,12 @@ impl Link<'_> {
                 from_m: here,
             }
         } else {
-            least(interference, c, [beyond, beyond], reach, high, value)?
+            let kink = if returned < f32::INFINITY {
+                returned
+            } else {
+                beyond
+            };
+            least(interference, c, [beyond, kink], reach, high, value)?
         };
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
@@ -305,8 +322,10 @@ impl Link<'_> {
         match self.onward()? {
             Onward::Rx(hop) => hop.required_position(target, from_m, place),
             Onward::Tx(hop) => {
+                let heard_m = hop.heard_up_to(target, place);
                 let Some(behind) = self.behind else {
-                    return Some(RequiredPosition::AtReach);
+                    let is_met = heard_m >= self.mission.config().distance_m;
+                    return is_met.then_some(RequiredPosition::AtReach);
                 };
                 let apart = self.mission.least_step(
                     self.own
@@ -314,11 +333,18 @@ impl Link<'_> {
                         .apart_squared(behind.relay.cross_section),
                 );
                 let low = from_m.max(place + apart).max(place.next_up());
+                let interference = HopInterference::new(self.mission, behind.measured_per_w);
                 // A position that leaves all relays toward Rx room along the line, at any altitude, is preferred.
                 let clear = self.mission.latest(self.index.saturating_add(1));
                 let to = |high| {
-                    let step = self.longest(&hop, target, low, high)?;
-                    (step.from_m <= place).then_some(step)
+                    let high = heard_m.min(high);
+                    // With a way back the nearest one is preferred, because the way back is best from there.
+                    let near = if heard_m < f32::INFINITY { low } else { high };
+                    let step = |high| {
+                        let step = hop.longest_there(interference, target, low, high)?;
+                        (step.from_m <= place).then_some(step)
+                    };
+                    step(near).or_else(|| step(high))
                 };
                 let step = to(clear).or_else(|| to(self.latest()))?;
                 Some(if step.to_m <= from_m {
@@ -331,9 +357,9 @@ impl Link<'_> {
     }
 }
 
-enum Onward {
+enum Onward<'a> {
     Rx(Hop),
-    Tx(Retreat),
+    Tx(Retreat<'a>),
 }
 
 fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {

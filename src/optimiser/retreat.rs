@@ -22,17 +22,40 @@
 //! Upsilon. `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/` compares it with grids of positions. If a minimum
 //! separation or a climb excludes some y, the ranges may have holes, and l_k is a bound.
 //!
+//! # Way back
+//!
+//! The receiver y of a hop sends on the way back, and its sender x receives. With A' = p' Upsilon(x) / (`mu_los` r) for p' watts at
+//! y the way back meets the target if
+//!
+//! ```text
+//! (y - x)^2 <= A' / gamma - q.
+//! ```
+//!
+//! Between two points of the field the right side is linear in x, so the margin is concave there, and the first x from which both
+//! directions work is a root of a quadratic. The smallest such x over all y is taken of the y that is best on the way there, of the
+//! nearest y, and of a bisection between them, because the way back prefers the nearest one. For a given x the set of y that both
+//! directions allow is exact: the y up to x + sqrt(A' / gamma - q). A range may have holes near the interferer, which are refused.
+//!
 //! Accuracy: asserted by `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` against f64.
 
 use crate::field::{FieldPoint, InNoise};
 use crate::mission::Mission;
 use crate::place::Station;
 use crate::root::sqrt;
-use crate::sir::square;
+use crate::sir::{Sender, square};
+
+/// Bisection steps between the positions that are best for either direction.
+const HALVINGS: u8 = 6;
+
+/// Relative rounding error of a hop at the limit of its target.
+const ROUNDING: f32 = 4e-6;
+
+/// Maximum rounding error of a root, in steps of an f32.
+const ULPS: u8 = 8;
 
 /// Hop toward Rx in an interference field, prepared for many targets. The position of its receiver is known.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Retreat {
+pub struct Retreat<'a> {
     /// Gain A of the hop, m^2, for the field's largest Upsilon = E[1/I]. For the hop to Rx it is that with the
     /// Upsilon at Rx.
     gain: f32,
@@ -42,9 +65,11 @@ pub struct Retreat {
     /// Smallest x that the hop's sender may take, m.
     end_m: f32,
     to_rx: bool,
+    /// Gain A' / Upsilon on the way back, and interference at the sender; `None` for one direction.
+    back: Option<(f32, HopInterference<'a>)>,
 }
 
-impl Retreat {
+impl<'a> Retreat<'a> {
     /// Returns the hop from relay `index`, `own`, to a relay at `altitude_m`, m; `None` stands for Rx.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb = own.cross_section.altitude_m - altitude_m.unwrap_or(0.0);
@@ -61,6 +86,38 @@ impl Retreat {
             },
             end_m: mission.end_for(index, 0.0),
             to_rx: altitude_m.is_none(),
+            back: None,
+        }
+    }
+
+    /// Returns this hop for a mission with a way back.
+    ///
+    /// The receiver sends with `power_w`, or is Rx if that is `None`. The sender has measured `measured_per_w`.
+    pub(super) fn both_ways(
+        self,
+        mission: &'a Mission,
+        power_w: Option<f32>,
+        measured_per_w: Option<f32>,
+    ) -> Self {
+        let reverse = mission.reverse();
+        if !(reverse > 0.0) {
+            return self;
+        }
+        let gain = power_w.map_or(Sender::receiver(mission).gain, |power_w| {
+            mission.relay_gain(power_w)
+        });
+        let heard = HopInterference::new(mission, measured_per_w);
+        Self {
+            back: Some((gain.value() / reverse, heard)),
+            ..self
+        }
+    }
+
+    fn back(&self) -> Option<(f32, HopInterference<'a>)> {
+        if cfg!(feature = "reverse") {
+            self.back
+        } else {
+            None
         }
     }
 
@@ -87,6 +144,80 @@ impl Retreat {
     /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], m. `quiet` is Upsilon = E[1/I] there
     /// over the field's largest, above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
+        let place = self.onward(target, from_m, quiet)?;
+        match self.back() {
+            Some((gain, heard)) => self.first(gain / target, heard, place, from_m),
+            None => Some(place),
+        }
+    }
+
+    /// Returns the first x from `place` on at which the sender hears the receiver at `from_m`.
+    ///
+    /// `c` is A' / gamma without Upsilon. At most one root for each field point in between.
+    #[inline(never)] // keeps a sweep of one direction small
+    fn first(&self, c: f32, heard: HopInterference<'_>, place: f32, from_m: f32) -> Option<f32> {
+        let apart = self.climb_squared;
+        let is_met =
+            |x: f32, quiet: f32| square(from_m - x) + apart <= c * quiet * (1.0 + 0.25 * ROUNDING);
+        let last = from_m - self.least_step;
+        let hop = |x: f32| (x <= last && (x < from_m || self.to_rx)).then_some(x);
+        let points = match heard {
+            HopInterference::In(field) => field.points(),
+            HopInterference::Evenly(_) => &[],
+        };
+        let after = points.partition_point(|point| point.x_m <= place);
+        let ends = points.get(after..).unwrap_or_default().iter();
+        let ends = ends.map(|point| point.x_m).take_while(|x_m| *x_m < last);
+        let (mut start, mut level) = (place, heard.quiet(place));
+        for end in ends.chain([last]) {
+            if is_met(start, level) {
+                return hop(start);
+            }
+            let quiet = heard.quiet(end);
+            let slope = if end > start {
+                (quiet - level) / (end - start)
+            } else {
+                0.0
+            };
+            // With z = y - x: z^2 + 2 h z - C <= 0.
+            let h = 0.5 * c * slope;
+            let squared = c * (level + slope * (from_m - start)) - apart;
+            let discriminant = square(h) + squared;
+            if discriminant >= 0.0 {
+                let root = sqrt(discriminant);
+                let z = if h > 0.0 {
+                    squared / (h + root)
+                } else {
+                    root - h
+                };
+                let mut x = (from_m - z).max(start);
+                for _ in 0..ULPS {
+                    if x <= end && is_met(x, heard.quiet(x)) {
+                        return hop(x);
+                    }
+                    x = x.next_up();
+                }
+            }
+            (start, level) = (end, quiet);
+        }
+        is_met(start, level).then(|| hop(start)).flatten()
+    }
+
+    /// Returns the largest x of the receiver that the sender at `place` hears on the way back, m.
+    pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
+        let Some((gain, heard)) = self.back() else {
+            return f32::INFINITY;
+        };
+        let squared = gain * heard.quiet(place) / target * (1.0 + ROUNDING) - self.climb_squared;
+        if squared >= 0.0 {
+            (place + sqrt(squared)).next_up()
+        } else {
+            f32::NEG_INFINITY
+        }
+    }
+
+    /// Returns [`Retreat::reach`] on the way there.
+    fn onward(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {
             return None;
@@ -122,12 +253,51 @@ impl Retreat {
         low: f32,
         high: f32,
     ) -> Option<Step> {
+        let there = self.longest_there(interference, target, low, high)?;
+        if self.back().is_none() {
+            return Some(there);
+        }
+        let low = low.max(self.nearest());
+        let mut best: Option<Step> = None;
+        // Returns true if the way there limits the hop that ends at `to_m`.
+        let mut is_limit = |to_m: f32| {
+            let quiet = interference.quiet(to_m);
+            let from_m = self.reach(target, to_m, quiet);
+            if let Some(from_m) = from_m
+                && best.is_none_or(|best| from_m < best.from_m)
+            {
+                best = Some(Step { to_m, from_m });
+            }
+            from_m.is_some() && from_m == self.onward(target, to_m, quiet)
+        };
+        let (mut near, mut far) = (low, there.to_m);
+        if !is_limit(far) && !is_limit(near) {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (near + far);
+                if is_limit(middle) {
+                    near = middle;
+                } else {
+                    far = middle;
+                }
+            }
+        }
+        best
+    }
+
+    /// Returns [`Retreat::longest`] on the way there.
+    pub(super) fn longest_there(
+        &self,
+        interference: HopInterference<'_>,
+        target: f32,
+        low: f32,
+        high: f32,
+    ) -> Option<Step> {
         let low = low.max(self.nearest());
         let squares = [
             self.climb_squared,
             self.climb_squared + square(self.least_step),
         ];
-        let value = |y, quiet| self.reach(target, y, quiet);
+        let value = |y, quiet| self.onward(target, y, quiet);
         least(interference, self.gain / target, squares, low, high, value)
     }
 }
@@ -141,8 +311,8 @@ pub struct Step {
     pub from_m: f32,
 }
 
-/// Interference at the receiver of a hop, as a function of the receiver's position.
-#[derive(Clone, Copy, Debug)]
+/// Interference at one end of a hop, as a function of the receiver's position.
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
     /// Same at every position: the receiver's measured Upsilon = E[1/I] over the field's largest.
     Evenly(f32),

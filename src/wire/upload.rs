@@ -40,8 +40,6 @@ pub enum UploadError {
     Relays,
     /// The mission loaded before flight, or the new one, has an interference field.
     Field,
-    /// The mission loaded before flight, or the new one, is for traffic in both directions (`reverse`).
-    Reverse,
     /// A parameter of the new mission is outside its range.
     Mission(MissionError),
     /// The upload is for relays that loaded another mission before flight.
@@ -65,9 +63,6 @@ impl core::fmt::Display for UploadError {
             }
             Self::Field => {
                 "an upload, and the mission it replaces, must have one interferer and no field"
-            }
-            Self::Reverse => {
-                "an upload, and the mission it replaces, must have a reverse of 0, because a reverse above 0 can only be loaded before flight"
             }
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",
@@ -93,19 +88,11 @@ impl Upload {
         if base.field().is_some() {
             return Err(UploadError::Field);
         }
-        if base.config().reverse > 0.0 {
-            return Err(UploadError::Reverse);
-        }
         if config.relays != base.relays() {
             return Err(UploadError::Relays);
         }
         let channel = config.channel.ordered();
-        let config = MissionConfig {
-            channel,
-            // Without effect, and not part of the bytes.
-            rx_power_w: config.tx_power_w,
-            ..config
-        };
+        let config = MissionConfig { channel, ..config };
         Self::checked(version, digest(base), config, None)
     }
 
@@ -139,9 +126,6 @@ impl Upload {
             return Err(UploadError::Field);
         }
         Mission::try_new(config).map_err(UploadError::Mission)?;
-        if config.reverse > 0.0 {
-            return Err(UploadError::Reverse);
-        }
         Ok(Self {
             version,
             base,

@@ -196,8 +196,7 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
     if method != Method::Align && raw.points > 0 {
         return Err(ConfigError::Method);
     }
-    let is_one_way = !(mission.config().reverse > 0.0);
-    if !(is_one_way || method == Method::Align && listen.is_none()) {
+    if method == Method::Joint && mission.config().reverse > 0.0 {
         return Err(ConfigError::Reverse);
     }
     Ok(Config {

@@ -153,7 +153,7 @@ pub enum ConfigError {
     Measure,
     /// Settings for estimating an unknown interferer out of range, or together with an interference field.
     Listen,
-    /// Traffic from receiver to transmitter together with a method other than align, or with sensing.
+    /// Traffic from receiver to transmitter together with the joint method.
     Reverse,
     /// Interferer given in a block that has an interference field.
     Interferer,

@@ -214,9 +214,7 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Reverse => {
-            error!(
-                "configuration refused: a reverse above 0 needs the method align, and no listen"
-            );
+            error!("configuration refused: a reverse above 0 needs the method align or adjust");
         }
         ConfigError::Interferer => {
             error!("configuration refused: it has both an interferer and an interference field");

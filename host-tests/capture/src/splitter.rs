@@ -1,6 +1,6 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Maximum number of bytes stored of a piece. The longest frame has 137 bytes; a longer piece is noise, and only its
+/// Maximum number of bytes stored of a piece. The longest frame has 145 bytes; a longer piece is noise, and only its
 /// start is kept.
 pub const MOST: usize = 1_024;
 

@@ -66,6 +66,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
         min_separation_m: link.min_separation_m,
         tx_w: link.tx_w,
         rx_w: link.tx_w,
+        reverse: 0.0,
         sources: vec![Source {
             power_w: link.interferer_w,
             x_m: link.x_i,

@@ -20,7 +20,7 @@ pub enum Refusal {
     NoHypothetical,
     /// The scenario has several interferers, and SIRs are also required from Rx to Tx.
     ///
-    /// The single interferer that would replace them is fitted for the direction from Tx to Rx only.
+    /// Plans for several interferers are for the direction from Tx to Rx only.
     ReverseSources,
     /// The distance from Tx to Rx is too short for the relays with their least separation.
     NoRoom {
@@ -46,7 +46,7 @@ impl fmt::Display for Refusal {
                 f.write_str("the [[interferer]] cannot be replaced by a single interferer with the same effect, which the relays need")
             }
             Self::ReverseSources => f.write_str(
-                "link.reverse above 0 needs exactly one [[interferer]]: the single one that replaces several is fitted for one direction only",
+                "link.reverse above 0 needs exactly one [[interferer]]: plans for several are for one direction; cargo chain flies both, with one that replaces them",
             ),
             Self::NoRoom {
                 relays,
@@ -85,8 +85,6 @@ pub fn mission(
         Interference::Sources(sources) => {
             let one = if let [source] = sources.as_slice() {
                 interferer(source)
-            } else if scenario.reverse > 0.0 {
-                return Err(Refusal::ReverseSources);
             } else {
                 let one = hypothetical(scenario).ok_or(Refusal::NoHypothetical)?;
                 interferer(&one.source())

@@ -52,6 +52,8 @@ pub struct Scene {
     pub tx_w: f64,
     /// Transmit power of Rx when it sends toward Tx, W, > 0.
     pub rx_w: f64,
+    /// SIR that a hop needs in the direction from Rx to Tx, relative to the one from Tx to Rx; 0 for one direction.
+    pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
@@ -120,6 +122,7 @@ impl Scene {
             min_separation_m: scenario.min_separation_m,
             tx_w: scenario.tx_w,
             rx_w: scenario.rx_w,
+            reverse: scenario.reverse,
             sources: sources.clone(),
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
@@ -206,9 +209,16 @@ impl Scene {
     }
 
     /// Returns the linear SIR of the worst hop from Tx to Rx; 0 if [`Scene::hop_sirs`] returns no hop.
+    ///
+    /// With a way back it is that of the worse direction, the way back divided by `reverse`.
     pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
-        sirs.reduce(f64::min).unwrap_or(0.0)
+        let there = sirs.reduce(f64::min).unwrap_or(0.0);
+        if !(self.reverse > 0.0) {
+            return there;
+        }
+        let back = self.hop_sirs_back(places).into_iter();
+        back.fold(there, |worst, sir| worst.min(sir / self.reverse))
     }
 
     /// Returns the linear SIR of the worst hop if relays are `along` metres from Tx, with lateral offset 0.

@@ -11,6 +11,10 @@ pub(crate) struct Chain {
     pub(crate) altitude_m: f64,
     /// Interferer: its power in W, and its x and y in m.
     pub(crate) interferer: [f64; 3],
+    /// Further interferers.
+    pub(crate) others: Vec<[f64; 3]>,
+    /// Points of a field that replaces the interferer: x in m, and Upsilon in 1/W. Empty for none.
+    pub(crate) field: Vec<[f64; 2]>,
     /// Path-loss factors, 1/m^2: of links with a drone at one or both ends, and of links on the ground.
     pub(crate) loss: [f64; 2],
     /// Noise power of every receiver, W.
@@ -33,14 +37,34 @@ impl Chain {
 
     /// Returns interference plus noise at a node, W.
     fn disturbance_w(&self, node: usize, x: f64) -> f64 {
-        let [power_w, xi, yi] = self.interferer;
+        if let [first, .., last] | [first @ last] = self.field.as_slice() {
+            // With noise each point has 1 / (I + N), and lines between.
+            let heard = |upsilon: f64| 1.0 / (1.0 / upsilon + self.noise_w);
+            let around = self
+                .field
+                .windows(2)
+                .find(|pair| x >= pair[0][0] && x <= pair[1][0]);
+            let upsilon = match around {
+                Some([[x0, a], [x1, b]]) => {
+                    heard(*a) + (heard(*b) - heard(*a)) * (x - x0) / (x1 - x0)
+                }
+                _ if x < first[0] => heard(first[1]),
+                _ => heard(last[1]),
+            };
+            return 1.0 / upsilon;
+        }
         let on_ground = node == 0 || node > self.relays();
         let (h, loss) = if on_ground {
             (0.0, self.loss[1])
         } else {
             (self.altitude_m, self.loss[0])
         };
-        power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
+        let sources = [self.interferer]
+            .into_iter()
+            .chain(self.others.iter().copied());
+        let each = sources
+            .map(|[power_w, xi, yi]| power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)));
+        each.sum::<f64>() + self.noise_w
     }
 
     /// Returns a hop's two-way SIR: the smaller of its forward SIR and backward SIR / `reverse`.
@@ -180,6 +204,8 @@ mod tests {
             powers_w: vec![1.0; 6],
             altitude_m: 1e-3,
             interferer: [1e-9, 0.0, 1e6],
+            others: Vec::new(),
+            field: Vec::new(),
             loss: [1.0, 1.0],
             noise_w: 1e-3,
             reverse: 1.0,

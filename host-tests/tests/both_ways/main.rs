@@ -1,8 +1,13 @@
 //! Both directions of a chain: relays placed for the way there and the way back.
 
+mod field;
 mod flown;
 mod judge;
 mod placed;
 mod refused;
 mod scenes;
+mod sensing;
+mod several;
+mod shares;
+mod turns;
 mod unchanged;

@@ -11,7 +11,7 @@ use super::scenes::{ENDS, LOS, NLOS, adversarial, in_noise, log_uniform, mission
 ///
 /// The SIR is 0 without an agreement. The two-way SIR of a hop is the smaller of its forward SIR and its backward SIR
 /// divided by the chain's `reverse`.
-fn reached(chain: &Chain) -> (f64, Vec<f64>) {
+pub(crate) fn reached(chain: &Chain) -> (f64, Vec<f64>) {
     let mission = mission(chain);
     let Some(agreed) = solve(&mission, &[]) else {
         return (0.0, Vec::new());
@@ -96,6 +96,8 @@ fn relays_stay_at_tx_where_an_interferer_is_between_them_and_a_weak_rx() {
         powers_w: vec![1.0; 4],
         altitude_m: 20.0,
         interferer: [32.0, 440.0, 111.0],
+        others: Vec::new(),
+        field: Vec::new(),
         loss: [LOS, NLOS],
         noise_w: 0.0,
         reverse: narrow(0.1),

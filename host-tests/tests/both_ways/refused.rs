@@ -3,8 +3,7 @@
 use host_tests::fixtures::paper;
 use uav_relay::mission::MissionError;
 use uav_relay::{
-    Field, FieldPoint, Identity, Instant, Interference, Listen, Method, Mission, MissionConfig,
-    Relay, Settings, SetupError, Upload, UploadError,
+    Identity, Instant, Listen, Method, Mission, MissionConfig, Relay, Settings, SetupError,
 };
 
 fn both_ways() -> MissionConfig {
@@ -48,25 +47,7 @@ fn a_way_back_out_of_range_is_refused() {
 }
 
 #[test]
-fn a_field_and_an_unknown_interferer_have_no_way_back() {
-    let point = FieldPoint {
-        x_m: 0.0,
-        upsilon_per_w: 1e9,
-    };
-    let field = Field::try_new(vec![point].leak()).unwrap();
-    for interference in [Interference::Field(field), Interference::Unknown] {
-        let config = MissionConfig {
-            interference,
-            ..both_ways()
-        };
-        let error = Mission::try_new(config).err();
-        assert_eq!(error, Some(MissionError::ReverseInterference));
-        assert!(error.unwrap().to_string().contains("reverse"));
-    }
-}
-
-#[test]
-fn methods_for_one_direction_are_refused() {
+fn the_joint_method_is_refused() {
     let mission = Mission::try_new(both_ways()).unwrap();
     let with = |settings: Settings| {
         let identity = Identity {
@@ -76,11 +57,12 @@ fn methods_for_one_direction_are_refused() {
         Relay::new(mission, identity, settings, 1, Instant::ZERO).err()
     };
     assert_eq!(with(Settings::default()), None);
-    let refused = [
-        Settings {
-            method: Method::Joint,
-            ..Settings::default()
-        },
+    let joint = Settings {
+        method: Method::Joint,
+        ..Settings::default()
+    };
+    assert_eq!(with(joint), Some(SetupError::Reverse));
+    for settings in [
         Settings {
             method: Method::Adjust(uav_relay::Adjust::default()),
             ..Settings::default()
@@ -89,20 +71,9 @@ fn methods_for_one_direction_are_refused() {
             listen: Some(Listen::default()),
             ..Settings::default()
         },
-    ];
-    for settings in refused {
-        assert_eq!(with(settings), Some(SetupError::Reverse), "{settings:?}");
+    ] {
+        assert_eq!(with(settings), None, "{settings:?}");
     }
     let line = SetupError::Reverse.to_string();
     assert!(line.contains("reverse") && line.contains("Align"), "{line}");
-}
-
-#[test]
-fn uploads_have_one_direction() {
-    let one_way = Mission::try_new(paper(3)).unwrap();
-    let both = Mission::try_new(both_ways()).unwrap();
-    let refused = Some(UploadError::Reverse);
-    assert_eq!(Upload::new(&one_way, 1, both_ways()).err(), refused);
-    assert_eq!(Upload::new(&both, 1, paper(3)).err(), refused);
-    assert!(UploadError::Reverse.to_string().contains("reverse"));
 }

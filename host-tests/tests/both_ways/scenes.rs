@@ -2,7 +2,9 @@
 
 use rand::{Rng, RngExt};
 use uav_relay::channel::AirGround;
-use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+use uav_relay::{
+    Band, Channel, Field, FieldPoint, Interference, Interferer, Mission, MissionConfig, Profile,
+};
 
 use super::judge::Chain;
 
@@ -31,6 +33,16 @@ fn carrier_hz() -> f64 {
 /// Returns the mission that describes a reference chain.
 pub(crate) fn mission(chain: &Chain) -> Mission {
     let [power_w, x_m, y_m] = chain.interferer.map(|value| value as f32);
+    let points = chain.field.iter().map(|[x, upsilon]| FieldPoint {
+        x_m: *x as f32,
+        upsilon_per_w: *upsilon as f32,
+    });
+    let points: Vec<FieldPoint> = points.collect();
+    let interference = if points.is_empty() {
+        Interference::Source(Interferer { power_w, x_m, y_m })
+    } else {
+        Interference::Field(Field::try_new(points.leak()).unwrap())
+    };
     Mission::try_new(MissionConfig {
         relays: chain.relays() as u16,
         distance_m: chain.distance_m as f32,
@@ -43,7 +55,7 @@ pub(crate) fn mission(chain: &Chain) -> Mission {
         band: Band::at(chain.altitude_m as f32),
         lateral: Band::NONE,
         channel: Channel::new(carrier_hz(), chain.loss[0], chain.loss[1], AirGround::Los).unwrap(),
-        interference: Interference::Source(Interferer { power_w, x_m, y_m }),
+        interference,
         noise_w: chain.noise_w as f32,
         reverse: chain.reverse as f32,
         rx_power_w: *chain.powers_w.last().unwrap() as f32,
@@ -69,6 +81,8 @@ pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
             narrow(rng.random_range(-200.0..=1200.0)),
             narrow(rng.random_range(50.0..=800.0)),
         ],
+        others: Vec::new(),
+        field: Vec::new(),
         loss: [LOS, NLOS],
         noise_w: 0.0,
         reverse: narrow(reverse),
@@ -91,6 +105,42 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
         narrow(rng.random_range(100.0..=1100.0)),
         narrow(log_uniform(rng, 1.0, 300.0)),
     ];
+    chain
+}
+
+/// Draws a scene in a field: even, random within a factor, or that of some interferers.
+pub(crate) fn in_field(rng: &mut impl Rng, ends: [f64; 2], reverse: f64, kind: usize) -> Chain {
+    let mut chain = usual(rng, ends, reverse);
+    let points: usize = [1, rng.random_range(2..=9), 41][kind];
+    let sources: Vec<[f64; 3]> = (0..rng.random_range(1..=3))
+        .map(|_| {
+            [
+                log_uniform(rng, 1.0, 100.0),
+                rng.random_range(-200.0..=1200.0),
+                log_uniform(rng, 20.0, 800.0),
+            ]
+        })
+        .collect();
+    let heard_w = |x: f64| -> f64 {
+        let each = sources
+            .iter()
+            .map(|[power_w, xi, yi]| power_w / (LOS * ((x - xi).powi(2) + yi * yi + 400.0)));
+        each.sum()
+    };
+    let middle_w = heard_w(500.0);
+    chain.field = (0..points)
+        .map(|at| {
+            let x = 1000.0 * at as f64 / (points - 1).max(1) as f64;
+            let upsilon = match kind {
+                0 => 1.0 / middle_w,
+                1 => log_uniform(rng, 0.2, 5.0) / middle_w,
+                _ => 1.0 / heard_w(x),
+            };
+            [narrow(x), narrow(upsilon)]
+        })
+        .collect();
+    let quietest = chain.field.iter().min_by(|a, b| a[1].total_cmp(&b[1]));
+    chain.interferer[1] = quietest.map_or(500.0, |point| point[0]);
     chain
 }
 

@@ -2,9 +2,15 @@
 //!
 //! The recorded number was computed by the code before missions had a way back.
 
-use host_tests::placing::{generator, places, solve};
-use uav_relay_oracle::mission::{as_relays_know_it, of_link};
+use host_tests::flights::settle;
+use host_tests::placing::{generator, places, setpoints, solve};
+use rand::RngExt;
+use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig};
+use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::{self, Chain, Style, in_noise};
+use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_oracle::reference::{Link, Relay as ReferenceRelay};
+use uav_relay_sim::simulator::setup::Setup;
 
 /// Number of random scenarios whose results are hashed.
 const SCENARIOS: u32 = 1_000;
@@ -51,5 +57,86 @@ fn places_of_one_direction_are_equal_to_the_bit() {
     }
     println!("{placed} of {drawn} placed, hash {hash:#018x}");
     assert!(placed > 900, "{placed}");
+    assert_eq!(hash, RECORDED, "{hash:#018x}");
+}
+
+/// Runs a chain, and adds its positions and its number of messages to `hash`.
+fn add_flown(hash: &mut u64, setup: Setup) {
+    let outcome = settle(setup);
+    for place in setpoints(&outcome) {
+        add(hash, place.x_m.to_bits());
+        add(hash, place.altitude_m.to_bits());
+    }
+    add(hash, outcome.messages as u32);
+}
+
+#[test]
+fn turns_of_one_direction_are_equal_to_the_bit() {
+    const RECORDED: u64 = 0x9659_977e_434d_648a;
+    let mut rng = generator(3311);
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for round in 0..100_usize {
+        let link = Link {
+            x_i: rng.random_range(-200.0..1200.0),
+            y_i: rng.random_range(20.0..400.0),
+            ..Link::paper(1 + round % 12)
+        };
+        let (mission, _) = of_link(&as_relays_know_it(&link), 1e-4).unwrap();
+        let config = MissionConfig {
+            band: Band {
+                least_m: 20.0,
+                most_m: 120.0,
+            },
+            noise_w: if round % 3 == 0 { 1e-9 } else { 0.0 },
+            ..*mission.config()
+        };
+        let mut setup = Setup::new(Mission::try_new(config).unwrap());
+        let local = if round % 2 == 0 {
+            Local::Fine
+        } else {
+            Local::Grid {
+                columns: 21,
+                rows: 11,
+            }
+        };
+        setup.settings.method = Method::Adjust(Adjust {
+            rounds: 20,
+            explore_m: 15.0,
+            local,
+        });
+        add_flown(&mut hash, setup);
+    }
+    assert_eq!(hash, RECORDED, "{hash:#018x}");
+}
+
+#[test]
+fn places_in_a_field_of_one_direction_are_equal_to_the_bit() {
+    const RECORDED: u64 = 0x2a9d_dbb3_7637_5eab;
+    let mut rng = generator(3312);
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for round in 0..300_usize {
+        let points = 1 + round % 9;
+        let point = |at: usize, level: f64| (1000.0 * at as f64 / points as f64, 2e6 * level);
+        let upsilon = (0..points).map(|at| point(at, random::log_uniform(&mut rng, 0.2, 5.0)));
+        let link = StochasticLink {
+            distance_m: 1000.0,
+            tx_w: 80.0,
+            mu_los: 7000.0,
+            eta: 7100.0,
+            upsilon: upsilon.collect(),
+            relays: vec![
+                ReferenceRelay {
+                    altitude_m: 20.0,
+                    power_w: 1.0,
+                };
+                1 + round % 20
+            ],
+        };
+        let apart_m = [0.0, 10.0][round % 2];
+        add_flown(
+            &mut hash,
+            Setup::new(of_stochastic_link(&link, apart_m).unwrap()),
+        );
+    }
     assert_eq!(hash, RECORDED, "{hash:#018x}");
 }

@@ -45,6 +45,27 @@ fn an_uploaded_interferer_is_flown_from_either_end() {
     }
 }
 
+/// Relays are loaded with a mission of one direction or with a way back, and get another one in flight.
+#[test]
+fn a_way_back_is_uploaded_and_flown_by_all() {
+    let back = |base: MissionConfig, reverse: f32, rx_power_w: f32| MissionConfig {
+        reverse,
+        rx_power_w,
+        ..base
+    };
+    let one_way = *mission(5).config();
+    for (loaded, uploaded) in [
+        (one_way, back(one_way, 0.5, 5.0)),
+        (back(one_way, 1.0, 5.0), one_way),
+        (back(one_way, 0.5, 5.0), back(one_way, 0.5, 80.0)),
+    ] {
+        for shared in [true, false] {
+            let base = Mission::try_new(loaded).unwrap();
+            fly(signed(base, shared), Side::Upstream, uploaded);
+        }
+    }
+}
+
 #[test]
 fn a_new_altitude_band_is_flown_to() {
     let base = MissionConfig {

@@ -83,8 +83,9 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
         "x_m": 400.0, "altitude_m": 20.0, "power_w": 1.0, "turn": 2, "explore_m": 10.0, "columns": 0, "rows": 0,
         "sir": 1.0,
     });
-    let moved =
-        json!({ "x_m": 600.0, "altitude_m": 20.0, "position_changed": true, "worst_sir": 1.0 });
+    let moved = json!({
+        "x_m": 600.0, "altitude_m": 20.0, "position_changed": true, "worst_sir": 1.0, "power_w": 1.0,
+    });
     let verdict = json!({ "own": false, "commit": 0, "slack_m": [1.0], "required_x_m": null });
     let fence = json!({
         "association": 1, "line_digest": mission, "echo": 0, "number": 1, "x_m": 400.0, "target_m": 400.0, "y_m": 1.0,

@@ -132,6 +132,7 @@ pub(crate) fn message(wire_message: &WireMessage) -> Message {
             place: of.place(),
             position_changed: of.flag("position_changed", 0),
             worst_sir: of.real("worst_sir"),
+            power_w: of.real("power_w"),
         }),
         "Hello" => Message::Hello(hello(&of)),
         "Proposal" | "Decision" => vote(wire_message.name(), &of),
@@ -298,6 +299,8 @@ fn upload(wire_message: &WireMessage, of: &MessageFields<'_>) -> Upload {
         ("tx_power_w", config.tx_power_w),
         ("tolerance", config.tolerance),
         ("noise_w", config.noise_w),
+        ("reverse", config.reverse),
+        ("rx_power_w", config.rx_power_w),
     ];
     for (name, number) in numbers {
         assert_eq!(number, of.real(name), "{name}");

@@ -20,12 +20,13 @@ const RELAYS: usize = 5;
 /// Offset of the noise power in an offer's body, bytes.
 const NOISE: usize = 83;
 /// Offset of the sites of Tx and Rx in an offer's body, bytes.
-const SITES_AT: usize = 87;
+const BACK: usize = 87;
+const SITES_AT: usize = 95;
 
 /// Length of an offer's body, bytes.
-pub(crate) const BYTES: usize = 113;
+pub(crate) const BYTES: usize = 121;
 /// Length of the part of an offer's body that a relay stores: all but the number of the answered hello.
-pub(crate) const KEPT: usize = 111;
+pub(crate) const KEPT: usize = 119;
 
 /// Returns an offer of mission `version` that eight relays loaded with `base` can fly.
 pub(crate) fn upload(version: u16, base: u16) -> WireMessage {
@@ -35,7 +36,7 @@ pub(crate) fn upload(version: u16, base: u16) -> WireMessage {
         "interferer_power_w": 62.5, "interferer_x_m": 600.0, "interferer_y_m": -250.5, "tolerance": 1e-4,
         "mu_los": 7000.0, "mu_nlos": 900_000.5, "eta": 7000.25,
         "altitude_min_m": 20.0, "altitude_max_m": 300.0, "lateral_min_m": -60.0, "lateral_max_m": 40.5,
-        "noise_w": 0.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
+        "noise_w": 0.0, "reverse": 0.0, "rx_power_w": 80.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
         "rx_lat_e7": 0, "rx_lon_e7": 0, "rx_amsl_mm": 0, "offer_number": 0,
     });
     WireMessage::new("Offer", &fields)
@@ -57,13 +58,16 @@ pub(crate) fn kept(offer: &WireMessage) -> Vec<u8> {
 /// The digest is the low half of a CRC-32C of the mission's numbers. If the offer has sites, the digest also covers
 /// these.
 pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
-    // Zero noise is left out.
-    let end = if offer.number("noise_w") > 0.0 {
-        SITES_AT
-    } else {
-        NOISE
-    };
-    let digest = between(offer, low_half(&offer.body()[RELAYS..end]));
+    let body = offer.body();
+    let mut covered = body[RELAYS..NOISE].to_vec();
+    // Noise and a relative SIR of 0 are left out.
+    if offer.number("noise_w") > 0.0 {
+        covered.extend(&body[NOISE..BACK]);
+    }
+    if offer.number("reverse") > 0.0 {
+        covered.extend(&body[BACK..SITES_AT]);
+    }
+    let digest = between(offer, low_half(&covered));
     (digest, offer.number("version") as u16)
 }
 

@@ -123,7 +123,7 @@ impl Case {
 
     /// Returns the planner's plan for the largest data rate.
     fn planned(&self) -> Plan {
-        let ask = self.ask(Number::Of(self.relays));
+        let ask = self.request(Number::Of(self.relays));
         match Carried::new(&self.scenario, &ask, &self.radio, self.relays) {
             Some(carried) => carried.plan(self.relays).unwrap(),
             None => plan(&self.scenario, &ask).unwrap(),

@@ -67,8 +67,8 @@ pub(crate) struct Computation {
     pub(super) chosen: Option<JointPlace>,
     /// Cross-section of the agreed position: lateral offset and altitude.
     pub(super) cross_section: CrossSection,
-    /// Last reported position of the neighbour toward Rx.
-    pub(super) after: Option<Placement>,
+    /// Neighbour toward Rx, as last reported.
+    pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
     /// Meter of the interference at the agreed position, in a field of interference.
     pub(super) meter: Meter,
@@ -261,6 +261,7 @@ impl Computation {
                     place,
                     position_changed: turn_pass.any,
                     worst_sir: turn_pass.worst,
+                    power_w: self.profile.power_w,
                 })
             }),
             _ => None,
@@ -544,11 +545,7 @@ impl Computation {
             LeaderTask::Adjusting(rounds) if ADJUST => {
                 let (turn, sir) = (rounds.turn(), rounds.sir);
                 self.begin();
-                let tx = HopEnd {
-                    place: Placement::default(),
-                    apart_m: 0.0,
-                };
-                self.take_turn(context, TurnPass::new(turn, sir, tx, mission.tx_gain()))
+                self.take_turn(context, TurnPass::new(turn, sir, None))
             }
             _ => Action::Work,
         }

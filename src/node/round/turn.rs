@@ -7,13 +7,19 @@
 use super::computation::LeaderTask;
 use super::computation::{Computation, PLACES_AT_ONCE, PassKind};
 use super::state::Action;
-use crate::mission::{Interferer, Mission};
 use crate::node::context::Context;
 use crate::optimiser::local::{HopEnd, Hops, LocalSearch};
 use crate::place::Placement;
-use crate::power_ratio::PowerRatio;
 use crate::wire::message::{AdjustStep, Moved, Token};
 use core::task::Poll;
+
+fn neighbour(context: &Context<'_>, place: Placement, power_w: f32) -> HopEnd {
+    HopEnd {
+        place,
+        apart_m: context.mission().config().min_separation_m,
+        power_w,
+    }
+}
 
 impl Computation {
     /// Handles the token of Algorithm 2, received from the previous relay.
@@ -32,12 +38,8 @@ impl Computation {
             return Action::Stale;
         }
         self.state.accept(token.number);
-        let before = HopEnd {
-            place: token.place,
-            apart_m: context.mission().config().min_separation_m,
-        };
-        let gain = context.mission().relay_gain(token.power_w);
-        self.take_turn(context, TurnPass::new(token.turn, token.sir, before, gain))
+        let before = neighbour(context, token.place, token.power_w);
+        self.take_turn(context, TurnPass::new(token.turn, token.sir, Some(before)))
     }
 
     /// Starts this relay's turn in Algorithm 2, in which it may move.
@@ -49,9 +51,10 @@ impl Computation {
             && (context.is_last() || self.after.is_some())
         {
             let band = context.band(at.altitude_m);
-            let hops = turn_pass.hops(
+            let hops = Hops::new(
                 context.mission(),
                 interferer,
+                turn_pass.before,
                 self.profile.power_w,
                 self.after,
             );
@@ -95,7 +98,7 @@ impl Computation {
             && context.is_between(moved.place)
         {
             turn_pass.any |= moved.position_changed;
-            self.after = Some(moved.place);
+            self.after = Some(neighbour(context, moved.place, moved.power_w));
             return self.conclude_turn(context, moved.worst_sir);
         }
         Action::Stale
@@ -110,9 +113,10 @@ impl Computation {
         ) else {
             return Action::Stale;
         };
-        let hops = turn_pass.hops(
+        let hops = Hops::new(
             context.mission(),
             interferer,
+            turn_pass.before,
             self.profile.power_w,
             self.after,
         );
@@ -143,10 +147,8 @@ pub(crate) struct TurnPass {
     /// Action of this pass: look, move or stop. `sir` is the chain's SIR before the pass, linear.
     pub(crate) turn: AdjustStep,
     pub(crate) sir: f32,
-    /// Position of the node before this relay. `gain_in` is the gain of that node's transmission, a factor of the
-    /// SIR.
-    pub(crate) before: HopEnd,
-    pub(crate) gain_in: PowerRatio,
+    /// Relay before this one; `None` for Tx.
+    before: Option<HopEnd>,
     search: Option<LocalSearch>,
     /// True if this relay or a later relay has moved in this pass of Algorithm 2.
     pub(crate) any: bool,
@@ -155,44 +157,15 @@ pub(crate) struct TurnPass {
 }
 
 impl TurnPass {
-    pub(crate) const fn new(
-        turn: AdjustStep,
-        sir: f32,
-        before: HopEnd,
-        gain_in: PowerRatio,
-    ) -> Self {
+    pub(crate) const fn new(turn: AdjustStep, sir: f32, before: Option<HopEnd>) -> Self {
         Self {
             turn,
             sir,
             before,
-            gain_in,
             search: None,
             any: false,
             worst: f32::MAX,
         }
-    }
-
-    /// Returns both hops of this relay, whose power is `power_w` watts. `after` is its neighbour toward Rx, `None`
-    /// for relay N.
-    pub(crate) fn hops(
-        &self,
-        mission: &Mission,
-        interferer: &Interferer,
-        power_w: f32,
-        after: Option<Placement>,
-    ) -> Hops {
-        let after = after.map(|place| HopEnd {
-            place,
-            apart_m: mission.config().min_separation_m,
-        });
-        Hops::new(
-            mission,
-            interferer,
-            self.before,
-            self.gain_in,
-            power_w,
-            after,
-        )
     }
 
     /// Starts a search for a better position around `at`, within the altitudes `band`, m. Returns false if no relay

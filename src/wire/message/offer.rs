@@ -55,6 +55,8 @@ struct OfferBody {
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
+    /// SIR needed from Rx to Tx relative to that from Tx to Rx, and the power of Rx, W.
+    back: [f32; 2],
     /// Positions of Tx and Rx, encoded by [`Sites::to_bytes`]; all 0 if the upload has none.
     sites: SitesBody,
 }
@@ -92,6 +94,7 @@ impl OfferBody {
                 c.lateral.most_m,
             ],
             noise_w: c.noise_w,
+            back: [c.reverse, c.rx_power_w],
             sites: upload.sites().map_or(NO_SITES, Sites::to_bytes),
         }
     }
@@ -99,6 +102,7 @@ impl OfferBody {
     fn checked(self) -> Option<Upload> {
         let [mu_los, mu_nlos, eta] = self.factors;
         let [least_m, most_m, left_m, right_m] = self.bands;
+        let [reverse, rx_power_w] = self.back;
         let [
             distance_m,
             min_separation_m,
@@ -135,9 +139,8 @@ impl OfferBody {
                 })
             },
             noise_w: self.noise_w,
-            // An upload has one direction.
-            reverse: 0.0,
-            rx_power_w: tx_power_w,
+            reverse,
+            rx_power_w,
             tolerance,
         };
         let pass = self.pass;

@@ -393,26 +393,38 @@ pub struct Moved {
     pub position_changed: bool,
     /// SIR of the worst hop after the sender in the direction of the pass, linear.
     pub worst_sir: f32,
+    /// Transmit power of the sender, W.
+    pub power_w: f32,
 }
 
 impl Moved {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
         let at = PlaceBody::of(self.place);
-        write(
-            &(tag::MOVED, pass, at, self.position_changed, self.worst_sir),
-            buffer,
-        )
+        let (any, worst) = (self.position_changed, self.worst_sir);
+        write(&(tag::MOVED, pass, at, any, worst, self.power_w), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, at, any, worst): (PassId, PlaceBody, bool, f32) = read(body)?;
-        Ok(Self {
+        let (pass, at, any, worst, power_w) = read(body)?;
+        Self::checked(pass, at, any, worst, power_w).ok_or(MessageError::Value)
+    }
+
+    fn checked(
+        pass: PassId,
+        at: PlaceBody,
+        position_changed: bool,
+        worst: f32,
+        power_w: f32,
+    ) -> Option<Self> {
+        let place = at.checked()?;
+        Some(Self {
             number: pass.number(),
             view_digest: pass.digest(),
-            place: at.checked().ok_or(MessageError::Value)?,
-            position_changed: any,
-            worst_sir: sir_in_range(worst).ok_or(MessageError::Value)?,
+            place,
+            position_changed,
+            worst_sir: sir_in_range(worst)?,
+            power_w: profile(place.altitude_m, power_w)?.power_w,
         })
     }
 }

@@ -17,7 +17,7 @@ use super::time::instant;
 pub struct Uploads {
     /// Upload the scenario's mission with changed parameters at second S of virtual time. Keys as in a scenario file: x_m, y_m
     /// and power_w of the interferer, altitude_m, altitude_min_m, altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m,
-    /// distance_m, tx_w, uav_w; noise_w, 0 to 1; and tolerance. If the scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and
+    /// distance_m, tx_w, uav_w, rx_w; reverse and noise_w, 0 to 1; and tolerance. If the scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and
     /// those of rx move an end and the distance follows. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
@@ -59,6 +59,8 @@ enum Key {
     TxPower,
     UavPower,
     Noise,
+    Reverse,
+    RxPower,
     Tolerance,
     TxLatitude,
     TxLongitude,
@@ -71,7 +73,7 @@ enum Key {
 /// Keys that `--upload` can change: name, key, smallest and largest value.
 ///
 /// The names are those of scenario files, and `noise_w` and `tolerance`.
-const KEYS: [(&str, Key, f64, f64); 20] = [
+const KEYS: [(&str, Key, f64, f64); 22] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
     ("power_w", Key::Power, 1e-6, 1e9),
@@ -85,6 +87,8 @@ const KEYS: [(&str, Key, f64, f64); 20] = [
     ("tx_w", Key::TxPower, 1e-6, 1e6),
     ("uav_w", Key::UavPower, 1e-6, 1e6),
     ("noise_w", Key::Noise, 0.0, 1.0),
+    ("reverse", Key::Reverse, 0.0, 1.0),
+    ("rx_w", Key::RxPower, 1e-6, 1e6),
     ("tolerance", Key::Tolerance, 1e-6, 0.1),
     ("tx_lat_deg", Key::TxLatitude, -90.0, 90.0),
     ("tx_lon_deg", Key::TxLongitude, -180.0, 180.0),
@@ -246,8 +250,8 @@ impl Planned {
                 y_m: to(Key::Y, at.y_m),
             }),
             noise_w: to(Key::Noise, base.noise_w),
-            reverse: base.reverse,
-            rx_power_w: base.rx_power_w,
+            reverse: to(Key::Reverse, base.reverse),
+            rx_power_w: to(Key::RxPower, base.rx_power_w),
             tolerance: to(Key::Tolerance, base.tolerance),
             ..*base
         })

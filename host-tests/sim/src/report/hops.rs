@@ -89,9 +89,11 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
 
 /// Returns the linear SIR of every hop from Rx to Tx. Entry k - 1 is received by node k - 1; node 0 is Tx.
 ///
-/// The formulas and the limit are those of [`hop_sirs`]. Empty unless the mission has one known interferer.
+/// The formulas and the limit are those of [`hop_sirs`]. Empty unless the mission has one known interferer, or a way back in a field.
 pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
-    let (Some((first, profile)), Some(_)) = (places.first(), mission.known_source()) else {
+    let is_known = mission.known_source().is_some();
+    let is_both_ways = mission.config().reverse > 0.0 && mission.field().is_some();
+    let Some((first, profile)) = places.first().filter(|_| is_known || is_both_ways) else {
         return Vec::new();
     };
     let limited = |sir: f32| f64::from(sir.min(f32::MAX));

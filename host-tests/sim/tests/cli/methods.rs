@@ -7,7 +7,7 @@ use uav_relay_scenario::scene::Scene;
 use super::{chain, example, json, refusal};
 
 #[test]
-fn a_way_back_is_accepted_by_align_only() {
+fn a_way_back_is_refused_by_joint_only() {
     let file = std::env::temp_dir().join(format!("way_back_{}.toml", std::process::id()));
     let text = uav_relay_scenario::DEFAULT;
     std::fs::write(&file, format!("{text}\n[link]\nreverse = 1.0\n")).unwrap();
@@ -25,11 +25,14 @@ fn a_way_back_is_accepted_by_align_only() {
         report["relays"][0]["sir_back"].as_f64().unwrap() >= sir,
         "{report}"
     );
-    for method in ["joint", "adjust"] {
-        let (status, line) = refusal(&format!("{ask} --method {method}"));
-        assert_eq!(status, 2);
-        assert!(line.contains("reverse") && line.contains("Align"), "{line}");
-    }
+    let adjusted = json(&format!("{ask} --method adjust --rounds 3"));
+    assert!(
+        adjusted["sir"].as_f64().unwrap() > sir * (1.0 - 1e-5),
+        "{adjusted}"
+    );
+    let (status, line) = refusal(&format!("{ask} --method joint"));
+    assert_eq!(status, 2);
+    assert!(line.contains("reverse") && line.contains("Align"), "{line}");
     std::fs::remove_file(&file).unwrap();
 }
 

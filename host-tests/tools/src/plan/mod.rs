@@ -55,6 +55,9 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     if scenario.reverse > 0.0 && is_several {
         return Err(Refusal::ReverseSources.into());
     }
+    if matches!(scenario.interference, Interference::Field(_)) {
+        both_ways_only_by_align(scenario, "a plan in a [field]")?;
+    }
     if ask.x_m.is_some() {
         both_ways_only_by_align(scenario, "--x-m")?;
     }

@@ -378,8 +378,8 @@ fn a_field_out_of_range_is_named() {
         (372, &1_200_001_u32.to_le_bytes(), ConfigError::Silence),
         (
             376,
-            &one,
-            ConfigError::Mission(MissionError::ReverseInterference),
+            &2.0_f32.to_le_bytes(),
+            ConfigError::Mission(MissionError::Reverse),
         ),
         (376, &nan, ConfigError::Mission(MissionError::Reverse)),
         (380, &[0; 4], ConfigError::Mission(MissionError::RxPower)),

@@ -1,0 +1,36 @@
+//! Shares of a judge's values: worst, percentiles, and a line for the table.
+
+/// Shares of the judge's value, one for each scene.
+#[derive(Debug, Default)]
+pub(crate) struct Shares(Vec<f64>);
+
+impl Shares {
+    pub(crate) fn push(&mut self, share: f64) {
+        assert!(share.is_finite(), "{share}");
+        self.0.push(share);
+    }
+
+    /// Returns the share that `percent` of the scenes do not reach.
+    pub(crate) fn percentile(&self, percent: f64) -> f64 {
+        let mut sorted = self.0.clone();
+        sorted.sort_by(f64::total_cmp);
+        let at = (sorted.len() as f64 * percent / 100.0) as usize;
+        sorted
+            .get(at.min(sorted.len().saturating_sub(1)))
+            .copied()
+            .unwrap_or(1.0)
+    }
+
+    pub(crate) fn worst(&self) -> f64 {
+        self.percentile(0.0)
+    }
+
+    /// Prints a row of the table.
+    pub(crate) fn report(&self, what: &str) {
+        let [worst, first, median] = [0.0, 1.0, 50.0].map(|percent| self.percentile(percent));
+        println!(
+            "{what}: {} scenes, worst {worst:.6}, 1 % {first:.6}, median {median:.6}",
+            self.0.len()
+        );
+    }
+}
