@@ -42,7 +42,7 @@ fn a_way_back_out_of_range_is_refused() {
     assert!(
         MissionError::Reverse
             .to_string()
-            .contains("reverse must be within 0 to 1")
+            .contains("must be within 0 to 1")
     );
 }
 
