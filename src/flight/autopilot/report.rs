@@ -92,7 +92,7 @@ impl Line {
             Some(HoldReason::Close) => "relay: waits, too close to",
             Some(HoldReason::Lost) => "relay: waits, lost relay near",
             Some(HoldReason::NotFlown) => "relay: waits, not engaged:",
-            Some(HoldReason::Pending) => "relay: waits, space still used by",
+            Some(HoldReason::Pending) => "relay: waits, space used by",
             Some(HoldReason::Halted) => "relay: stops, wrong order past",
             None => "relay: no longer waits for",
         };
@@ -105,7 +105,7 @@ impl Line {
             Event::Infeasible => "relay: no target SIR can be met",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",
-            Event::LeaseLapsed => "relay: agreement expired, holds position",
+            Event::LeaseLapsed => "relay: agreement expired, keeps setpoint",
             Event::Adopted => "relay: new mission adopted",
             Event::UploadRefused { .. } => "relay: mission rejected: sites or geofence",
             Event::DuplicateIndex { .. } => "relay: duplicate relay number",
