@@ -4,7 +4,7 @@
 //! with another block they are ignored, and the drone flies the mission of the block.
 //!
 //! An upload in flight erases nothing, because an erase of these sectors stops the CPU for a second or two. A sector of 128 KiB
-//! holds 1092 records, so at least as many uploads are stored between two starts; further ones are flown but not stored.
+//! holds 1024 records, so at least as many uploads are stored between two starts; further ones are flown but not stored.
 
 use uav_relay::Upload;
 

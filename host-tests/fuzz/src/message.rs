@@ -215,5 +215,6 @@ impl Body<'_, '_> {
         self.altitude();
         self.small(0, 1);
         self.sir();
+        self.power();
     }
 }

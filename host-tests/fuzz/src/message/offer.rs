@@ -31,6 +31,12 @@ impl Body<'_, '_> {
         }
         let choice = self.input.byte();
         self.reals(&[if choice % 16 == 7 { 1e-12 } else { 0.0 }]);
+        // SIR needed on the way back, and power of Rx, W.
+        self.reals(if choice % 16 == 9 {
+            &[0.5, 5.0]
+        } else {
+            &[0.0, 80.0]
+        });
         self.sites(choice);
         self.answer(choice);
     }

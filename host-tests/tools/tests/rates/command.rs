@@ -198,7 +198,7 @@ fn what_has_no_way_back_is_refused_by_name() {
     );
     let line = String::from_utf8(plan(&several, "--uavs 3").stderr).unwrap();
     assert!(
-        line.contains("link.reverse above 0 needs one [[interferer]]"),
+        line.contains("link.reverse above 0 needs exactly one [[interferer]]"),
         "{line}"
     );
 }
