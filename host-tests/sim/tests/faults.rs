@@ -207,8 +207,9 @@ fn after_two_cuts_all_relays_return_to_one_view() {
     assert!(wrong.is_empty(), "{} of 84: {wrong:#?}", wrong.len());
 }
 
-/// Duration of a run with a one-way link, s. In its last [`STILL_S`] seconds nothing may change.
+/// Duration of a run with a one-way link, s.
 const ONE_WAY_S: u64 = 400;
+/// Time at the end of a run with a one-way link in which nothing may change, s.
 const STILL_S: u64 = 120;
 
 /// Returns the setups of runs with each possible one-way link in chains of 4 and 8 relays.

@@ -122,19 +122,19 @@ pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
 struct Group {
     first_s: f64,
     last_s: f64,
-    /// Numbers of the relays in the order of their entries, or, for two neighbours that linked, from Tx on.
+    /// Numbers of the relays in the order of their entries; two new neighbours are in order from Tx.
     relays: Vec<u16>,
     sample: MomentReport,
 }
 
-/// Longest time between successive log entries about one event, s.
+/// Longest time between two successive log entries that are grouped as one event, s.
 ///
 /// Neighbours may detect the same failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
 /// Groups log entries about the same event, sorted by time.
 ///
-/// An event in which all relays must take part counts at its last entry, any other at its first.
+/// The time of an event in which all relays take part is that of its last entry, otherwise that of its first.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {
@@ -382,7 +382,7 @@ pub struct RecoveryReport {
     /// Version of an uploaded mission that is first flown in this view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// Time when the upload of that mission began, s; absent without an upload.
+    /// Time when the upload of the mission `version` began, s; absent without an upload.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offered_s: Option<f64>,
     /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
@@ -497,7 +497,7 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
 
 /// Returns the time of the event that caused the loss or the return of relays, `lost` and `back`.
 ///
-/// For each relay it is the latest such event in `earlier`, and the result is the first of these times.
+/// The cause for a relay is its latest such event in `earlier`. Of all relays' causes, the earliest is returned.
 fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {

@@ -25,9 +25,8 @@ use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
 /// Number of packets that are sent after the end of a run, so that the rates are meaningful.
-///
-/// [`AFTER_A_HOP`] is the number of further packets for each hop.
 const AFTER: usize = 1_000;
+/// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;
 
 /// Largest number of packet transmissions, over all hops, that is simulated.

@@ -122,9 +122,8 @@ fn title(canvas: &mut Canvas, picture: &Picture) {
 }
 
 /// Upper edge of the view from above, in picture units. It lies below the axis of the side view.
-///
-/// [`PLOT_BOTTOM`] is its lower edge.
 const PLOT_TOP: f64 = BOTTOM + 52.0;
+/// Lower edge of the view from above, in picture units.
 const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
 const SIZE: f64 = 10.0;

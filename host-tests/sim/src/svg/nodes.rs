@@ -117,9 +117,8 @@ const SIR_SIZE: f64 = 10.0;
 const GAP: f64 = 4.6;
 
 /// Places along a hop at which its SIR may be written, as fractions of its length.
-///
-/// [`SIDES`] has the distances from the hop: positive above, negative below.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
+/// Distances of a SIR from its hop, in picture units: positive above the hop, negative below.
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
 /// Largest number of hops for which each SIR is written beside its hop. More are written in one row.

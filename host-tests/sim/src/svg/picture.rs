@@ -3,15 +3,17 @@
 use uav_relay::Mission;
 
 /// Width of a picture, in picture units. At half a page width the smallest text is about 5 pt.
-///
-/// [`HEIGHT`] is the height of one without a view from above and without events.
 pub(super) const WIDTH: f64 = 480.0;
+/// Height of a picture without a view from above and without events, in picture units.
 pub(super) const HEIGHT: f64 = 330.0;
 
-/// Left edge of the side view, in picture units. All edges leave space for title, vertical axis and legend.
+/// Left edge of the side view, in picture units. It leaves space for the vertical axis.
 pub(super) const LEFT: f64 = 54.0;
+/// Right edge of the side view, in picture units.
 pub(super) const RIGHT: f64 = WIDTH - 14.0;
+/// Upper edge of the side view, in picture units. It leaves space for the title.
 pub(super) const TOP: f64 = 46.0;
+/// Lower edge of the side view, in picture units. It leaves space for the legend.
 pub(super) const BOTTOM: f64 = HEIGHT - 80.0;
 
 /// Additional height of a picture with a view from above, in picture units.

@@ -3,8 +3,9 @@
 use super::canvas::{Area, Canvas, Frame, Labels, Point, width};
 use super::picture::{LEFT, OtherInterferers, Picture, RIGHT, TOP, length, near};
 
-/// Font size of the labels of interferers, in picture units. [`LINE`] is the distance between their lines of text.
+/// Font size of the labels of interferers, in picture units.
 const SIZE: f64 = 10.0;
+/// Distance between two lines of text in labels of interferers, in picture units.
 const LINE: f64 = 12.0;
 
 /// Largest number of interferers that have a label each. More have one label together.

@@ -156,7 +156,9 @@ impl Chain {
         }
     }
 
-    /// Returns the nodes that receive `node` on the shared channel. Nodes are relays from 0, then ground stations.
+    /// Returns the nodes that receive frames of `node` on the shared channel.
+    ///
+    /// Nodes are relays from 0, then ground stations.
     fn hearers(&self, node: usize) -> Vec<usize> {
         let relays = self.members.len();
         match node.checked_sub(relays) {
