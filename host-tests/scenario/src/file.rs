@@ -459,7 +459,7 @@ fn relays(
     Ok(relays)
 }
 
-/// Builds the `[plan]` of a file; an error unless it has exactly one position for every relay.
+/// Builds the `[plan]` of a file. It is an error unless the plan has exactly one position for every relay.
 fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
     if raw.places.len() != usize::from(raw.uavs) {
         return Err(mistake(

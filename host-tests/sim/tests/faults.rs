@@ -238,7 +238,7 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
 
 /// Describes what is wrong at the end of a run with a one-way link; `None` if nothing is.
 ///
-/// All relays but one of the two at the link have to hold positions in one view, without recent changes.
+/// All relays except one of the two at the link have to hold positions in one view, without recent changes.
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.observed).collect();
     let agreements = groups(&seen);
@@ -444,7 +444,7 @@ fn random_faults_let_at_most_one_group_fly() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
-/// Repeats a run in which two groups flew at once before a fix.
+/// Checks that only one group flies, in a run in which two groups flew at once before a fix.
 ///
 /// A view that only the last relay had accepted was followed by one without the relays that had voted for it and held
 /// its lease.

@@ -20,7 +20,7 @@ use crate::simulator::traffic::{TrafficSpec, traffic};
 use crate::simulator::true_interference::beta_w;
 use crate::svg::{OtherInterferers, Picture, lateral_view};
 
-/// A run that is ready to start: its setup, and the mission with the true interference to evaluate it.
+/// Run that is ready to start: its setup, and the mission with the true interference for the report.
 #[derive(Debug)]
 pub struct Prepared<'a> {
     options: &'a Options,

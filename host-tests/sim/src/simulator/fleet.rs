@@ -223,7 +223,7 @@ impl Vehicle {
         along.map_or([f64::NAN; 3], point)
     }
 
-    /// Converts a position of the relay to the line of the run, m; `None` if it is too far from it.
+    /// Converts a relay's position to coordinates of the run's original line, m; `None` if it is too far.
     ///
     /// The lines differ if an upload has moved Tx or Rx.
     pub(super) fn in_run_coordinates(&self, place: Placement) -> Option<Point> {
@@ -326,8 +326,8 @@ impl Vehicle {
 
     /// Returns true if the relay may send position targets now.
     ///
-    /// A drone in flight or landing accepts them, a PX4 in any mode, and an ArduCopter only while the relay controls
-    /// it.
+    /// Only a drone in flight or landing accepts targets: a PX4 in any mode, an ArduCopter only while the relay
+    /// controls it.
     fn accepts_targets(&self) -> bool {
         match self.landed {
             IN_AIR | LANDING => self.kind == Kind::Px4 || self.mode == Mode::Companion,
@@ -495,7 +495,7 @@ const FIRST_S: u64 = 5;
 /// Time between the take-offs of two successive drones, ms.
 const NEXT_MS: u64 = 500;
 
-/// Delay from the end of the climb to the pilot's hand-over, s, and before a further attempt.
+/// Delay from the end of the climb, or from a rejected hand-over, to the pilot's next hand-over, s.
 const LOOKS_S: u64 = 2;
 /// Delay from a restart of the autopilot or of the relay to the pilot's next hand-over, s.
 const RECOVERS_S: u64 = 10;

@@ -128,7 +128,7 @@ pub struct RelayEnd {
     pub setpoint: Option<Placement>,
     /// Linear target SIR for which the setpoint was agreed on; `None` without a target.
     pub target: Option<f32>,
-    /// Upper bound on the linear SIR that any chain reaches at these altitudes; only at the leader.
+    /// Upper bound on the linear SIR of any chain at the relays' altitudes; `None` except at the leader.
     pub bound: Option<f32>,
     /// Altitude and power of the relay.
     pub profile: Profile,
@@ -203,7 +203,7 @@ pub struct Outcome {
     pub nearest: Option<Nearest>,
     /// Closest approach of two drones with autopilots while no pilot controls either of them.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest value, m, of the distance of two drones less the distance that they have to keep.
+    /// Smallest margin, m: the distance of two drones minus the distance that they have to keep.
     ///
     /// Pairs with a drone in a pilot's hands do not count. A pair has to keep the mission's separation, or its
     /// distance at the last hand-over if that is smaller. Infinite if there was no such pair.

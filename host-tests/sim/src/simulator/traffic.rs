@@ -281,7 +281,8 @@ impl Queue {
 
     /// Replaces the hop on which the node sends, from `now` on.
     ///
-    /// To the same receiver the rest of the first packet is sent at the new rate. To another one it is sent anew.
+    /// If the receiver stays the same, the rest of the first packet is sent at the new rate. Otherwise the whole
+    /// packet is sent again.
     fn change(&mut self, hop: Option<Hop>, now: Ps) {
         self.rest = match (self.hop, hop) {
             (Some(old), Some(new)) if old.to == new.to && self.rest > 0 => {

@@ -47,7 +47,7 @@ impl Watch {
         }
     }
 
-    /// Counts the time since the last call, with unchanged states, as available or as outage.
+    /// Adds the time since the last call, in which no state changed, to the available or the outage time.
     pub fn count_time(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
