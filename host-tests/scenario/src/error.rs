@@ -50,7 +50,7 @@ pub enum Problem {
     SaidTwice,
     /// A position in latitude and longitude is given without the table `[site]`, to which it relates.
     NoSite,
-    /// The value of a key is a text that is not one of those allowed.
+    /// The value of a key is a text outside the list of allowed texts.
     UnknownChoice,
     /// The UDP address of an autopilot is malformed.
     NoEndpoint(EndpointError),

@@ -334,7 +334,7 @@ pub struct Planned {
 pub enum PlannedMethod {
     /// Placement at fixed altitudes: the paper's Algorithm 1, or Algorithm 4 in a random field.
     Align,
-    /// Placement along the line, sideways and in altitude together.
+    /// Placement that chooses position along the line, lateral offset and altitude of each relay together.
     Joint,
 }
 

@@ -146,7 +146,7 @@ fn cut(after: u16, from: u64, until: u64) -> Partition {
 
 /// Returns the setups of runs with all pairs of different partitions of eight relays.
 ///
-/// Both begin at the same time, or the second one begins later.
+/// Both partitions begin at the same time, or the second one begins later.
 fn cuts() -> Vec<Setup> {
     let mut all = Vec::new();
     for one in 1..8 {

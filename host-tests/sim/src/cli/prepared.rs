@@ -172,9 +172,9 @@ impl<'a> Prepared<'a> {
         Ok(chain)
     }
 
-    /// Returns the report of a run. Its SIRs are those with the true interference at the end of the run.
+    /// Returns the report of a run. Its SIRs are for the true interference at the end of the run.
     ///
-    /// The mission in `self.setup` is replaced by that with the true interference.
+    /// The mission in `self.setup` is replaced by one with the true interference.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
         let (options, scenario) = (self.options, &self.scenario);
         let listened = SensingReport::of(&self.setup, outcome);

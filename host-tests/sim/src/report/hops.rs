@@ -157,7 +157,7 @@ impl WorstBack {
     }
 }
 
-/// Relative difference up to which the worst SIRs of both directions count as equal. It is 0.004 dB, above the
+/// Relative difference up to which the worst SIRs of both directions count as equal. It is 0.004 dB, larger than the
 /// rounding errors.
 const EQUAL: f64 = 1e-3;
 

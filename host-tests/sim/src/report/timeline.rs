@@ -379,7 +379,7 @@ pub struct RecoveryReport {
     pub lost: Vec<u16>,
     /// Relays in this view (membership of the chain) that were not in the previous one, by number from 1.
     pub back: Vec<u16>,
-    /// Version of an uploaded mission that is first flown in this view.
+    /// Version of an uploaded mission that the chain first flies in this view; absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Time when the upload of the mission `version` began, s; absent without an upload.
@@ -393,7 +393,7 @@ pub struct RecoveryReport {
     /// Time when a neighbour first detected that a relay was lost or had returned, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detected_s: Option<f64>,
-    /// Time when the last of its relays accepted the view (membership of the chain), s.
+    /// Time when the last relay of the view (membership of the chain) accepted it, s.
     pub formed_s: f64,
     /// Time when all relays of the view had new positions, s; absent if another view came first.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -478,7 +478,7 @@ fn views(moments: &[Moment]) -> Vec<View> {
     whole.map(|(_, view)| view).collect()
 }
 
-/// Returns the version of the newest mission that relays of `view` adopted before or with it.
+/// Returns the version of the newest mission that relays of `view` had adopted when they accepted it.
 fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
     // A relay logs the adoption right after the view.
     let story = moments.get(..=view.span.1 + 1).unwrap_or(moments);
@@ -528,7 +528,7 @@ fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'
     })
 }
 
-/// Returns the last entry in which one of `members` accepts a position. `None` unless all accept one.
+/// Returns the last entry in which one of `members` accepts a position; `None` unless all accept one.
 fn convergence<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed = |moment: &&Moment| {
         moment.what == TimelineEvent::Converged && members.contains(&moment.relay)

@@ -337,7 +337,7 @@ pub struct Chain {
     attacker: Option<Attacker>,
     flight: Option<Flight>,
     fleet: Vec<Vehicle>,
-    /// Distance of each pair of drones at their last hand-over, m. `None` while a pilot flies one of the two.
+    /// Distance of each pair of drones at their last hand-over, m; `None` while a pilot flies one of them.
     handed_over_m: Vec<Option<f64>>,
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     medium: Option<Medium>,

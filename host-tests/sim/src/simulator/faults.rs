@@ -158,9 +158,9 @@ impl Bursts {
 /// Period in which relay `by` does not receive relay `of`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct OneWayFailure {
-    /// Number of the relay that does not receive the other one, from 1.
+    /// Number of the relay that does not receive relay `of`, from 1.
     pub by: u16,
-    /// Number of the relay that is not received, from 1.
+    /// Number of the relay that relay `by` does not receive, from 1.
     pub of: u16,
     /// Start of the one-way link failure.
     pub from: Instant,

@@ -104,7 +104,7 @@ impl Track {
         }
     }
 
-    /// Returns this record with the agreed positions replaced by `places`, m, at the same times.
+    /// Returns this record with the positions of all relays replaced by `places`, m, at the same times.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -427,7 +427,7 @@ pub struct DataLink {
     pub packet_bits: f64,
     /// True if data goes from Tx to Rx and from Rx to Tx; false if only to Rx.
     pub both: bool,
-    /// Data rate back relative to that to Rx, 0 to 1, for which the positions are chosen. 0 for one direction.
+    /// Ratio of the planned data rate to Tx to that to Rx, 0 to 1. It is 0 if only the direction to Rx is planned.
     pub reverse: f64,
 }
 

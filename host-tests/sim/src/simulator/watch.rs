@@ -103,7 +103,8 @@ impl Watch {
 
     /// Sets whether the chain counts as available from now on.
     ///
-    /// It does while the longest possible chain of the living relays holds the positions that it has without faults.
+    /// It is available while the longest possible chain of the living relays holds the positions that it has without
+    /// faults.
     pub fn set_available(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);

@@ -224,7 +224,7 @@ impl Chain {
 
     /// Appends to `note` the faults of a frame on the way to `receiver`: lost, twice, changed or late.
     ///
-    /// `arrivals` are the arrivals of `frame` there, with faults.
+    /// `arrivals` are the arrivals of `frame` at the receiver, after the faults.
     pub(super) fn remark(
         &self,
         note: &mut String,

@@ -162,8 +162,8 @@ impl Chain {
 
     /// Simulates an operator who confirms to relays that the drones of lost neighbours have landed.
     ///
-    /// Relays then no longer keep away from these drones. The operator waits while the next flying drone is in its
-    /// pilot's hands, or was until recently.
+    /// Relays then no longer keep away from these drones. The operator waits while a pilot controls the next flying
+    /// drone, and for some time after that.
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {
