@@ -8,8 +8,8 @@ use core::fmt;
 const PREFIX: &str = "udp:";
 
 /// Ports at which PX4's simulation listens for a companion computer, one for each vehicle from 0 to 9.
-/// [`PX4_SENDS_TO`] is the port to which vehicle 0 sends.
 const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
+/// Local port to which vehicle 0 of PX4's simulation sends. Each further vehicle sends to the next port.
 const PX4_SENDS_TO: u16 = 14_540;
 
 /// Default local port minus the autopilot's port, for ports outside of [`PX4_LISTENS`].

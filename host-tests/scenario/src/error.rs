@@ -42,19 +42,19 @@ pub enum Problem {
     Empty,
     /// The scenario file is not valid TOML.
     Syntax,
-    /// The table of a scenario file has a key that no such table may have.
+    /// A table of the scenario file has an unknown key.
     UnknownKey,
-    /// The table of a scenario file lacks a required key.
+    /// A table of the scenario file lacks a required key.
     Missing,
     /// Two keys that exclude each other are both given, such as a power in W and in dBm.
     SaidTwice,
     /// A position in latitude and longitude is given without the table `[site]`, to which it relates.
     NoSite,
-    /// The value of a key is a text that is not one of those allowed.
+    /// The value of a key is a text outside the list of allowed texts.
     UnknownChoice,
     /// The UDP address of an autopilot is malformed.
     NoEndpoint(EndpointError),
-    /// The plan has another number of places, or `[network]` another number of relays, than `plan.uavs`.
+    /// The number of positions in the plan, or of relays in `[network]`, differs from `plan.uavs`.
     OtherNumber,
     /// The file has a single table where a list of tables is required.
     NoList,
@@ -62,7 +62,7 @@ pub enum Problem {
     NoTable,
     /// The value of a key has the wrong type.
     WrongType,
-    /// The value of a key is outside its range: also a number that is NaN or infinite, or an empty text.
+    /// The value of a key is outside its range, is NaN or infinite, or is an empty text.
     OutOfRange,
     /// The value of a key is an empty list, although it needs an entry.
     EmptyList,

@@ -459,7 +459,7 @@ fn relays(
     Ok(relays)
 }
 
-/// Builds the `[plan]` of a file; an error unless it has exactly one position for every relay.
+/// Builds the `[plan]` of a file. It is an error unless the plan has exactly one position for every relay.
 fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
     if raw.places.len() != usize::from(raw.uavs) {
         return Err(mistake(
@@ -571,8 +571,9 @@ fn line_on_earth(file: &str, sites: &RawSites) -> Result<Line, ScenarioError> {
 //
 // An antenna has the same gain in all directions; a null toward the interferer is not modelled.
 
-/// Range of the EIRPs, W, that a mission accepts for Tx, Rx and relays. [`SOURCE_EIRP`] is the range for interferers.
+/// Range of the EIRPs, W, that a mission accepts for Tx, Rx and relays.
 const EIRP: [f64; 2] = [1e-6, 1e6];
+/// Range of the EIRPs, W, that a mission accepts for interferers.
 const SOURCE_EIRP: [f64; 2] = [1e-6, 1e9];
 
 #[derive(Deserialize)]
@@ -605,7 +606,7 @@ pub(super) struct GivenPower<'a> {
     pub(super) in_w: (&'a str, Option<f64>),
     pub(super) in_dbm: (&'a str, Option<f64>),
     pub(super) eirp: (&'a str, Option<f64>),
-    /// Name of the key, and value in dBi, of the antenna gain.
+    /// Antenna gain: the name of its key, and its value in dBi; `None` if it is not given.
     pub(super) gain: (&'a str, Option<f64>),
 }
 
@@ -681,9 +682,9 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
     })
 }
 
-/// Largest error of the interference, dB, at which an interferer above or below the ground is accepted.
+/// Largest error, dB, from treating an interferer above or below the ground as on the ground.
 ///
-/// The mission has all interferers on the ground. The limit holds at every position that relays or Rx may have.
+/// An interferer with a larger error is rejected. The error is checked at every position that relays or Rx may have.
 const MAX_HEIGHT_ERROR_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -799,10 +800,10 @@ fn on_earth(
 }
 
 impl RelayArea<'_> {
-    /// Returns the largest error of the interference, dB, if a source above ground is treated as on it.
+    /// Returns the largest error of the interference, dB, from treating an interferer as on the ground.
     ///
-    /// The source is at (`x_m`, `y_m`), `above_m` over the ground, m. For each of 65 altitudes, the error is that at
-    /// the nearest position which a relay may have, where it is largest. Rx, on the ground, is one more receiver.
+    /// The interferer is at (`x_m`, `y_m`), `above_m` over the ground, m. The error is checked at Rx and, for 65
+    /// altitudes, at the relay position nearest to the interferer, where it is largest.
     fn height_error_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;
         let ratio_db = |beside_m: f64, h: f64| {

@@ -17,10 +17,9 @@ const COARSE: usize = 400;
 /// Approximate number of quadrature points for the error in the final refinement of the position.
 const FINE: usize = 4_000;
 
-/// Number of grid steps along the line, for the decision on which side of it the interferer is.
-///
-/// [`ASIDE`] is the number of lateral steps of that grid.
+/// Number of grid steps along the line, in the search for the interferer's side of the line.
 const ALONG: u32 = 64;
+/// Number of lateral grid steps, in the search for the interferer's side of the line.
 const ASIDE: u32 = 8;
 
 /// Approximate number of quadrature points for the error that is reported with the result.
@@ -31,10 +30,11 @@ const REPORTED: usize = 60_000;
 /// At 30 times the extent, the interference is uniform to a thousandth.
 const FAR: f64 = 30.0;
 
-/// Grid step in u = asinh(y_H / lowest altitude). For y_H well above that altitude it is a factor of 1.4 in y_H.
+/// Grid step of the search for the lateral distance y_H, in u = asinh(y_H / lowest altitude). For y_H well above the
+/// lowest altitude, a step multiplies y_H by about 1.4.
 const RISE: f64 = 0.35;
 
-/// Largest number of the grid's local minima, and of true sources, from which local searches start.
+/// Largest number of the grid's local minima, and of true interferers, from which searches start.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
@@ -275,10 +275,10 @@ impl Space {
         graded(0.0, self.most_u, &[], 0.0, RISE)
     }
 
-    /// Minimises the error by the simplex method from `start`, as (x, u) in the search space.
+    /// Minimises the error by the simplex method from `start`, a point (x, u) of the search space.
     ///
-    /// The first simplex has `share` times the length over which the error changes. The search ends at the relative
-    /// `tolerance` or after `most` steps.
+    /// `share` is the size of the first simplex relative to the length over which the error changes. The search ends
+    /// at the relative `tolerance` or after `most` steps.
     fn descend(
         &self,
         raster: &Raster,
@@ -332,14 +332,14 @@ pub struct Raster {
 pub struct BestPower {
     /// Best transmit power of the hypothetical interferer at its position, W, > 0.
     pub power_w: f64,
-    /// Integral of |p / d^2 - S| over the points, with this interferer's power p and its distance d.
+    /// Error that remains: the integral of |p / d^2 - S| over the quadrature points.
     ///
-    /// S is the sum of p / d^2 over the true interferers. The unit is W for an integral over distance and altitude,
-    /// and W/m for one over distance at a single altitude.
+    /// p is this interferer's power, d its distance, and S the sum of p / d^2 over the true interferers. The unit is
+    /// W for an integral over distance and altitude, and W/m for one over distance only.
     pub error: f64,
 }
 
-/// A coordinate of a quadrature point, and its weight in that direction.
+/// Quadrature point in one direction: its coordinate, m, and its weight.
 type WeightedCoordinate = (f64, f64);
 
 impl Raster {
@@ -504,7 +504,7 @@ fn gauss(ends: &[f64]) -> Vec<WeightedCoordinate> {
         .collect()
 }
 
-/// Power with which an interferer would cause the true interference at a point, and the point's weight.
+/// Interferer power, W, that is right for one quadrature point, and the point's weight in the median.
 struct Ratio {
     value: f64,
     weight: f64,

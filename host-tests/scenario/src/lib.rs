@@ -82,8 +82,8 @@ impl deployment::Deployment {
 
     /// Parses only the settings in `[network]`, `[companion]` and `[ground]` of a scenario file.
     ///
-    /// Other than [`Self::load`] it accepts another number of relays than that of the plan, because the caller is
-    /// about to replace the plan. `file_name` is used only in error messages.
+    /// Unlike [`Self::load`], it accepts a number of relays that differs from the plan, because the caller is about
+    /// to replace the plan. `file_name` is used only in error messages.
     ///
     /// # Errors
     /// Invalid TOML, and any mistake in a section.

@@ -123,8 +123,8 @@ impl RateModel {
     }
 }
 
-/// Returns the smaller of the rate to Rx and the rate back divided by `reverse`, bit/s. If `reverse` is 0, that is
-/// the rate to Rx.
+/// Returns the data rate of the worse direction, bit/s: the rate to Tx counts divided by `reverse`. If `reverse` is
+/// 0, returns the rate to Rx.
 pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
     if reverse > 0.0 {
         there_bps.min(back_bps / reverse)

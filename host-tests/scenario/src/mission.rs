@@ -67,9 +67,9 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// Converts a scenario to the mission of `uavs` relays, and the profiles of relays that differ.
+/// Converts a scenario to a mission of `uavs` relays, and lists relays with an own altitude or power.
 ///
-/// Several interferers are replaced by one. The profiles come with the index of their relay, from 1.
+/// Several interferers are replaced by one. Each listed profile comes with the index of its relay, from 1.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -161,7 +161,7 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
     }
 }
 
-/// Returns an error line if the scenario describes a relay beyond a chain of `uavs`. Otherwise `None`.
+/// Returns an error line if the scenario has a `[[relay]]` whose index exceeds `uavs`. Otherwise `None`.
 pub fn undescribed_relay_error(scenario: &Scenario, uavs: u16) -> Option<String> {
     let (index, _) = scenario.relays.last_key_value()?;
     (*index > uavs).then(|| {
@@ -179,10 +179,10 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission as relays know it before they measure: a field with the same Upsilon everywhere.
+/// Returns the mission as relays know it before they measure: equal interference everywhere.
 ///
-/// Upsilon, the mean of the inverse interference in 1/W, is that at Rx. Missions without a field are returned
-/// unchanged.
+/// In a random field, the mean of the inverse interference (Upsilon) is set to that at Rx. Other missions are
+/// returned unchanged.
 #[must_use]
 pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();

@@ -12,7 +12,7 @@ pub struct Relay {
     pub altitude_m: f64,
     /// Transmit power of the relay, W, > 0.
     pub power_w: f64,
-    /// True if the relay keeps its altitude, even outside the band of altitudes that other relays may have.
+    /// True if the relay keeps its altitude, even outside the altitude limits of the other relays.
     pub holds: bool,
 }
 
@@ -52,7 +52,7 @@ pub struct Scene {
     pub tx_w: f64,
     /// Transmit power of Rx when it sends toward Tx, W, > 0.
     pub rx_w: f64,
-    /// SIR that a hop needs from Rx to Tx, relative to that from Tx to Rx; 0 for one direction.
+    /// Ratio of the SIR needed from Rx to Tx to that from Tx to Rx; 0 if only the way to Rx counts.
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
@@ -210,7 +210,7 @@ impl Scene {
 
     /// Returns the linear SIR of the worst hop from Tx to Rx; 0 if [`Scene::hop_sirs`] returns no hop.
     ///
-    /// With a way back it is that of the worse direction, the way back divided by `reverse`.
+    /// If `self.reverse` is above 0, the hops from Rx to Tx count, too, with their SIRs divided by it.
     pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
         let there = sirs.reduce(f64::min).unwrap_or(0.0);
@@ -221,7 +221,7 @@ impl Scene {
         back.fold(there, |worst, sir| worst.min(sir / self.reverse))
     }
 
-    /// Returns the linear SIR of the worst hop if relays are `along` metres from Tx, with lateral offset 0.
+    /// Returns the linear SIR of the worst hop for relays on the line, at the distances `along` from Tx, m.
     ///
     /// Each relay has its own altitude. Returns 0 unless there is one position per relay.
     pub fn sir_along(&self, along: &[f64]) -> f64 {

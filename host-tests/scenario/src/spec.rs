@@ -235,7 +235,7 @@ pub struct BetaPoint {
 /// Altitude and power of one relay that differ from those of the others. At least one is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
-    /// Fixed altitude of this relay, m, 0.1 to 1e4. It may be outside the band of the methods that choose altitudes.
+    /// Fixed altitude of this relay, m, 0.1 to 1e4. It may be outside `altitude_min_m` to `altitude_max_m`.
     pub altitude_m: Option<f64>,
     /// EIRP of this relay, W, 1e-6 to 1e6.
     pub power_w: Option<f64>,
@@ -334,7 +334,7 @@ pub struct Planned {
 pub enum PlannedMethod {
     /// Placement at fixed altitudes: the paper's Algorithm 1, or Algorithm 4 in a random field.
     Align,
-    /// Placement along the line, sideways and in altitude together.
+    /// Placement that chooses position along the line, lateral offset and altitude of each relay together.
     Joint,
 }
 

@@ -346,9 +346,9 @@ fn one_of_two_simultaneous_duplicates_flies() {
     }
 }
 
-/// Checks two relays with one number that sign their frames: the one with the larger epoch stays.
+/// Checks that of two relays with one number that sign, the one with the larger epoch stays active.
 ///
-/// The other one becomes passive and reports the duplicate.
+/// The other relay becomes passive and reports the duplicate.
 #[test]
 fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {
@@ -409,7 +409,7 @@ fn a_key_mismatch_is_reported_with_the_node() {
     }
 }
 
-/// Checks that two handshakes with a wrong key cause no report: it takes more of them.
+/// Checks that two handshakes with a wrong key cause no report. Relays report only after more of them.
 #[test]
 fn two_forged_handshakes_are_noise() {
     let mission = mission(3);
@@ -426,7 +426,7 @@ fn two_forged_handshakes_are_noise() {
     assert!(air.reporters(Event::KeyMismatch { node: 2 }).is_empty());
 }
 
-/// Checks that a relay that restarts with an older epoch is rejected. It and its neighbours report it.
+/// Checks that a relay that restarts with an older epoch is rejected. The relay and its neighbours report it.
 ///
 /// A newer epoch is accepted without a report.
 #[test]
@@ -447,7 +447,7 @@ fn an_epoch_that_went_back_is_reported_with_the_node() {
     }
 }
 
-/// Checks a relay that restarts with the epoch that it had. Its neighbours take it for a second relay 2.
+/// Checks a relay 2 that restarts with the same epoch. Its neighbours take it for a second relay 2.
 ///
 /// With the larger random claim it takes part at once. With the smaller one it reports that its number is taken, and
 /// gets no setpoint until its neighbours have received nothing of the larger claim for `dead_after`.

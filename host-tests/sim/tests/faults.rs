@@ -146,7 +146,7 @@ fn cut(after: u16, from: u64, until: u64) -> Partition {
 
 /// Returns the setups of runs with all pairs of different partitions of eight relays.
 ///
-/// Both begin at the same time, or the second one begins later.
+/// Both partitions begin at the same time, or the second one begins later.
 fn cuts() -> Vec<Setup> {
     let mut all = Vec::new();
     for one in 1..8 {
@@ -207,8 +207,9 @@ fn after_two_cuts_all_relays_return_to_one_view() {
     assert!(wrong.is_empty(), "{} of 84: {wrong:#?}", wrong.len());
 }
 
-/// Duration of a run with a one-way link, s. In its last [`STILL_S`] seconds nothing may change.
+/// Duration of a run with a one-way link, s.
 const ONE_WAY_S: u64 = 400;
+/// Time at the end of a run with a one-way link in which nothing may change, s.
 const STILL_S: u64 = 120;
 
 /// Returns the setups of runs with each possible one-way link in chains of 4 and 8 relays.
@@ -237,7 +238,7 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
 
 /// Describes what is wrong at the end of a run with a one-way link; `None` if nothing is.
 ///
-/// All relays but one of the two at the link have to hold positions in one view, without recent changes.
+/// All relays except one of the two at the link have to hold positions in one view, without recent changes.
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.observed).collect();
     let agreements = groups(&seen);
@@ -443,7 +444,7 @@ fn random_faults_let_at_most_one_group_fly() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
-/// Repeats a run in which two groups flew at once before a fix.
+/// Checks that only one group flies, in a run in which two groups flew at once before a fix.
 ///
 /// A view that only the last relay had accepted was followed by one without the relays that had voted for it and held
 /// its lease.

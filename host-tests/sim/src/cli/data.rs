@@ -45,7 +45,7 @@ enum Way {
 impl Data {
     /// Rejects traffic options without `--traffic`, and traffic toward Tx if its SIRs are not known.
     ///
-    /// They are unknown in a random field, and after an upload. `uploads` is true if the run has one.
+    /// SIRs toward Tx are unknown in a random field, and after an upload. `uploads` is true if the run has an upload.
     pub(super) fn agree(&self, interference: &Interference, uploads: bool) -> Result<(), Failure> {
         let told = [
             given_option("--bandwidth-hz", self.bandwidth_hz),

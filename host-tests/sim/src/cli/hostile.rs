@@ -105,7 +105,7 @@ impl Hostile {
 
     /// Checks that the options fit together and to a chain of `uavs` relays.
     ///
-    /// `is_loop` is true if `--closed-loop` is given, which allows no such events.
+    /// `is_loop` is true if `--closed-loop` is given, which excludes failures, attacks, uploads and drones.
     pub fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
@@ -316,13 +316,13 @@ impl Air {
         self.soak
     }
 
-    /// Returns the text of each `--deaf` option, for messages, with the start of the failure.
+    /// Returns each `--deaf` option as text, for error messages, and the start of its failure.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |deaf: &OneWayFailure| (format!("--deaf {}:{}", deaf.by, deaf.of), deaf.from);
         self.deaf.iter().map(name)
     }
 
-    /// Returns the end of each `--deaf` failure, or its start if it has no end, and the end of a `--soak`.
+    /// Returns the time when each `--deaf` failure ends, or starts if it is permanent, and a `--soak` ends.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
             .iter()
@@ -416,10 +416,10 @@ fn soak(text: &str) -> Result<Instant, String> {
 }
 
 /// Bound on the constant error of a drone's reported position, m.
-///
-/// [`NOISE_M`] bounds its random error, m. [`GUST_MPS`] is the standard deviation of the gusts, m/s.
 const BIAS_M: f64 = 0.5;
+/// Bound on the random error of a drone's reported position, m.
 const NOISE_M: f64 = 0.3;
+/// Standard deviation of the gusts, m/s per axis.
 const GUST_MPS: f64 = 0.3;
 
 /// Largest distance of a hovering drone's reported position from its setpoint, m.
@@ -452,7 +452,7 @@ impl Flight {
         self.fly
     }
 
-    /// Returns the text of each `--takeover` option, for messages, with the start of the takeover.
+    /// Returns each `--takeover` option as text, for error messages, and the start of the takeover.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |it: &Takeover| (format!("--takeover {}", it.relay), it.from);
         self.takeover.iter().map(name)

@@ -20,7 +20,7 @@ use crate::simulator::traffic::{TrafficSpec, traffic};
 use crate::simulator::true_interference::beta_w;
 use crate::svg::{OtherInterferers, Picture, lateral_view};
 
-/// A run that is ready to start: its setup, and the mission with the true interference to evaluate it.
+/// Run that is ready to start: its setup, and the mission with the true interference for the report.
 #[derive(Debug)]
 pub struct Prepared<'a> {
     options: &'a Options,
@@ -38,9 +38,9 @@ pub struct Prepared<'a> {
 pub enum Refused {
     /// Invalid options or scenario.
     Failed(Failure),
-    /// The relays cannot be placed, as the report says.
+    /// The relays cannot be placed, for the reason that the report states.
     ///
-    /// The failure is set only if the options are at fault: with the default scenario, which the user cannot change.
+    /// The failure is `Some` for the default scenario: the user cannot change that one, so the options are at fault.
     Reported(Box<ChainReport>, Option<Failure>),
 }
 
@@ -172,9 +172,9 @@ impl<'a> Prepared<'a> {
         Ok(chain)
     }
 
-    /// Returns the report of a run. Its SIRs are those with the true interference at the end of the run.
+    /// Returns the report of a run. Its SIRs are for the true interference at the end of the run.
     ///
-    /// The mission in `self.setup` is replaced by that with the true interference.
+    /// The mission in `self.setup` is replaced by one with the true interference.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
         let (options, scenario) = (self.options, &self.scenario);
         let listened = SensingReport::of(&self.setup, outcome);
@@ -217,7 +217,8 @@ impl<'a> Prepared<'a> {
         report::hop_sirs(&mission, &places)
     }
 
-    /// Returns the SIR of every hop on the way back, as [`Prepared::sirs_at`]. Empty in a mission of one direction.
+    /// Returns the linear SIR of every hop from Rx to Tx, otherwise as [`Prepared::sirs_at`]. Empty in a mission of
+    /// one direction.
     pub fn sirs_back_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
         let (mission, places) = self.chain_at(then, places);
         if mission.reverse() > 0.0 {
@@ -227,7 +228,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Returns the mission at `then`, and the positions with the relays' profiles.
+    /// Returns the mission with the interferer's position at `then`, and relay positions and profiles.
     fn chain_at(
         &self,
         then: Instant,

@@ -129,7 +129,7 @@ impl Uploads {
         Ok(())
     }
 
-    /// Returns the text of each `--upload` option, for messages, with the upload's start time.
+    /// Returns each `--upload` option as text, for error messages, and the start of the upload.
     pub fn begins(&self) -> impl Iterator<Item = (String, Instant)> {
         let name = |one: &Planned| (format!("--upload {}", one.text), one.at);
         self.upload.iter().map(name)

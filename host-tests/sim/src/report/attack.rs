@@ -15,9 +15,9 @@ pub struct AttackCountsReport {
     pub sent: u64,
     /// Number of the attacker's frames that a relay accepted as frames of a neighbour.
     pub taken: u64,
-    /// Number of the attacker's frames by the relay's counter that each incremented.
+    /// Number of the attacker's frames for each receive counter of a relay that they incremented.
     ///
-    /// `received` has the accepted frames. The other counters are reasons of rejection.
+    /// `received` counts accepted frames. Each other counter stands for a reason of rejection.
     pub counted: BTreeMap<&'static str, u64>,
 }
 

@@ -50,7 +50,7 @@ pub struct ChainReport {
     /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best possible linear SIR, 0, if no placement gives every hop a SIR above 0; absent otherwise.
+    /// Best possible linear SIR: 0 if no placement gives every hop a SIR above 0, absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
     /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
@@ -68,9 +68,9 @@ pub struct ChainReport {
     /// Target SIR that the relays agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// True if no chain of equal relays can reach a higher target SIR in the random field. False if unknown.
+    /// True if no chain of equal relays can exceed `target` in the random field, within the tolerance.
     ///
-    /// Absent without a field.
+    /// False if that is unknown. Absent without a random field.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
     /// Linear SIR of the chain before the first round of Algorithm 2, and after each round.
@@ -115,7 +115,7 @@ pub struct ChainReport {
     /// SIR with all interferers of the scenario, if the relays assume a single one in their place.
     #[serde(flatten)]
     pub against_all: Option<AllInterferersReport>,
-    /// Number of relays in the chain at the end; absent if the only events are accepted positions.
+    /// Number of relays in the chain at the end; absent if the log has only accepted positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
     /// Relays that are not in the chain at the end, with their last positions.
@@ -354,8 +354,8 @@ impl ChainReport {
 
 /// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
 ///
-/// The chain is the largest complete view, or all living relays if there is none. On separate links a failure is only
-/// reported: all relays stay. Without a quorum there is no chain.
+/// The chain is the largest view that all its relays have accepted, or else all relays that are on. On separate links
+/// with a failed relay it is all relays. Without a quorum it is empty.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -378,7 +378,7 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if `part` has all relays of one view, in the order of their indices in it.
+/// Returns true if `part` has all relays of one view (membership of the chain), ordered by index.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)

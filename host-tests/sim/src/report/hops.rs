@@ -120,17 +120,18 @@ pub struct WorstBack {
     pub worst_back: f64,
     /// SIR of the worst hop from Rx to Tx, dB.
     pub worst_back_db: f64,
-    /// SIR of the hop from Rx on the way back, linear.
+    /// Linear SIR of the hop from Rx to the last relay.
     pub rx_sir_back: f64,
-    /// The smaller of the worst SIR on the way there and of that on the way back divided by `reverse`.
+    /// Linear SIR of the worst hop of both directions; SIRs from Rx to Tx are divided by `reverse`.
     pub worst_both: f64,
-    /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. The SIR of the way back
-    /// is divided by `reverse`.
+    /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. SIRs from Rx to Tx are
+    /// divided by `reverse` before they are compared.
     pub worst_direction: &'static str,
 }
 
 impl WorstBack {
-    /// Finds the worst hop of both directions linear SIRs from Rx to Tx. `None` if the mission requires none.
+    /// Finds the worst hop of both directions, as [`Self::with`]. `None` if the mission requires no SIR from Rx to
+    /// Tx.
     pub fn of(mission: &Mission, there: &[f64], back: &[f64]) -> Option<Self> {
         let reverse = f64::from(mission.config().reverse);
         if reverse > 0.0 {
@@ -140,7 +141,7 @@ impl WorstBack {
         }
     }
 
-    /// Returns the worst hop of both directions. `None` without hops.
+    /// Finds the worst hop from linear SIRs to Rx (`there`) and to Tx (`back`). `None` without hops.
     pub fn with(reverse: f64, there: &[f64], back: &[f64]) -> Option<Self> {
         let worst = |sirs: &[f64]| sirs.iter().copied().reduce(f64::min);
         let (worst_there, worst_back) = (worst(there)?, worst(back)?);
@@ -156,7 +157,7 @@ impl WorstBack {
     }
 }
 
-/// Relative difference up to which the worst SIRs of both directions count as equal. It is 0.004 dB, above the
+/// Relative difference up to which the worst SIRs of both directions count as equal. It is 0.004 dB, larger than the
 /// rounding errors.
 const EQUAL: f64 = 1e-3;
 

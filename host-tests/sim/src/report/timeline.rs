@@ -122,19 +122,19 @@ pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
 struct Group {
     first_s: f64,
     last_s: f64,
-    /// Numbers of the relays in the order of their entries, or, for two neighbours that linked, from Tx on.
+    /// Numbers of the relays in the order of their entries; two new neighbours are in order from Tx.
     relays: Vec<u16>,
     sample: MomentReport,
 }
 
-/// Longest time between successive log entries about one event, s.
+/// Longest time between two successive log entries that are grouped as one event, s.
 ///
 /// Neighbours may detect the same failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
 /// Groups log entries about the same event, sorted by time.
 ///
-/// An event in which all relays must take part counts at its last entry, any other at its first.
+/// The time of an event in which all relays take part is that of its last entry, otherwise that of its first.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {
@@ -379,10 +379,10 @@ pub struct RecoveryReport {
     pub lost: Vec<u16>,
     /// Relays in this view (membership of the chain) that were not in the previous one, by number from 1.
     pub back: Vec<u16>,
-    /// Version of an uploaded mission that is first flown in this view.
+    /// Version of an uploaded mission that the chain first flies in this view; absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
-    /// Time when the upload of that mission began, s; absent without an upload.
+    /// Time when the upload of the mission `version` began, s; absent without an upload.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offered_s: Option<f64>,
     /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
@@ -393,7 +393,7 @@ pub struct RecoveryReport {
     /// Time when a neighbour first detected that a relay was lost or had returned, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detected_s: Option<f64>,
-    /// Time when the last of its relays accepted the view (membership of the chain), s.
+    /// Time when the last relay of the view (membership of the chain) accepted it, s.
     pub formed_s: f64,
     /// Time when all relays of the view had new positions, s; absent if another view came first.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -478,7 +478,7 @@ fn views(moments: &[Moment]) -> Vec<View> {
     whole.map(|(_, view)| view).collect()
 }
 
-/// Returns the version of the newest mission that relays of `view` adopted before or with it.
+/// Returns the version of the newest mission that relays of `view` had adopted when they accepted it.
 fn adopted(moments: &[Moment], view: &View) -> Option<u16> {
     // A relay logs the adoption right after the view.
     let story = moments.get(..=view.span.1 + 1).unwrap_or(moments);
@@ -497,7 +497,7 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
 
 /// Returns the time of the event that caused the loss or the return of relays, `lost` and `back`.
 ///
-/// For each relay it is the latest such event in `earlier`, and the result is the first of these times.
+/// The cause for a relay is its latest such event in `earlier`. Of all relays' causes, the earliest is returned.
 fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {
@@ -528,7 +528,7 @@ fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'
     })
 }
 
-/// Returns the last entry in which one of `members` accepts a position. `None` unless all accept one.
+/// Returns the last entry in which one of `members` accepts a position; `None` unless all accept one.
 fn convergence<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed = |moment: &&Moment| {
         moment.what == TimelineEvent::Converged && members.contains(&moment.relay)

@@ -10,14 +10,13 @@ use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec
 /// Number of periods that remain at the start of a shortened text, and at its end.
 const ENDS: usize = 10;
 
-/// Largest number of queues that the text lists completely. Of more, it lists the 8 longest.
+/// Largest number of queues that the text lists completely. If there are more, it lists the 8 longest.
 const SHOWN: usize = 16;
 
 /// Data traffic of a run. Arrays have the direction to Rx first and then, if used, that back to Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficReport {
-    /// Data rates at the positions of the first agreement, bit/s, for each direction. The planner's formula gives
-    /// them.
+    /// Promised data rates, bit/s, for each direction: by the planner's formula at the first agreement.
     pub promised_bps: Vec<f64>,
     /// Data rates of the packets that the sources created, bit/s, for each direction.
     pub offered_bps: Vec<f64>,

@@ -51,7 +51,7 @@ pub struct AttackCounts {
 
 #[derive(Clone, Debug)]
 pub(super) struct Recorded {
-    /// Time when the recorded frame arrives at its receiver. To send it again earlier would be no replay.
+    /// Time when the recorded frame arrives at its receiver. The attacker does not replay it earlier.
     pub(super) arrived: Instant,
     /// Port at which the receiver gets the recorded frame.
     pub(super) port: Port,
@@ -71,7 +71,7 @@ const ATTACKER: u64 = 2;
 /// Largest number of frames that the attacker records; it discards the oldest.
 const MEMORY: usize = 65_536;
 
-/// Number of recorded frames that the attacker picks at random before it gives up. It needs one that has arrived.
+/// Number of random picks of a recorded frame before the attacker gives up. The frame must have arrived.
 const TRIES: usize = 64;
 
 impl Attacker {
@@ -166,8 +166,9 @@ pub(super) fn incremented_counter(before: &Stats, after: &Stats) -> &'static str
         .map_or("oversized", |(name, _)| name)
 }
 
-/// Flag in the header of a frame with a tag (signature). The flag [`HELLO`] marks a handshake.
+/// Flag in the header of a frame with a tag (signature).
 const SIGNED: u8 = 0x10;
+/// Flag in the header of a frame that is a handshake.
 const HELLO: u8 = 0x20;
 
 const CHECK: usize = 4;
@@ -232,7 +233,7 @@ fn false_message(
     copy.unwrap_or_else(|| random_message(mission, way, rng))
 }
 
-/// Returns a copy of a recorded frame with false values and the same or a slightly higher number.
+/// Returns a copy of a recorded frame with false values, and the same or a slightly higher number.
 ///
 /// `None` unless the frame is a message that relays pass along the whole chain, or a reply to one.
 fn altered_copy(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {

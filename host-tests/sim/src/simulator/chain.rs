@@ -307,7 +307,7 @@ struct Member {
     record: Option<ViewRecord>,
     /// Last setpoint that was within its limits, so that it is not checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of the relay's setpoints since it last had none.
+    /// Smallest and largest coordinates of the setpoints since the relay last had no setpoint.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -337,7 +337,7 @@ pub struct Chain {
     attacker: Option<Attacker>,
     flight: Option<Flight>,
     fleet: Vec<Vehicle>,
-    /// Distance of each pair of drones at their last hand-over, m. `None` while a pilot flies one of the two.
+    /// Distance of each pair of drones at their last hand-over, m; `None` while a pilot flies one of them.
     handed_over_m: Vec<Option<f64>>,
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     medium: Option<Medium>,
@@ -515,7 +515,7 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
     Ok(members)
 }
 
-/// Queues the restarts of autopilots and the landings of drones that a pilot keeps. Returns their number.
+/// Queues restarts of autopilots, and landings of drones that a pilot never returns. Returns their number.
 fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     let Some(fleet) = &setup.fleet else {
         return 0;

@@ -135,7 +135,7 @@ pub struct Nearest {
 }
 
 impl Nearest {
-    /// Returns the two closest of `places` at `now`, and their distance; `None` for fewer than two.
+    /// Finds the two closest of `places`, the drones' positions at `now`; `None` for fewer than two.
     pub(super) fn of(places: &[Point], now: Instant) -> Option<Self> {
         let mut nearest: Option<Self> = None;
         for (one, at) in places.iter().enumerate() {

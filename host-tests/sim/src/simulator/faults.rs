@@ -105,7 +105,7 @@ impl Faults {
 
 /// Model of bursts of losses (Gilbert-Elliott): each direction of a link is in a good or a bad state.
 ///
-/// A bad one loses all frames, a good one none.
+/// In the bad state it loses all frames, in the good state none.
 #[derive(Debug)]
 pub struct Bursts {
     /// Mean fraction of lost frames. It equals the fraction of frames that find the link in the bad state.
@@ -136,7 +136,7 @@ impl Bursts {
 
     /// Returns the mean number of successive losses if each frame is lost with the probability `share`.
     ///
-    /// This is the smallest length that the model can have.
+    /// It is the shortest mean burst that [`Bursts::new`] accepts.
     pub fn shortest(share: f64) -> f64 {
         1.0 / (1.0 - share)
     }
@@ -158,9 +158,9 @@ impl Bursts {
 /// Period in which relay `by` does not receive relay `of`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct OneWayFailure {
-    /// Number of the relay that does not receive the other one, from 1.
+    /// Number of the relay that does not receive relay `of`, from 1.
     pub by: u16,
-    /// Number of the relay that is not received, from 1.
+    /// Number of the relay that relay `by` does not receive, from 1.
     pub of: u16,
     /// Start of the one-way link failure.
     pub from: Instant,

@@ -81,10 +81,10 @@ pub fn somewhere(distance_m: f64) -> Option<Axis> {
 const DRONES: u64 = 1_000;
 
 /// Largest speed of a drone between positions, m/s.
-///
-/// [`CLIMB_MPS`] is its speed at take-off and landing, m/s, and [`ACCELERATION_MPS2`] its acceleration, m/s².
 const SPEED_MPS: f64 = 10.0;
+/// Largest speed of a drone at take-off and landing, m/s.
 const CLIMB_MPS: f64 = 2.0;
+/// Largest acceleration of a drone, m/s².
 const ACCELERATION_MPS2: f64 = 3.0;
 
 /// Time without a position target after which a PX4 leaves OFFBOARD and hovers (`COM_OBL_RC_ACT` 5).
@@ -93,7 +93,7 @@ const LOST: Duration = Duration::from_millis(1_000);
 /// Time with a stream of position targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
 const RESUMES: Duration = Duration::from_millis(1_200);
 
-/// Time that the restart of an autopilot takes. It is silent meanwhile.
+/// Time that the restart of an autopilot takes. The autopilot is silent meanwhile.
 const AWAY: Duration = Duration::from_millis(3_000);
 
 /// Time within which a relay learns of a new flight mode or state of its autopilot.
@@ -104,10 +104,13 @@ const MODE_KNOWN_WITHIN: Duration = Duration::from_millis(1_500);
 /// Height that a pilot climbs after taking a drone over, to leave the chain, m.
 const ASIDE_M: f64 = 15.0;
 
-/// Value of MAVLink's `MAV_LANDED_STATE` for a drone on the ground. The other states follow.
+/// Value of MAVLink's `MAV_LANDED_STATE` for a drone on the ground.
 const ON_GROUND: u8 = 1;
+/// Value of MAVLink's `MAV_LANDED_STATE` for a drone in flight.
 const IN_AIR: u8 = 2;
+/// Value of MAVLink's `MAV_LANDED_STATE` for a drone that takes off.
 const TAKING_OFF: u8 = 3;
+/// Value of MAVLink's `MAV_LANDED_STATE` for a drone that lands.
 const LANDING: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]
@@ -220,7 +223,7 @@ impl Vehicle {
         along.map_or([f64::NAN; 3], point)
     }
 
-    /// Converts a position of the relay to the line of the run, m; `None` if it is too far from it.
+    /// Converts a relay's position to coordinates of the run's original line, m; `None` if it is too far.
     ///
     /// The lines differ if an upload has moved Tx or Rx.
     pub(super) fn in_run_coordinates(&self, place: Placement) -> Option<Point> {
@@ -323,8 +326,8 @@ impl Vehicle {
 
     /// Returns true if the relay may send position targets now.
     ///
-    /// A drone in flight or landing accepts them, a PX4 in any mode, and an ArduCopter only while the relay controls
-    /// it.
+    /// Only a drone in flight or landing accepts targets: a PX4 in any mode, an ArduCopter only while the relay
+    /// controls it.
     fn accepts_targets(&self) -> bool {
         match self.landed {
             IN_AIR | LANDING => self.kind == Kind::Px4 || self.mode == Mode::Companion,
@@ -487,14 +490,14 @@ impl Vehicle {
     }
 }
 
-/// Time when the first drone takes off, s. Each further drone takes off [`NEXT_MS`] after the one before.
+/// Time when the first drone takes off, s.
 const FIRST_S: u64 = 5;
+/// Time between the take-offs of two successive drones, ms.
 const NEXT_MS: u64 = 500;
 
-/// Delay from the end of the climb to the pilot's hand-over, s, and before a further attempt.
-///
-/// [`RECOVERS_S`] is the delay after a restart of the autopilot or of the relay, s.
+/// Delay from the end of the climb, or from a rejected hand-over, to the pilot's next hand-over, s.
 const LOOKS_S: u64 = 2;
+/// Delay from a restart of the autopilot or of the relay to the pilot's next hand-over, s.
 const RECOVERS_S: u64 = 10;
 
 /// Flight mode of a drone: who controls it.

@@ -128,7 +128,7 @@ pub struct RelayEnd {
     pub setpoint: Option<Placement>,
     /// Linear target SIR for which the setpoint was agreed on; `None` without a target.
     pub target: Option<f32>,
-    /// Upper bound on the linear SIR that any chain reaches at these altitudes; only at the leader.
+    /// Upper bound on the linear SIR of any chain at the relays' altitudes; `None` except at the leader.
     pub bound: Option<f32>,
     /// Altitude and power of the relay.
     pub profile: Profile,
@@ -201,14 +201,14 @@ pub struct Outcome {
     pub moments: Vec<Moment>,
     /// Closest approach of two flying drones; `None` if no flight was simulated.
     pub nearest: Option<Nearest>,
-    /// Closest approach of two drones with autopilots while no pilot controls either of them.
+    /// Closest approach of two drones with autopilots while no pilot controls them; `None` without one.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest value, m, of the distance of two drones less the distance that they have to keep.
+    /// Smallest margin, m: the distance of two drones minus the distance that they have to keep.
     ///
     /// Pairs with a drone in a pilot's hands do not count. A pair has to keep the mission's separation, or its
     /// distance at the last hand-over if that is smaller. Infinite if there was no such pair.
     pub margin_m: f64,
-    /// The two drones, their distance and the time at which `margin_m` was reached.
+    /// Pair of drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
     pub margin_at: Option<Nearest>,
     /// Number of position targets that autopilots received in a state that forbids them.
     ///

@@ -104,7 +104,7 @@ impl Track {
         }
     }
 
-    /// Returns this record with the agreed positions replaced by `places`, m, at the same times.
+    /// Returns this record with the positions of all relays replaced by `places`, m, at the same times.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -136,8 +136,8 @@ pub struct TrueHops {
 impl TrueHops {
     /// Prepares the true SIRs of a run of `setup`, whose relays fly `mission` at first.
     ///
-    /// They are those with all interferers of `scenario`, which may move. In a random field, and in a run with
-    /// uploads, they are those of the mission that the chain flies.
+    /// The SIRs are those with all interferers of `scenario`, which may move. In a random field, and in a run with
+    /// uploads, the interference is that of the mission that the chain flies.
     pub fn new(scenario: &Scenario, setup: &Setup, mission: &Mission) -> Self {
         let relays = mission.relays();
         let moved = setup
@@ -333,7 +333,7 @@ struct Members {
 }
 
 impl Members {
-    /// Returns the relays of the view that most living relays have accepted; of several the newest.
+    /// Returns the relays of the view that most living relays have accepted. Of several such views it is the newest.
     fn of(states: &BTreeMap<usize, RelayState>) -> Option<Self> {
         let on = || states.iter().filter(|(_, state)| state.observed.is_on);
         let mut counts: BTreeMap<(ViewId, u16), usize> = BTreeMap::new();
@@ -375,7 +375,7 @@ impl Members {
         self.relays.iter().enumerate().map(place).collect()
     }
 
-    /// Returns the node numbers from Tx, 0, to Rx, `rx`. `None` for a relay that cannot send.
+    /// Returns the numbers of the chain's nodes, from Tx (0) to Rx (`rx`); `None` for one that cannot send.
     fn nodes(&self, rx: usize) -> Vec<Option<usize>> {
         let alive = self.relays.iter().map(|member| {
             let (relay, state) = (*member)?;
@@ -410,7 +410,7 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction. They are set at an agreement and for a new view.
+/// Time slots of all hops, for each direction. They are set anew at each agreement and for each new view.
 struct Layout {
     view: ViewId,
     agreed: Option<Vec<(usize, Point)>>,
@@ -427,7 +427,7 @@ pub struct DataLink {
     pub packet_bits: f64,
     /// True if data goes from Tx to Rx and from Rx to Tx; false if only to Rx.
     pub both: bool,
-    /// Data rate back relative to that to Rx, 0 to 1, for which the positions are chosen. 0 for one direction.
+    /// Ratio of the planned data rate to Tx to that to Rx, 0 to 1. It is 0 if only the direction to Rx is planned.
     pub reverse: f64,
 }
 
@@ -517,7 +517,7 @@ impl DataLink {
     }
 }
 
-/// Returns a share of a time, 0 to 1, rounded down.
+/// Returns a fraction of a time: `time` multiplied by `share`, 0 to 1, rounded down.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -680,7 +680,7 @@ mod tests {
         open_for: 7,
     };
 
-    /// Counts the picoseconds within slots one by one, for comparison.
+    /// Counts the picoseconds within slots one by one, as the reference for the tests of `Window`.
     fn counted(from: u64, until: u64) -> u64 {
         let is_open = |at: &u64| (10..17).contains(&((at - 100) % 30));
         (from..until).filter(is_open).count() as u64

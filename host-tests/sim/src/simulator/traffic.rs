@@ -25,9 +25,8 @@ use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
 /// Number of packets that are sent after the end of a run, so that the rates are meaningful.
-///
-/// [`AFTER_A_HOP`] is the number of further packets for each hop.
 const AFTER: usize = 1_000;
+/// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;
 
 /// Largest number of packet transmissions, over all hops, that is simulated.
@@ -282,7 +281,8 @@ impl Queue {
 
     /// Replaces the hop on which the node sends, from `now` on.
     ///
-    /// To the same receiver the rest of the first packet is sent at the new rate. To another one it is sent anew.
+    /// If the receiver stays the same, the rest of the first packet is sent at the new rate. Otherwise the whole
+    /// packet is sent again.
     fn change(&mut self, hop: Option<Hop>, now: Ps) {
         self.rest = match (self.hop, hop) {
             (Some(old), Some(new)) if old.to == new.to && self.rest > 0 => {

@@ -47,7 +47,7 @@ impl Watch {
         }
     }
 
-    /// Counts the time since the last call, with unchanged states, as available or as outage.
+    /// Adds the time since the last call, in which no state changed, to the available or the outage time.
     pub fn count_time(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
@@ -103,7 +103,8 @@ impl Watch {
 
     /// Sets whether the chain counts as available from now on.
     ///
-    /// It does while the longest possible chain of the living relays holds the positions that it has without faults.
+    /// It is available while the longest possible chain of the living relays holds the positions that it has without
+    /// faults.
     pub fn set_available(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);

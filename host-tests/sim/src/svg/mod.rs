@@ -46,7 +46,9 @@ pub fn draw(picture: &Picture) -> String {
     canvas.finish()
 }
 
-/// Returns the scales of the side view. The scale x has the chain and all near interferers; h begins at the ground.
+/// Returns the scales of the side view's axes.
+///
+/// The x axis includes the chain and all near interferers. The height axis begins at the ground.
 fn frame(picture: &Picture) -> Frame {
     let distance = length(picture);
     let (mut low, mut high, mut top) = (0.0_f64, distance, 0.0_f64);
@@ -122,9 +124,8 @@ fn title(canvas: &mut Canvas, picture: &Picture) {
 }
 
 /// Upper edge of the view from above, in picture units. It lies below the axis of the side view.
-///
-/// [`PLOT_BOTTOM`] is its lower edge.
 const PLOT_TOP: f64 = BOTTOM + 52.0;
+/// Lower edge of the view from above, in picture units.
 const PLOT_BOTTOM: f64 = BOTTOM + ABOVE;
 
 const SIZE: f64 = 10.0;
@@ -134,9 +135,9 @@ const SIZE: f64 = 10.0;
 /// An interferer farther away is an arrow at the edge.
 const FARTHEST: f64 = 2.0;
 
-/// Lateral extent of the view from above toward an interferer too far away, in distances from Tx to Rx.
+/// Lateral extent of the view from above toward an interferer that is too far to the side to show.
 ///
-/// It applies if relays must stay on the line.
+/// It is a fraction of the distance from Tx to Rx, and applies if relays must stay on the line.
 const TOWARD_FAR: f64 = 0.4;
 
 /// Draws the view from above. `side` has the scale along the line; `view` has the relays' lateral offsets.
@@ -271,7 +272,7 @@ const LINE: f64 = 48.0;
 /// Distance of the first and the last event from the picture's left and right edge, in picture units.
 const MARGIN: f64 = 52.0;
 
-/// Largest number of events in a picture. The middle ones of more are merged.
+/// Largest number of events in a picture. If there are more, the middle ones are merged.
 const MOST: usize = 8;
 
 /// Largest number of characters in the text of an event. Longer texts are cut.

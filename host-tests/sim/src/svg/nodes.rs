@@ -68,7 +68,7 @@ pub(super) fn cross(canvas: &mut Canvas, (x, y): Point, arm: f64) {
 
 /// Writes the numbers of the relays where there is free space.
 ///
-/// In a short chain every relay gets a number. In a long one, every fifth, tenth and so on does, and the lost ones.
+/// In a short chain every relay gets a number. In a long chain only every fifth or tenth does, and each lost relay.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let radius = radius(picture, frame);
     let step = round_step((picture.nodes.len() as f64 / 12.0).max(1.0));
@@ -117,22 +117,21 @@ const SIR_SIZE: f64 = 10.0;
 const GAP: f64 = 4.6;
 
 /// Places along a hop at which its SIR may be written, as fractions of its length.
-///
-/// [`SIDES`] has the distances from the hop: positive above, negative below.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
+/// Distances of a SIR from its hop, in picture units: positive above the hop, negative below.
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
-/// Largest number of hops for which each SIR is written beside its hop. More are written in one row.
+/// Largest number of hops for which each SIR is written beside its hop. For more hops, the SIRs are in one row.
 const FEW: usize = 21;
 
 pub(super) struct Hop {
     number: usize,
     line: [Point; 2],
-    /// SIR that counts, dB.
+    /// SIR of the hop in the worse of its directions, dB; `None` if it is unknown.
     decibels: Option<f64>,
-    /// SIR on the way to Rx and on the way back, dB.
+    /// SIRs of the hop in the direction to Rx and in that to Tx, dB; `None` if unknown.
     ways: [Option<f64>; 2],
-    /// True in a picture of both directions.
+    /// True if the picture shows SIRs of both directions, to Rx and back to Tx.
     has_back: bool,
     colour: (&'static str, f64),
     silent: bool,
@@ -268,9 +267,9 @@ fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> V
     places
 }
 
-/// Draws a line from a hop's SIR to the hop, if the hop is shorter than that text.
+/// Draws a line from the text with a hop's SIR to the hop, if the hop is shorter than that text.
 ///
-/// Without it, the reader could not tell to which hop the text belongs.
+/// Without the line, the reader could not tell to which hop the text belongs.
 fn leader(canvas: &mut Canvas, hop: &Hop, from: Point, to: Point, (width, height): Point) {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);

@@ -3,15 +3,17 @@
 use uav_relay::Mission;
 
 /// Width of a picture, in picture units. At half a page width the smallest text is about 5 pt.
-///
-/// [`HEIGHT`] is the height of one without a view from above and without events.
 pub(super) const WIDTH: f64 = 480.0;
+/// Height of a picture without a view from above and without events, in picture units.
 pub(super) const HEIGHT: f64 = 330.0;
 
-/// Left edge of the side view, in picture units. All edges leave space for title, vertical axis and legend.
+/// Left edge of the side view, in picture units. It leaves space for the vertical axis.
 pub(super) const LEFT: f64 = 54.0;
+/// Right edge of the side view, in picture units.
 pub(super) const RIGHT: f64 = WIDTH - 14.0;
+/// Upper edge of the side view, in picture units. It leaves space for the title.
 pub(super) const TOP: f64 = 46.0;
+/// Lower edge of the side view, in picture units. It leaves space for the legend.
 pub(super) const BOTTOM: f64 = HEIGHT - 80.0;
 
 /// Additional height of a picture with a view from above, in picture units.
@@ -36,9 +38,9 @@ pub struct Picture {
     pub lateral_view: Option<LateralView>,
     /// Linear SIR of every hop from Tx to Rx. A hop is grey if its value is not finite and positive.
     pub hop_sir: Vec<f64>,
-    /// Linear SIR of every hop on the way back, from Tx to Rx; empty if only the way to Rx counts.
+    /// Linear SIR of every hop in the direction to Tx, the hop next to Tx first. Empty if only the way to Rx counts.
     pub hop_sir_back: Vec<f64>,
-    /// SIR that a hop needs on the way back relative to the way to Rx, 0 to 1.
+    /// Ratio, 0 to 1, of the SIR that a hop needs in the direction to Tx to that in the direction to Rx.
     pub reverse: f64,
     /// Numbers, 1 to N, of silent relays. They are crossed out, and their hops are dashed.
     pub lost: Vec<usize>,
@@ -48,7 +50,7 @@ pub struct Picture {
     pub events: Vec<(f64, String)>,
 }
 
-/// Kind of interferers in a picture that are not really there now.
+/// Kind of the faint interferers in a picture: those before an upload, or an estimated one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum OtherInterferers {
     /// Interferers of the mission that was flown before an upload.
@@ -148,8 +150,8 @@ pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
 
-/// Returns the smaller SIR (linear) of both directions of hop `number`, from 1. That of the way back is divided by
-/// `reverse`.
+/// Returns the linear SIR of hop `number`, from 1, in its worse direction; `None` without such a hop. SIRs of the way
+/// back are divided by `reverse`.
 pub(super) fn counted(picture: &Picture, number: usize) -> Option<f64> {
     let at = number.checked_sub(1)?;
     let there = picture.hop_sir.get(at).copied()?;
@@ -160,7 +162,7 @@ pub(super) fn counted(picture: &Picture, number: usize) -> Option<f64> {
     }
 }
 
-/// Returns the lowest linear SIR that counts, of the hops with a known one.
+/// Returns the lowest linear SIR of all hops, each in its worse direction; `None` if none is known.
 pub(super) fn worst(picture: &Picture) -> Option<f64> {
     let sirs = (1..=picture.hop_sir.len())
         .filter_map(|number| counted(picture, number))
@@ -173,9 +175,9 @@ pub(super) fn is_gone(picture: &Picture, number: usize) -> bool {
     picture.lost.contains(&number) || picture.left_out.contains(&number)
 }
 
-/// Returns true if `x` is between Tx and Rx, or beyond by at most a fifth of their distance, in m.
+/// Returns true if `x`, m, is between Tx and Rx or outside by at most a fifth of `distance`, m.
 ///
-/// The x axis then includes it.
+/// The x axis of the picture then includes it.
 pub(super) fn near(x: f64, distance: f64) -> bool {
     x >= -0.2 * distance && x <= 1.2 * distance
 }

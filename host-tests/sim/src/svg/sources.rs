@@ -3,20 +3,21 @@
 use super::canvas::{Area, Canvas, Frame, Labels, Point, width};
 use super::picture::{LEFT, OtherInterferers, Picture, RIGHT, TOP, length, near};
 
-/// Font size of the labels of interferers, in picture units. [`LINE`] is the distance between their lines of text.
+/// Font size of the labels of interferers, in picture units.
 const SIZE: f64 = 10.0;
+/// Distance between two lines of text in labels of interferers, in picture units.
 const LINE: f64 = 12.0;
 
-/// Largest number of interferers that have a label each. More have one label together.
+/// Largest number of interferers that each have a label. If there are more, they have one label together.
 const CROWD: usize = 8;
 
-/// Largest number of lines of text about interferers beyond the plot.
+/// Largest number of lines of text about interferers outside the plot.
 const FAR_LINES: usize = 4;
 
 /// Interferer: transmit power, W, and position x along the line and y to its right, m.
 type Source = (f64, f64, f64);
 
-/// Splits interferers into those within the plot and those beyond it. Values that are not finite are left out.
+/// Splits interferers into those within the plot and those outside. Values that are not finite are left out.
 fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
     let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
     all.iter()
@@ -25,13 +26,13 @@ fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
         .partition(|(_, x, _)| near(*x, distance))
 }
 
-/// Returns the height of the text about interferers beyond the plot, in picture units.
+/// Returns the height of the text about interferers outside the plot, in picture units.
 pub(super) fn headroom(picture: &Picture) -> f64 {
     let (_, far) = sorted(&picture.interferers, length(picture));
     far.len().min(FAR_LINES) as f64 * LINE
 }
 
-/// Draws interferers in the side view: symbols on the ground or, beyond the plot, arrows with a text.
+/// Draws interferers in the side view: symbols on the ground or, outside the plot, arrows with a text.
 pub(super) fn draw(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let (inside, far) = sorted(&picture.interferers, length(picture));
     draw_distant(canvas, labels, &far);
@@ -49,9 +50,9 @@ pub(super) fn diamond((x, y): Point) -> [Point; 4] {
     [(x, y - 6.0), (x + 6.0, y), (x, y + 6.0), (x - 6.0, y)]
 }
 
-/// Returns an arrow for an interferer beyond the view from above.
+/// Returns an arrow for an interferer that is above or below the range of the view from above.
 ///
-/// `down` is true at its lower edge, where the arrow points down, and false at the upper edge.
+/// `down` is true at the lower edge of the view, where the arrow points down, and false at the upper edge.
 fn arrow((x, y): Point, down: bool) -> [Point; 3] {
     let inward = if down { -1.0 } else { 1.0 };
     let (tip, back) = (y + 2.0 * inward, y + 10.0 * inward);
@@ -269,7 +270,7 @@ fn draw_label(
     }
 }
 
-/// Writes a line of text for each interferer beyond the plot, with an arrow toward it.
+/// Writes a line of text for each interferer outside the plot, with an arrow toward it.
 fn draw_distant(canvas: &mut Canvas, labels: &mut Labels, far: &[Source]) {
     let shown = if far.len() > FAR_LINES {
         FAR_LINES - 1

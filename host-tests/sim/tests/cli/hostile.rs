@@ -144,7 +144,7 @@ fn with_tags_an_attack_has_no_effect() {
     }
 }
 
-/// Checks that relays that do not sign frames accept an attacker's, and that the report shows the harm.
+/// Checks that relays without signatures accept an attacker's frames, and that the report shows it.
 #[test]
 fn without_tags_accepted_forgeries_are_reported() {
     let attacked = "--uavs 4 --forge 1000 --replay 100 --no-auth --json";
@@ -236,9 +236,9 @@ fn an_overloaded_channel_is_refused_before_flight() {
     assert!(json("--baud 9600 --wires")["sir"].as_f64().unwrap() > 1.0);
 }
 
-/// Checks the refusal of a channel that is too slow for fifty relays in range of each other.
+/// Checks that a channel that is too slow for fifty relays in range of each other is refused.
 ///
-/// It names settings that would do, and the slower probing that it names does.
+/// The error names settings that would suffice. A run with the slower probing that it names is accepted.
 #[test]
 fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::{chain, example, json, refusals};
 
-/// Largest ratio of the delivered to the promised data rate. It allows for rounding.
+/// Largest accepted ratio of the delivered to the promised data rate. It allows for rounding.
 const MOST: f64 = 1.0 + 1e-5;
 
 fn number(value: &Value) -> f64 {

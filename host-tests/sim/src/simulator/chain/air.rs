@@ -156,7 +156,9 @@ impl Chain {
         }
     }
 
-    /// Returns the nodes that receive `node` on the shared channel. Nodes are relays from 0, then ground stations.
+    /// Returns the nodes that receive frames of `node` on the shared channel.
+    ///
+    /// Nodes are relays from 0, then ground stations.
     fn hearers(&self, node: usize) -> Vec<usize> {
         let relays = self.members.len();
         match node.checked_sub(relays) {
@@ -222,7 +224,7 @@ impl Chain {
 
     /// Appends to `note` the faults of a frame on the way to `receiver`: lost, twice, changed or late.
     ///
-    /// `arrivals` are the arrivals of `frame` there, with faults.
+    /// `arrivals` are the arrivals of `frame` at the receiver, after the faults.
     pub(super) fn remark(
         &self,
         note: &mut String,

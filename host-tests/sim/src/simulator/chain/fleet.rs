@@ -18,9 +18,9 @@ const ARRIVED_M: f64 = 1.0;
 /// Period in which the simulated operator looks for landed drones of lost relays.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
-/// Distance, m, in addition to the required separation, within which another moving drone is traffic.
+/// Distance, m, beyond the required separation, from which on a pilot ignores another moving drone.
 ///
-/// A pilot hands no drone over while there is traffic.
+/// A pilot hands no drone over while a moving drone is nearer.
 const TRAFFIC_M: f64 = 30.0;
 
 /// Time after which a pilot lands a drone whose relay is off, or which the pilot took over for good.
@@ -66,7 +66,7 @@ impl Chain {
 
     /// Updates the smallest separation margin of two drones, `margin_m` of the outcome.
     ///
-    /// It checks all pairs of drones of which no pilot flies one.
+    /// It checks all pairs of flying drones that no pilot controls.
     fn measure_pairs(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let count = self.fleet.len();
@@ -162,8 +162,8 @@ impl Chain {
 
     /// Simulates an operator who confirms to relays that the drones of lost neighbours have landed.
     ///
-    /// Relays then no longer keep away from these drones. The operator waits while the next flying drone is in its
-    /// pilot's hands, or was until recently.
+    /// Relays then no longer keep away from these drones. The operator waits while a pilot controls the next flying
+    /// drone, and for some time after that.
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {
@@ -250,7 +250,7 @@ impl Chain {
         self.line_up();
     }
 
-    /// Moves all simple drones for one time step. Those of living relays report their positions to them.
+    /// Moves all simple drones for one time step. Relays that are on get the reported positions of their drones.
     pub(super) fn fly(&mut self) {
         let now = self.now;
         let Some(mut flight) = self.flight.take() else {
@@ -294,7 +294,7 @@ impl Chain {
         }
     }
 
-    /// Returns true if every simple drone with a living relay is at its agreed position, as it believes.
+    /// Returns true if each simple drone of a living relay is at its agreed position by its own estimate.
     ///
     /// True without simple drones.
     pub(super) fn has_arrived(&self) -> bool {

@@ -103,7 +103,7 @@ impl Chain {
 
     /// Returns true if one of the longest possible chains of the living relays holds its best positions.
     ///
-    /// If all of these lack a quorum, no relay may hold a position, and the result is false.
+    /// If these chains are too small for a quorum, their relays hold no positions, and the result is false.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
@@ -197,7 +197,7 @@ impl Chain {
         }
     }
 
-    /// Groups the living relays into parts of the chain, in order from Tx.
+    /// Groups the living relays into parts of the chain that can communicate, in order from Tx.
     ///
     /// A part ends at a partition, and before a gap that is wider than the radio range.
     fn parts(&self) -> Vec<Vec<&Member>> {
@@ -244,16 +244,16 @@ impl Chain {
     }
 }
 
-/// Returns true if `part` has all relays of one view, in the order of their indices in it.
+/// Returns true if `part` has all relays of one view (membership of the chain), ordered by index.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
     })
 }
 
-/// Returns true if all parts of the chain are too small for a quorum, and their relays know it.
+/// Returns true if no part of the chain has enough relays for a quorum, and the relays know it.
 ///
-/// Each relay must know its present neighbours, and one of each part must have reported the missing quorum.
+/// Each relay must know its present neighbours, and one relay of each part must have reported the missing quorum.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));
@@ -272,7 +272,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all relays of `part` hold positions that were agreed on for the same target SIR.
+/// Returns true if all of these relays hold positions that were agreed on for the same target SIR.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()
@@ -474,7 +474,7 @@ impl Chain {
 }
 
 impl Member {
-    /// Returns the number of passes and view proposals that this relay has begun, before reboots, too.
+    /// Returns the number of passes and view proposals that this relay has begun, even before reboots.
     ///
     /// A pass is a message that relays forward along the whole chain.
     fn begun(&self) -> u32 {
