@@ -89,9 +89,8 @@ struct Bound<'a> {
     targets: Targets,
 }
 
-/// Node with its possible cells in ascending order of x.
-///
-/// For each cell it has the largest squared length, m^2, of a hop that the node can receive there at its target SIR.
+/// Node with its possible cells in ascending order of x. For each cell it has the largest squared length, m^2, of a
+/// hop that the node can receive there at its target SIR.
 struct Node<'a> {
     cells: &'a [Range<f64>],
     hears_squared: Vec<f64>,
@@ -199,9 +198,8 @@ fn retain(cells: &mut Vec<Range<f64>>, kept: &[bool]) {
     cells.retain(|_| kept.next() == Some(&true));
 }
 
-/// Returns, for each cell of `here`, true if a hop with some cell of `other` meets the target SIRs.
-///
-/// The hop must be short enough for the receiver at each of its ends.
+/// Returns, for each cell of `here`, true if a hop with some cell of `other` meets the target SIRs. The hop must be
+/// short enough for the receiver at each of its ends.
 fn possible(here: &Node<'_>, other: &Node<'_>) -> Vec<bool> {
     let pairs = here.cells.iter().zip(&here.hears_squared);
     pairs

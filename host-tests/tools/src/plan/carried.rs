@@ -41,10 +41,9 @@ pub struct Carried<'a> {
 }
 
 impl<'a> Carried<'a> {
-    /// Creates the planner for up to `most` relays; `None` where the positions of the best SIR are used.
-    ///
-    /// These also maximise the rate, or no better ones are searched for: with free altitudes, a given x, a field or
-    /// several interferers.
+    /// Creates the planner for up to `most` relays; `None` where the positions of the best SIR are used. These also
+    /// maximise the rate, or no better ones are searched for: with free altitudes, a given x, a field or several
+    /// interferers.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -147,10 +146,8 @@ impl<'a> Carried<'a> {
         Plan { proven, ..plan }
     }
 
-    /// Returns the positions of the largest rate that Algorithm 1 finds, by bisection on the rate.
-    ///
-    /// For each rate it uses the ratio of the SIRs that the two directions need. `least` is a rate that is met,
-    /// bit/s/Hz.
+    /// Returns the positions of the largest rate that Algorithm 1 finds, by bisection on the rate. For each rate it
+    /// uses the ratio of the SIRs that the two directions need. `least` is a rate that is met, bit/s/Hz.
     fn by_ratio(&self, briefed: &ProfiledMission, least: f64) -> Option<Vec<Placement>> {
         let reverse = self.scenario.reverse;
         let model = &self.radio.link.model;
@@ -199,9 +196,8 @@ fn chain(
         .then_some(places)
 }
 
-/// Returns true if it is proven that no positions carry `bits_per_hz`, bit/s/Hz, over each hop to Rx.
-///
-/// With `reverse` above 0 each hop must also carry `reverse` times that rate toward Tx.
+/// Returns true if it is proven that no positions carry `bits_per_hz`, bit/s/Hz, over each hop to Rx. With `reverse`
+/// above 0 each hop must also carry `reverse` times that rate toward Tx.
 pub fn carries_no(scene: &Scene, radio: &Radio, reverse: f64, bits_per_hz: f64) -> bool {
     let model = &radio.link.model;
     let Some(there) = model.sinr(bits_per_hz) else {

@@ -213,9 +213,8 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
     }
 }
 
-/// Returns the points at which a hop crosses the antimeridian, at longitude 180 and -180 degrees.
-///
-/// The hop takes the shorter way between its ends. `None` if it does not cross.
+/// Returns the points at which a hop crosses the antimeridian, at longitude 180 and -180 degrees. The hop takes the
+/// shorter way between its ends. `None` if it does not cross.
 fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let [lon, lat, high] = from;
     let [other_lon, other_lat, other_high] = to;

@@ -148,10 +148,8 @@ impl<'a> Times<'a> {
         }
     }
 
-    /// Returns the time of a hop for one bit, s Hz; infinite if the hop carries nothing or is too short.
-    ///
-    /// With `guide` a radio's rate steps get a small extra time that falls as the SIR rises, to decide between equal
-    /// times.
+    /// Returns the time of a hop for one bit, s Hz; infinite if the hop carries nothing or is too short. With `guide`
+    /// a radio's rate steps get a small extra time that falls as the SIR rises, to decide between equal times.
     fn time(&self, hop: &Hop, from: Point, to: Point, guide: bool) -> f64 {
         let apart = to.x - from.x;
         if apart < hop.least_m - ROUNDING * self.scene.distance_m || apart < 0.0 {
@@ -435,7 +433,7 @@ impl Table {
         u16::try_from(last).unwrap_or(u16::MAX)
     }
 
-    /// Returns the grid positions, x in m, of the best chain of `relays` relays; `None` if not in the table.
+    /// Returns the x of the relays, m, in the best grid chain of `relays` relays; `None` if there is none.
     pub fn start(&self, relays: u16) -> Option<&[f64]> {
         let at = usize::from(relays).checked_sub(1)?;
         self.starts.get(at).map(|(_, x)| x.as_slice())

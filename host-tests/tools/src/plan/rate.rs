@@ -260,9 +260,8 @@ impl MostRate {
         }
     }
 
-    /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s.
-    ///
-    /// For both directions the data rate is the smaller of the rate to Rx and the rate to Tx over r.
+    /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s. For both directions
+    /// the data rate is the smaller of the rate to Rx and the rate to Tx over r.
     fn of(&self, radio: &Radio, relays: u16) -> f64 {
         let relays = f64::from(relays);
         match radio.link.access {
