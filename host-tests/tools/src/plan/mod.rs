@@ -246,7 +246,7 @@ impl Plan {
 /// Largest number of relays that the planner tries when it looks for the number.
 const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
-/// Mission with the profiles of the relays that have their own, and the indices of fixed-altitude relays.
+/// Mission with the relays' own profiles (power, altitude), and the indices of fixed-altitude relays.
 struct ProfiledMission {
     mission: Mission,
     own: Vec<(u16, Profile)>,
