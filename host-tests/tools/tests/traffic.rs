@@ -277,7 +277,8 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
     assert!(carried > 0);
 }
 
-/// Chains that are planned for both directions, or for fitted slots, at the positions of the plan.
+/// Checks that simulated chains at the planned positions deliver the planner's data rates. The chains are planned for
+/// both directions, or for time slots as long as each hop needs.
 fn every_plan_is_kept(access: Access, has_steps: bool) {
     let first = number("SEED", 1);
     let (mut worst, mut carried) = (1.0_f64, 0);

@@ -219,7 +219,7 @@ pub struct WayBack {
     pub worst_back: f64,
     /// SIR of the worst hop in the direction from Rx to Tx, dB.
     pub worst_back_db: f64,
-    /// Fraction of the SIR to Rx that suffices toward Tx; absent if the relays are placed for one direction.
+    /// Fraction of the SIR to Rx that suffices toward Tx; absent if relays are placed for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
     /// SIR of the worst hop of both directions, linear; an SIR toward Tx counts divided by `reverse`.
