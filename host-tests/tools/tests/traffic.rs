@@ -210,11 +210,10 @@ impl Case {
     }
 }
 
-/// Returns the delivered data rate as a fraction of the planner's, and checks its limits.
+/// Checks the delivered data rate, and returns it as a fraction of the planner's rate `promised_bps`.
 ///
-/// It also checks that no packet is unaccounted for. The rate at the agreed positions is never exceeded. These differ
-/// from the planned ones: the rate to Rx by the tolerance, and that of the way back, for which positions are not
-/// chosen, by up to `most`.
+/// No packet may be unaccounted for, and the rate at the agreed positions is never exceeded. The planner's rate may
+/// be exceeded by the fraction `most`, because the agreed positions differ slightly from the planned ones.
 fn share(flow: &Flow, promised_bps: f64, most: f64, what: &str) -> f64 {
     let packets = flow.packets;
     let gone = packets.delivered + packets.dropped + packets.lost + flow.queued;

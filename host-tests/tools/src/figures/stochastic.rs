@@ -23,8 +23,7 @@ const ALPHA: f64 = 3.0;
 /// Largest interference power as a multiple of the power that a relay receives from 1 W right below it.
 const MOST: f64 = 2.0;
 
-/// Kind of interference field: varying along the line, or the same everywhere. Upsilon is E[1 / I], the mean of 1
-/// over the interference power I. Lambda is the power received from 1 W right below.
+/// Kind of interference field: varying along the line Tx-Rx, or the same everywhere.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {

@@ -35,7 +35,7 @@ fn is_allowed(expression: &str) -> bool {
     plain.split(" AND ").all(|part| part.split(" OR ").any(one))
 }
 
-/// Packages that the library may need in two versions.
+/// Packages of which the library may need two versions at once.
 ///
 /// embedded-hal 1.0 needs the older defmt, which re-exports the newer one.
 const TWICE: [&str; 1] = ["defmt"];

@@ -58,7 +58,7 @@ impl Block {
         }
     }
 
-    /// Returns true if this block is the expected output of `commands`, the block before it.
+    /// Returns true if this block is the expected output of `commands`, the block of commands before it.
     pub(crate) fn prints(&self, commands: &Self) -> bool {
         self.kind == Kind::Text && self.heading == commands.heading
     }
