@@ -23,7 +23,7 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
 
-/// Largest relative loss of rate on the grid at which a number of relays is still refined.
+/// Largest relative loss of rate on the coarse grid at which a number of relays is still refined.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
@@ -41,7 +41,7 @@ pub struct Carried<'a> {
 }
 
 impl<'a> Carried<'a> {
-    /// Creates the planner for up to `most` relays; `None` where the positions of the best SIR are used. These also
+    /// Creates the planner for up to `most` relays; `None` if the positions of the best SIR are used. They also
     /// maximise the rate, or no better ones are searched for: with free altitudes, a given x, a field or several
     /// interferers.
     pub fn new(
@@ -75,10 +75,10 @@ impl<'a> Carried<'a> {
         table.as_ref()
     }
 
-    /// Returns the largest number of relays whose grid time is within 5 % of the least, in fitted slots.
+    /// Returns the largest number of relays whose positions are worth a refinement, in fitted slots.
     ///
-    /// More relays need so much longer on the grid that no refinement makes up for it. At most the table's number of
-    /// relays.
+    /// A bit needs at most 5 % more time on the coarse grid than with the best number. With more relays no refinement
+    /// makes up for the loss.
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }

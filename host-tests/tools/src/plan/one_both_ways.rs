@@ -33,7 +33,7 @@ pub struct Best {
     pub x_m: f64,
     /// Reason for the position: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
     pub case: u8,
-    /// Explanation, for the user, of why the relay goes there.
+    /// Explanation, for the user, of why the relay goes to its position.
     pub words: String,
 }
 

@@ -37,7 +37,7 @@ const NEAREST: f64 = 1e-4;
 /// Number of grid points in the window around a relay's position; odd, to include the position.
 const WINDOW: i32 = 9;
 
-/// Largest number of times that the windows around the positions are searched.
+/// Largest number of searches in windows around the relays' positions.
 const MOST_WINDOWS: u32 = 260;
 
 /// Distance from a relay to the edges of its first search window, as a fraction of the line Tx-Rx.

@@ -287,7 +287,7 @@ pub struct PlanReport {
     /// SIR of the plan's worst hop, linear. For both directions an SIR toward Tx counts divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// SIR of the plan's worst hop, dB; counted as for `sir`.
+    /// SIR of the plan's worst hop, dB. For both directions an SIR toward Tx counts divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
     /// SIRs in the direction from Rx to Tx; absent in a field of interference known only along the line.

@@ -83,7 +83,7 @@ fn licences() -> Result<Vec<String>, String> {
 
 /// Returns an error message for each package that the library needs in several versions.
 ///
-/// Packages that only tests or the build need are not counted, nor those in [`TWICE`].
+/// Packages in [`TWICE`], and packages that only tests or the build need, are not counted.
 fn twice() -> Result<Vec<String>, String> {
     let text = tree(&[
         "--package=uav-relay",
