@@ -15,7 +15,7 @@ use uav_relay::{
 
 use crate::fixtures::NETWORK;
 
-/// Largest number of frames delivered at one instant. More mean that the relays never stop sending.
+/// Largest number of frames delivered at one instant. If it is exceeded, the relays never stop sending.
 const MOST_STEPS: u32 = 400_000;
 
 /// Frame in transit between two nodes of the test bench.
@@ -43,10 +43,10 @@ impl Frame {
     }
 }
 
-/// Function that routes a frame: takes the sender's index, its port, and the index of a receiver.
+/// Function that decides whether a frame from one node reaches another, and at which port.
 ///
-/// Returns the port at which the frame reaches that receiver; `None` if it does not. Indices are those in the chain,
-/// from 1.
+/// It takes the sender's index, its port, and the receiver's index, from 1. `None` means that the frame does not
+/// arrive.
 pub type Route = Box<dyn Fn(usize, Port, usize) -> Option<Port>>;
 
 /// Function that may change an arriving frame, and returns true if the frame is to be delivered.
@@ -126,12 +126,9 @@ impl Bench {
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Delivers the next frame that has arrived, or advances to the next timer or arrival.
+    /// Processes the next event: delivers a frame that has arrived, or advances the time to the next one.
     ///
     /// Then all nodes handle their timers and send. Returns false if nothing is left to do up to `until`.
-    ///
-    /// # Panics
-    /// The relays never stop sending, or a relay asks to be called at once again and again.
     pub fn step(&mut self, until: Instant) -> bool {
         let arrived = self
             .flying

@@ -43,7 +43,7 @@ pub fn settle(setup: Setup) -> Outcome {
     outcome
 }
 
-/// Runs `setup` without faults and with [`Faults::BAD_DAY`], and checks that both end alike.
+/// Runs `setup` without faults and with [`Faults::BAD_DAY`], and checks that both runs end alike.
 ///
 /// The faults must change neither the kind of ending nor a bit of the positions. Returns the run with faults, whose
 /// random numbers come from `seed`.

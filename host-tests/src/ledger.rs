@@ -95,12 +95,12 @@ pub fn left(outcome: &Outcome) -> Vec<u16> {
     living.map(|(index, _)| index).collect()
 }
 
-/// Runs a chain of only the relays `left` of `setup`, without faults, and returns its result.
+/// Runs a chain that consists of only the relays `left` of `setup`, without faults; returns its result.
 ///
-/// `config` is its mission.
+/// `config` is the mission of the chain.
 ///
 /// # Panics
-/// That chain does not settle.
+/// The chain does not settle.
 pub fn undisturbed(setup: &Setup, left: &[u16], config: MissionConfig) -> Outcome {
     let relays = u16::try_from(left.len()).unwrap();
     let mission = Mission::try_new(config).unwrap();
@@ -119,9 +119,9 @@ pub fn undisturbed(setup: &Setup, left: &[u16], config: MissionConfig) -> Outcom
     outcome
 }
 
-/// Checks that the relays `left` end as in an undisturbed chain of only these, to the bit.
+/// Checks that the relays `left` end as in an undisturbed chain of only these relays, to the bit.
 ///
-/// `version` and `config` are those of the mission that they must have at the end.
+/// `version` and `config` are those of the mission that the relays must have at the end.
 ///
 /// # Errors
 /// The first difference, a relay with another mission version, or setpoints outside their limits.

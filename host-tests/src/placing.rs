@@ -100,7 +100,7 @@ pub struct Solved {
     pub x: Vec<f64>,
     /// Relative shortfall of the SIR from the optimum: 1 - SIR / optimum.
     pub short: f64,
-    /// Number of message sweeps along the chain that the solution needs.
+    /// Number of passes of messages along the chain that the solution needs.
     pub sweeps: u32,
 }
 
@@ -138,9 +138,9 @@ pub fn optimum_is_found(
 pub struct Mixed {
     /// Number of chains for which the solver found an agreement.
     pub solved: u32,
-    /// Number of chains whose SIR is at most 2e-4 (relative) below the optimum.
+    /// Number of chains whose SIR is at most 2e-4 (relative) below the optimum of the reference.
     pub best: u32,
-    /// Largest number of message sweeps that one of the chains needed.
+    /// Largest number of passes of messages along the chain that one of the chains needed.
     pub sweeps: u32,
 }
 
@@ -225,14 +225,14 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
     })
 }
 
-/// Counters of tested reaches. A reach is the farthest position at which a hop meets a target SIR.
+/// Counters of tested hops. Each hop's farthest position that meets a target SIR is compared with the reference.
 #[derive(Debug, Default)]
 pub struct Reaches {
-    /// Number of reaches that end before Rx, so that the target limits them.
+    /// Number of hops whose farthest position is before Rx, so that the target limits it.
     pub inside: u32,
-    /// Number of reaches with nearer positions that miss the target, because the interferer is there.
+    /// Number of hops that miss the target at a nearer position, because the interferer is there.
     pub leaps: u32,
-    /// Number of target SIRs that no position meets.
+    /// Number of hops whose target SIR no position meets.
     pub infeasible: u32,
 }
 

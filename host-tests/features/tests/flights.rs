@@ -10,7 +10,7 @@ use uav_relay_features::{Chain, paper, shared};
 
 // Results of the full set of features; `-- --nocapture` prints them, for an update after a change of the arithmetic or the wire
 // format.
-/// Expected positions x, m, of a chain of five relays, each as the bits of an f32.
+/// Expected x of the relays in a chain of five, m, each as the bits of an f32.
 const OF_FIVE: [u32; 5] = [
     0x439b_7618,
     0x43ac_5a98,

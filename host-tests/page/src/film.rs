@@ -11,7 +11,7 @@ use uav_relay_sim::cli::Prepared;
 use uav_relay_sim::report::seconds;
 use uav_relay_sim::simulator::outcome::{Outcome, Shot, Transmission};
 
-/// Largest number of times at which the recorded picture changes; if there are more, some are merged.
+/// Largest number of pictures of the chain in a recording. If there are more, those close in time are merged.
 const STANDS: usize = 600;
 
 /// Largest number of frames in a recording; later frames are left out.
@@ -34,11 +34,11 @@ struct StandTold {
     ///
     /// The position is `None` before the relay has agreed on one.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
-    /// SIR of every hop from Tx to Rx at that time, linear. Empty if there is no relay to count.
+    /// SIR of every hop from Tx to Rx at that time, linear; empty if no relay counts.
     ///
-    /// Relays that are off or have no position do not count.
+    /// A relay counts if it is switched on and has a position.
     sirs: Vec<f32>,
-    /// The same on the way back; empty for one direction.
+    /// SIR of every hop in the direction from Rx to Tx, linear; empty for data in one direction.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     backs: Vec<f32>,
     /// Number of frames sent on all links from the start until this time.

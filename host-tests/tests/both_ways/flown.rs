@@ -49,7 +49,7 @@ fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     assert!(once >= 55, "{once}");
 }
 
-/// Checks that relays with different settings of the return direction do not form a chain.
+/// Checks that relays whose missions differ in `reverse` or in the power of Rx do not form a chain.
 #[test]
 fn relays_with_other_ways_back_do_not_form_a_chain() {
     let mut rng = generator(3307);

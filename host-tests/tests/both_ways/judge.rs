@@ -11,7 +11,7 @@ pub(crate) struct Chain {
     pub(crate) altitude_m: f64,
     /// Interferer: its power in W, and its x and y in m.
     pub(crate) interferer: [f64; 3],
-    /// Further interferers.
+    /// Further interferers, each with its power in W, and its x and y in m.
     pub(crate) others: Vec<[f64; 3]>,
     /// Points of a field that replaces the interferer: x in m, and Upsilon in 1/W. Empty for none.
     pub(crate) field: Vec<[f64; 2]>,
@@ -30,12 +30,12 @@ const GRID: usize = 300;
 const WINDOW: usize = 15;
 
 impl Chain {
-    /// Returns the number of relays.
+    /// Returns the number of relays in the chain.
     pub(crate) fn relays(&self) -> usize {
         self.powers_w.len() - 2
     }
 
-    /// Returns interference plus noise at a node, W.
+    /// Returns the power of interference plus noise at `node`, which is at x = `x`, W.
     fn disturbance_w(&self, node: usize, x: f64) -> f64 {
         if let [first, .., last] | [first @ last] = self.field.as_slice() {
             // With noise each point has 1 / (I + N), and lines between.
@@ -138,7 +138,7 @@ impl Chain {
         places.map(|(grid, &at)| grid[at]).collect()
     }
 
-    /// Returns the points of the first search: equidistant ones, and dense ones near interferer and ends.
+    /// Returns the x of the first search's grid, m. It is dense near the interferer and both ends.
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
         let mut points: Vec<f64> = (0..=GRID).map(|i| d * i as f64 / GRID as f64).collect();

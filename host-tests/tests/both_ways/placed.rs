@@ -7,7 +7,7 @@ use uav_relay_oracle::random::count;
 use super::judge::Chain;
 use super::scenes::{ENDS, LOS, NLOS, adversarial, in_noise, log_uniform, mission, narrow, usual};
 
-/// Returns the two-way SIR of the worst hop, and the positions, on which the relays agree.
+/// Returns the two-way SIR of the worst hop on the relays' agreed positions, and these positions.
 ///
 /// The SIR is 0 without an agreement. The two-way SIR of a hop is the smaller of its forward SIR and its backward SIR
 /// divided by the chain's `reverse`.
@@ -22,7 +22,7 @@ pub(crate) fn reached(chain: &Chain) -> (f64, Vec<f64>) {
 
 type Draw<R> = fn(&mut R, [f64; 2], f64) -> Chain;
 
-/// Checks in random scenes that the relays' agreement is as good as the best that a grid search finds.
+/// Checks in random scenes that the relays' agreed positions are as good as the best of a grid search.
 ///
 /// At least 99.5 % of the two-way SIRs are within 1e-4 of the best one, and none is below 0.99 of it.
 fn as_good_as_the_judge(seed: u64, scenes: usize, noisy: bool, draw: Draw<ChaCha8Rng>) {

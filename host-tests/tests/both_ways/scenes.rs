@@ -8,12 +8,12 @@ use uav_relay::{
 
 use super::judge::Chain;
 
-/// Path-loss factor of free space at 2 GHz.
+/// Path-loss factor of free space at 2 GHz, 1/m^2.
 pub(crate) const LOS: f64 = 7_020.0;
-/// Path-loss factor on the ground, 20.9 dB above that of free space.
+/// Path-loss factor on the ground, 1/m^2: 20.9 dB above that of free space.
 pub(crate) const NLOS: f64 = 7_020.0 * 123.0;
 
-/// Powers of Tx and Rx in W: strong, weak, and a strong Tx with a weak Rx.
+/// Pairs of the powers of Tx and Rx, W: both strong, both weak, and a strong Tx with a weak Rx.
 pub(crate) const ENDS: [[f64; 2]; 3] = [[80.0, 80.0], [1.0, 1.0], [80.0, 1.0]];
 
 /// Rounds a number to f32, the precision of the relays.
@@ -21,7 +21,7 @@ pub(crate) fn narrow(value: f64) -> f64 {
     f64::from(value as f32)
 }
 
-/// Draws a number, uniform in its logarithm.
+/// Draws a number from `least` to `most` whose logarithm is uniformly distributed.
 pub(crate) fn log_uniform(rng: &mut impl Rng, least: f64, most: f64) -> f64 {
     rng.random_range(least.ln()..=most.ln()).exp()
 }
@@ -108,7 +108,8 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
     chain
 }
 
-/// Draws a scene in a field: even, random within a factor, or that of some interferers.
+/// Draws a scene with an interference field of the given `kind`, known by points along the line. 0 is an even field,
+/// 1 random within a factor, and 2 that of some interferers.
 pub(crate) fn in_field(rng: &mut impl Rng, ends: [f64; 2], reverse: f64, kind: usize) -> Chain {
     let mut chain = usual(rng, ends, reverse);
     let points: usize = [1, rng.random_range(2..=9), 41][kind];

@@ -11,7 +11,8 @@ use super::judge::Chain;
 use super::scenes::{ENDS, log_uniform, narrow};
 use super::shares::Shares;
 
-/// Compares the loss with that of one direction, which the replacement has too.
+/// Checks chains for both directions if one hypothetical interferer replaces several. The positions chosen for both
+/// directions must have a higher median SIR than those for one direction.
 #[test]
 fn one_interferer_in_place_of_several_costs_no_more_than_in_one_direction() {
     let mut rng = generator(3325);

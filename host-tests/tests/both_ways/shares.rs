@@ -1,6 +1,6 @@
 //! Shares of a judge's values: worst, percentiles, and a line for the table.
 
-/// Shares of the judge's value, one for each scene.
+/// List of ratios, one for each random scene: the tested SIR over that of the reference search.
 #[derive(Debug, Default)]
 pub(crate) struct Shares(Vec<f64>);
 
@@ -10,7 +10,7 @@ impl Shares {
         self.0.push(share);
     }
 
-    /// Returns the share that `percent` of the scenes do not reach.
+    /// Returns the ratio below which `percent` of the scenes are.
     pub(crate) fn percentile(&self, percent: f64) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
@@ -25,7 +25,7 @@ impl Shares {
         self.percentile(0.0)
     }
 
-    /// Prints a row of the table.
+    /// Prints the worst, the 1 % and the median ratio as a table row with the label `what`.
     pub(crate) fn report(&self, what: &str) {
         let [worst, first, median] = [0.0, 1.0, 50.0].map(|percent| self.percentile(percent));
         println!(

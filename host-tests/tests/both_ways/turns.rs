@@ -15,16 +15,16 @@ use super::judge::Chain;
 use super::scenes::{ENDS, adversarial, in_noise, log_uniform, mission, narrow, usual};
 use super::shares::Shares;
 
-/// Position along the line and altitude, m.
+/// Position of a node: x along the line Tx-Rx, and altitude, both in m.
 type Place = [f64; 2];
 
-/// Rounds of turns of a flown chain.
+/// Number of rounds of Algorithm 2 in a simulated chain; in each round every relay moves once.
 const ROUNDS: u16 = 6;
 
-/// Grid points along x and in altitude.
+/// Numbers of grid points along x and in altitude that the reference search tries for a relay.
 const GRID: [usize; 2] = [240, 25];
 
-/// Returns interference plus noise at a node, W.
+/// Returns the power of interference plus noise at `node`, which is at the given position, W.
 fn disturbance_w(chain: &Chain, node: usize, [x, h]: Place) -> f64 {
     let [power_w, xi, yi] = chain.interferer;
     let on_ground = node == 0 || node > chain.relays();
@@ -32,7 +32,8 @@ fn disturbance_w(chain: &Chain, node: usize, [x, h]: Place) -> f64 {
     power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + chain.noise_w
 }
 
-/// Returns the smaller of forward SIR and backward SIR / r of the hop to `node`.
+/// Returns the two-way SIR of the hop to `node`, from position `from` to position `to`. It is the smaller of the
+/// forward SIR and the backward SIR divided by the chain's `reverse`.
 fn hop(chain: &Chain, node: usize, from: Place, to: Place) -> f64 {
     let squared = (to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2);
     let gain = 1.0 / (chain.loss[0] * squared);
@@ -41,7 +42,7 @@ fn hop(chain: &Chain, node: usize, from: Place, to: Place) -> f64 {
     there.min(back / chain.reverse)
 }
 
-/// Returns the place of a node; those of relays are `places`.
+/// Returns the position of `node`: 0 is Tx, then come the relays at `places`, and last Rx.
 fn place_of(chain: &Chain, places: &[Place], node: usize) -> Place {
     match node.checked_sub(1) {
         None => [0.0, 0.0],
@@ -49,7 +50,7 @@ fn place_of(chain: &Chain, places: &[Place], node: usize) -> Place {
     }
 }
 
-/// Returns the worst hop of a chain.
+/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`.
 fn value(chain: &Chain, places: &[Place]) -> f64 {
     let hops = (1..=places.len() + 1).map(|node| {
         let [from, to] = [node - 1, node].map(|node| place_of(chain, places, node));
@@ -58,7 +59,8 @@ fn value(chain: &Chain, places: &[Place]) -> f64 {
     hops.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the best place and value of relay `node` between its neighbours, within `altitudes_m`.
+/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops. It is found
+/// by a grid search with altitudes within `altitudes_m`.
 fn turn(chain: &Chain, places: &[Place], node: usize, altitudes_m: [f64; 2]) -> (Place, f64) {
     let [from, to] = [node - 1, node + 1].map(|node| place_of(chain, places, node));
     let worse = |at: Place| hop(chain, node, from, at).min(hop(chain, node + 1, at, to));
@@ -133,7 +135,8 @@ fn draw(rng: &mut ChaCha8Rng, round: usize) -> Chain {
     }
 }
 
-/// Compares a turn at random positions with the grid search. The fine search has the same rectangle.
+/// Checks that one relay's search in Algorithm 2 is as good as a dense grid search. The relays are at random
+/// positions; both searches have the same range of x and altitude.
 #[test]
 fn a_turn_is_as_good_as_a_dense_grid() {
     let mut rng = generator(3313);
@@ -215,7 +218,8 @@ fn a_turn_is_as_good_as_a_dense_grid() {
     assert!(silent.percentile(0.5) > 0.9999 && noisy.percentile(0.5) > 0.9999);
 }
 
-/// Compares flown chains with the same rounds of turns by the grid search, from the same start.
+/// Checks that Algorithm 2 in simulated chains gains as much SIR as the same rounds by grid search. Both start from
+/// the same positions.
 #[test]
 fn flown_turns_gain_what_turns_by_a_dense_grid_gain() {
     let mut rng = generator(3314);

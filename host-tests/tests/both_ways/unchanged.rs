@@ -60,7 +60,7 @@ fn places_of_one_direction_are_equal_to_the_bit() {
     assert_eq!(hash, RECORDED, "{hash:#018x}");
 }
 
-/// Runs a chain, and adds its positions and its number of messages to `hash`.
+/// Runs the simulated chain `setup`, and adds its positions and number of messages to `hash`.
 fn add_flown(hash: &mut u64, setup: Setup) {
     let outcome = settle(setup);
     for place in setpoints(&outcome) {

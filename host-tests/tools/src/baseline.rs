@@ -66,7 +66,7 @@ pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
 // The outer hops are at least as long as the altitude. If the hops span more than the distance even then, many chains are
 // equally good; the one that shortens every hop in the same proportion is used.
 
-/// Number of bisection steps for the common received power. It suffices for any f64 bracket to close.
+/// Largest number of bisection steps that find the common received power. Any f64 interval needs fewer.
 const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m from Tx, that maximise the weakest received signal, without interference.
@@ -105,15 +105,16 @@ struct Hops<'a> {
 }
 
 impl Hops<'_> {
-    /// Returns the largest power, W, that the first and the last hop can both receive.
+    /// Returns the largest power, W, that both the first and the last hop can receive.
     ///
-    /// Each has it with its relay straight above Tx or Rx.
+    /// Each receives most if its relay is right above Tx or Rx.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)
     }
 
-    /// Returns the horizontal length, m, of a first or last hop that receives `signal_w` from `power_w`.
+    /// Returns the horizontal length, m, of a hop from Tx or to Rx that receives `signal_w` watts. `power_w` is the
+    /// sender's power, W.
     fn outer(&self, power_w: f64, signal_w: f64) -> f64 {
         let height = self.relay.altitude_m;
         let squared = power_w / (self.scene.eta * signal_w) - height * height;

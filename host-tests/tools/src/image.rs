@@ -119,7 +119,7 @@ impl Board {
     }
 }
 
-/// Largest distance between the first bytes of an image's first and last piece.
+/// Largest distance between the first bytes of the first and the last part of an image.
 ///
 /// No supported flash is larger than this.
 pub const LARGEST: u32 = 16 * 1024 * 1024;

@@ -109,7 +109,7 @@ impl RandomScene {
 
     /// Returns a simulation whose relays measure the interference every 5 s, and move instantly.
     ///
-    /// `guess` is the interference that they assume at first.
+    /// `guess` is the interference that the relays assume before the first measurement.
     pub fn setup(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = Setup::new(self.mission(guess)?);
         setup.seed = self.seed;
@@ -125,7 +125,7 @@ impl RandomScene {
 
     /// Returns a simulation whose relays are drones of 10 m/s, and measure the interference every second.
     ///
-    /// They start beside Tx. `guess` is the interference that they assume at first.
+    /// They start beside Tx. `guess` is the interference that the relays assume before the first measurement.
     pub fn flown(&self, guess: Interference) -> Result<Setup, FigureError> {
         let mut setup = self.setup(guess)?;
         let start = (1..=self.relays)
@@ -154,13 +154,14 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
     sirs
 }
 
-/// Largest number of agreements based on measurements for which results are given.
+/// Largest number of agreements, based on measurements, after which the figure shows the SIR.
 pub const LAST: usize = 8;
 
-/// Ratios SIR / optimum after 0 to [`LAST`] agreements based on measurements, one for each scene.
+/// Ratios of the SIR to the best possible one, after 0, 1, 2 and more agreements based on measurements. Each list has
+/// one ratio for each random scene.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// Simulates `scenes` random scenes and returns SIR / optimum after each agreement.
+/// Simulates `scenes` random scenes; returns the SIR over the best possible one after each agreement.
 ///
 /// `setup` returns the simulation of a scene.
 pub fn shares(
@@ -227,20 +228,22 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
 /// Time after the start of a run from which its SIRs count, s.
 const BEGUN_S: u32 = 60;
 
-/// Ratios SIR / optimum while the interferer moves: a mean over time for each scene.
+/// Mean ratios of the SIR to the best possible one while the interferer moves, one for each scene.
 ///
-/// The first minute of a run does not count. The optimum is that of the same moment.
+/// The first minute of a run does not count. The best possible SIR is that of the same moment.
 #[derive(Clone, Debug, Default)]
 pub struct MovingShares {
-    /// Ratios of chains that track the interferer.
+    /// Mean ratios of chains that track the interferer, one for each scene.
     pub followed: Vec<f64>,
-    /// Ratios of chains that keep the positions that were optimal after the first minute.
+    /// Mean ratios of chains that do not move, one for each scene. They keep the positions that were best after the
+    /// first minute.
     pub stayed: Vec<f64>,
 }
 
-/// Simulates `scenes` scenes in which an interferer passes at a distance of 300 m from the line.
+/// Simulates `scenes` scenes in which an interferer passes the line Tx-Rx at a distance of 300 m.
 ///
-/// Returns SIR / optimum of chains that track the interferer, and of chains that do not move.
+/// Returns the mean ratios of SIR to the best possible one, for chains that track the interferer and chains that do
+/// not move.
 pub fn moving_shares(
     scenes: u64,
     relays: u16,

@@ -306,7 +306,7 @@ fn the_way_back_is_reported_for_every_hop() {
     assert!(json(&format!("--uavs 3 --scenario {field}"))["worst_back"].is_null());
 }
 
-/// Chain in noise with `[link]` and `more`.
+/// Writes a scenario of 10 km whose hops are limited by noise, with `more` in its section `[link]`.
 fn linked(more: &str) -> tempfile::NamedTempFile {
     let file = tempfile::NamedTempFile::new().unwrap();
     let text = "[geometry]\ndistance_m = 10000\naltitude_m = 20\n[power]\ntx_w = 1\nuav_w = 1\n[channel]\nexcess_loss_los_db = 30\n\

@@ -210,11 +210,10 @@ impl Case {
     }
 }
 
-/// Returns the delivered data rate as a fraction of the planner's, and checks its limits.
+/// Checks the delivered data rate, and returns it as a fraction of the planner's rate `promised_bps`.
 ///
-/// It also checks that no packet is unaccounted for. The rate at the agreed positions is never exceeded. These differ
-/// from the planned ones: the rate to Rx by the tolerance, and that of the way back, for which positions are not
-/// chosen, by up to `most`.
+/// No packet may be unaccounted for, and the rate at the agreed positions is never exceeded. The planner's rate may
+/// be exceeded by the fraction `most`, because the agreed positions differ slightly from the planned ones.
 fn share(flow: &Flow, promised_bps: f64, most: f64, what: &str) -> f64 {
     let packets = flow.packets;
     let gone = packets.delivered + packets.dropped + packets.lost + flow.queued;
@@ -277,7 +276,8 @@ fn every_promise_is_kept(access: Access, has_steps: bool) {
     assert!(carried > 0);
 }
 
-/// Chains that are planned for both directions, or for fitted slots, at the positions of the plan.
+/// Checks that simulated chains at the planned positions deliver the planner's data rates. The chains are planned for
+/// both directions, or for time slots as long as each hop needs.
 fn every_plan_is_kept(access: Access, has_steps: bool) {
     let first = number("SEED", 1);
     let (mut worst, mut carried) = (1.0_f64, 0);

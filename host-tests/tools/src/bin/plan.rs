@@ -114,7 +114,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Result of planning: the plan, the request that it answers, and the data rates if requested.
+/// Result of planning: the plan, the request that it answers, and the data rates.
 struct Planned {
     /// Planned positions; `None` if no number of relays carries the requested data rate.
     plan: Option<Plan>,
@@ -122,9 +122,9 @@ struct Planned {
     rates: Option<RateReport>,
 }
 
-/// Returns the data link if data rates are requested by an option, or if the scenario has `[link]`.
+/// Returns the data link, for which the data rates are computed.
 ///
-/// `None` if neither is so.
+/// `None` if no option asks for data rates, and the scenario has no section `[link]`.
 fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failure> {
     let target_bps = options.wanted.target_rate_bps;
     let is_asked = options.rates || target_bps.is_some() || options.bandwidth_hz.is_some();
@@ -144,7 +144,7 @@ fn radio(options: &Options, scenario: &Scenario) -> Result<Option<Radio>, Failur
     Ok(Some(radio))
 }
 
-/// Plans for a number of relays or an SIR. Adds the data rates over the link `radio`, if there is one.
+/// Plans a given number of relays, or the fewest for a target SIR. Adds the data rates over `radio`, if any.
 fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Result<Planned, NoPlan> {
     let most = match ask.number {
         Number::Of(relays) => relays,
@@ -231,7 +231,7 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
     }
 }
 
-/// Returns the SIRs of the way back if the chain is planned for both directions.
+/// Returns the SIR of each hop in the direction from Rx to Tx; empty for a plan of one direction.
 fn sirs_back(plan: &Plan, scenario: &Scenario) -> Vec<f64> {
     let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
     let places: Vec<Placement> = plan.places.iter().map(|(place, _)| *place).collect();
@@ -351,7 +351,7 @@ impl Options {
         }
     }
 
-    /// Returns the requested number of relays, or the SIR that the fewest relays shall reach.
+    /// Returns the request: a number of relays, or the SIR that the fewest relays shall reach.
     ///
     /// For a requested data rate it is 1 relay: the number of relays is then found by that rate.
     fn number(&self) -> Number {
@@ -367,7 +367,8 @@ impl Options {
 
 /// Checks the options that concern `--out` before planning, so that a mistake is found at once.
 ///
-/// Relays choose x themselves and hold their altitude in a field, so options that say otherwise are rejected.
+/// In flight, relays choose their x themselves, and in an interference field keep their altitude. Options that
+/// contradict this are rejected.
 fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let Some(file) = &options.out else {
         return Ok(());
@@ -399,7 +400,7 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes the file of `--out`: the scenario with the positions on which its relays will settle.
+/// Writes the file of `--out`: the scenario with the positions that its relays will choose.
 ///
 /// Returns the text that tells the user the next command; empty without `--out`.
 fn write_out(
@@ -462,9 +463,9 @@ fn write_out(
     ))
 }
 
-/// Loads the sections of the scenario file about the network and the companion computers.
+/// Loads the scenario file's sections about the network and the companion computers.
 ///
-/// If they state a number of relays, it must be `relays`.
+/// Rejects them if they state a number of relays other than `relays`.
 fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     let Some(path) = &options.scenario else {
         return Ok(Deployment::default());

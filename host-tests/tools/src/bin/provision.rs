@@ -212,7 +212,7 @@ impl<'a> Asked<'a> {
             .with_probe_after(self.probe_after_ms))
     }
 
-    /// Predicts the positions on which the relays will settle; `None` if they are not needed or not known.
+    /// Returns the positions that the relays will choose; `None` if they are not needed or not known.
     ///
     /// # Errors
     /// The plan in the scenario is out of date, or the hypothetical interferer costs too much SIR.
@@ -309,9 +309,9 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// Checks that the radio channel is fast enough for `uavs` relays.
+/// Checks that the radio channel is fast enough for `uavs` relays; wired relays always pass.
 ///
-/// `probe_after` is the silence after which a relay probes a neighbour. Relays with wires have no channel.
+/// `probe_after` is the silence after which a relay probes a neighbour.
 fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), String> {
     if options.wires {
         return Ok(());
@@ -459,7 +459,7 @@ fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
 
 /// Tells the user which options override the scenario's section `network`.
 ///
-/// Then nobody relies on a value in the file that is not used.
+/// So nobody relies on a value in the file that is not used.
 fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
     let say = |option: &str, key: &str| {
         command::complain(&format!("{option} replaces network.{key} of {name}"));
@@ -490,10 +490,10 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
     }
 }
 
-/// Returns the method of the command line or plan, otherwise that of section `network`, or `align`.
+/// Returns the method to provision: that of the command line or plan, else of the section, or `align`.
 ///
-/// `of_file` is the section's. A plan made with another method is rejected; an option that overrides the section is
-/// reported.
+/// `of_file` is that of section `network`. A plan made with another method is rejected; an option that overrides the
+/// section is reported.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,

@@ -134,7 +134,7 @@ fn taken() -> Vec<String> {
     ]
 }
 
-/// Formats the horizontal distances between two neighbours at the head, middle and tail of the chain.
+/// Formats the horizontal distance of two neighbours, each at the chain's head, middle and tail.
 ///
 /// They are those after `round` rounds of Algorithm 2.
 fn steps(rows: &[ShapeRow], round: u16) -> String {

@@ -25,7 +25,7 @@ struct Row {
     altitude_m: f64,
     /// SIR of the worst hop by Algorithm 1, linear.
     sir_linear: f64,
-    /// SIR of the worst hop with the paper's fixed step of 0.1, linear.
+    /// SIR of the worst hop, linear, if the target falls by the paper's fixed step of 0.1.
     ///
     /// Only for altitudes near the paper's best one, otherwise `None`.
     sir_by_step_linear: Option<f64>,

@@ -19,12 +19,12 @@ pub const ALTITUDES_M: (f64, f64) = (20.0, 300.0);
 /// Distances of the interferer from the line Tx-Rx, m, one for each curve in the figure of positions.
 pub const OFFSETS_M: [f64; 4] = [50.0, 100.0, 150.0, 250.0];
 
-/// Largest distance from the line permitted to the relay on each side, m, in the figure of positions.
+/// Largest distance from the line Tx-Rx permitted to a relay in the figure of positions, m.
 pub const MOST_ROOM_M: u16 = 400;
 
 const ROOM_STEP_M: u16 = 4;
 
-/// Largest distance from the line permitted to the relay on each side, m, in the figure of the gain.
+/// Largest distance from the line Tx-Rx permitted to the relay in the figure of the gain, m.
 ///
 /// It equals the highest altitude.
 pub const ROOM_M: f64 = 300.0;
@@ -40,11 +40,11 @@ struct Row {
     room_m: f64,
     x_m: f32,
     y_m: f32,
-    /// SIR of the worse of the two hops at the best position, linear.
+    /// SIR of the weaker of the relay's two hops at its best position, linear.
     sir_linear: f32,
 }
 
-/// Table row: best SIRs of a relay that may or may not leave the line, and the lowest altitude.
+/// Table row: best SIRs of a relay above the line, at one altitude or any, and beside the line.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
@@ -78,7 +78,7 @@ fn some<C>(found: Option<(Found, C)>) -> Result<Found, FigureError> {
 
 /// Returns the relay's best positions at the lowest altitude, for each interferer's offset.
 ///
-/// The distance from the line that the relay may use rises by `step_m`.
+/// For each offset there is one position per permitted distance from the line; these distances are `step_m` apart.
 fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for offset_m in OFFSETS_M {
@@ -98,9 +98,9 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the relay's best SIRs if it may or may not leave the line, and the lowest altitude.
+/// Returns the relay's best SIRs for different distances of the interferer from the line.
 ///
-/// The interferer's distance from the line rises by `step_m`.
+/// The relay is above the line at the lowest altitude or any, or beside the line. The distances are `step_m` apart.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()
@@ -177,7 +177,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
     })
 }
 
-/// Computes the figure of the SIR gained if a single relay may leave the line, or the lowest altitude.
+/// Computes the figure of the SIR that a relay gains by leaving the line or the lowest altitude.
 pub fn gains_sheet() -> Result<Sheet, FigureError> {
     let rows = gains(OFFSET_STEP_M)?;
     let line = |name: &str, index: usize, sir: fn(&PowerRatio) -> f32| {

@@ -7,24 +7,26 @@ use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::sheet::{FigureError, Sheet, Table};
 use super::{paper, walk};
 
-/// Numbers of relays, one for each curve of the figure.
+/// Numbers of relays in the chains of the figure, one chain for each curve.
 pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 
-/// Step by which the paper's Algorithm 1 lowers the target SIR in each sweep, linear.
+/// Decrease of the target SIR from one pass of messages along the chain to the next, linear. It is that of the
+/// paper's Algorithm 1.
 pub const STEP: f64 = 0.1;
 
-/// Table row: SIR of a chain after one sweep of messages along it.
+/// Table row: SIR of a chain after one sweep, a pass of messages along it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
     sweep: u32,
-    /// Target SIR of every hop in this sweep, linear.
+    /// Target SIR of every hop in this pass of messages, linear.
     target_linear: f32,
     /// SIR of the worst hop, linear, with every relay as far toward Rx as the target allows.
     sir_linear: f64,
 }
 
-/// Returns the sweeps of each chain until it settles. Some are left out, because all are too many to draw.
+/// Returns table rows for the passes of messages of each chain, until it settles. Some passes are left out, because
+/// all are too many to draw.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let chains: Result<Vec<Vec<Row>>, FigureError> =
         relays.par_iter().map(|&relays| sweeps(relays)).collect();
@@ -48,7 +50,8 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects sweeps to draw: the first, every hundredth, every tenth of the last 1 000, the last twenty.
+/// Selects the passes of messages to draw, the last ones more densely. They are the first, every hundredth, every
+/// tenth of the last 1 000, and the last twenty.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()
@@ -63,7 +66,7 @@ fn thinned(rows: &[Row]) -> Vec<Row> {
         .collect()
 }
 
-/// Computes the figure of the chain's SIR by sweep of Algorithm 1.
+/// Computes the figure of a chain's SIR by the number of passes of messages in Algorithm 1.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let lines = |from: u32| -> Vec<Line> {

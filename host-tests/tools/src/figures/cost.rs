@@ -13,21 +13,22 @@ use uav_relay_scenario::Scenario;
 /// Numbers of relays for which the figure shows the cost.
 pub const RELAYS: [u16; 10] = [1, 2, 3, 5, 8, 14, 24, 40, 65, 100];
 
-/// Table row: cost until a chain of `relays` relays settles, by three ways to choose the target SIRs.
+/// Table row: messages and bytes until a chain settles, by three ways to choose the target SIRs.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
-    /// Number of sweeps along the chain if the target SIR falls by the paper's step of 0.1.
+    /// Number of passes of messages along the chain, if the target SIR falls by the paper's step of 0.1.
     step_sweeps: u32,
     step_messages: u64,
     step_bytes: u64,
     step_sir_linear: f64,
-    /// Number of sweeps along the chain if the target SIRs bracket the optimum, without a prediction.
+    /// Number of passes of messages along the chain, if an interval around the best target SIR is narrowed. The
+    /// leader does not predict the solution.
     bracketed_sweeps: u32,
     bracketed_messages: u64,
     bracketed_bytes: u64,
     bracketed_sir_linear: f64,
-    /// Number of sweeps along the chain if the leader first predicts the solution from the mission.
+    /// Number of passes of messages along the chain, if its leader first predicts the solution.
     predicted_sweeps: u32,
     predicted_messages: u64,
     predicted_bytes: u64,
@@ -90,7 +91,7 @@ fn panel(rows: &[Row], title: &str, of: fn(&Row) -> [f64; 3]) -> Panel {
     }
 }
 
-/// Computes the figure of the sweeps, messages and bytes until a chain settles.
+/// Computes the figure of the passes, messages and bytes that a chain needs until it settles.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let ratio = rows.last().map_or(0.0, |row| {

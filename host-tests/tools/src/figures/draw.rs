@@ -25,9 +25,9 @@ const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
 const PEN: u32 = 4;
 const APART: f64 = 105.0;
-/// Distance of a curve's first marker from its beginning, picture units per colour number.
+/// Distance of a curve's first marker from its beginning, picture units, for each colour number.
 ///
-/// Markers of curves that coincide are then side by side.
+/// So the markers of curves that coincide are side by side.
 const APART_BY_HUE: u8 = 25;
 
 /// Error: the chart cannot be drawn, with the reason.
@@ -171,9 +171,9 @@ fn signed(plot: &Plot<'_, '_>, line: &Line) -> Vec<(f64, f64)> {
     }
 }
 
-/// Returns the lengths of a stroke's dashes and gaps, in picture units.
+/// Returns the lengths of a stroke's dashes and gaps, in picture units; `None` if no line is drawn.
 ///
-/// The gap of a solid line is 0; `None` if no line is drawn.
+/// A solid line has gaps of 0.
 const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     match stroke {
         Stroke::None => None,

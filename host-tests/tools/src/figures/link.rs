@@ -13,26 +13,27 @@ use crate::plan::carried::Carried;
 use crate::plan::rate::Rate;
 use crate::plan::{Number, Plan, PlanRequest, plan};
 
-/// Largest number of relays; every N from 1 to it is drawn.
+/// Largest number of relays in the figure; every number from 1 to it is drawn.
 pub const MOST_RELAYS: u16 = 24;
 
-/// SIRs and data rates of one number of relays. Both ways r is 1.
+/// Table row: SIRs and data rates of one number of relays, for one direction and for both. For both directions the
+/// same SIR or rate is required each way (r = 1).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
-    /// Worst hop of the places for one direction, linear.
+    /// SIR of the worst hop to Rx, linear, with the positions for one direction.
     one_way_sir_linear: f64,
-    /// Worst hop of both directions of the places for both, linear.
+    /// SIR of the worst hop of both directions, linear, with the positions for both.
     both_ways_sir_linear: f64,
-    /// Worst hop of both directions of the places for one direction, linear.
+    /// SIR of the worst hop of both directions, linear, with the positions for one direction.
     judged_sir_linear: f64,
-    /// Rate to Rx in equal slots, of the places for one direction.
+    /// Data rate to Rx in equal time slots, with the positions for one direction.
     one_way_slots_bit_per_s_hz: f64,
-    /// The same in fitted slots at the places for them.
+    /// Data rate to Rx in slots as long as each hop needs, with the positions for that rate.
     one_way_fitted_bit_per_s_hz: f64,
-    /// Rate in each direction in equal slots, of the places for both.
+    /// Data rate in each of both directions in equal time slots, with the positions for both.
     both_ways_slots_bit_per_s_hz: f64,
-    /// The same in fitted slots at the places for them.
+    /// Data rate in each of both directions in slots as long as each hop needs, with the positions for it.
     both_ways_fitted_bit_per_s_hz: f64,
 }
 
@@ -87,7 +88,7 @@ fn row(relays: u16) -> Result<Row, FigureError> {
     })
 }
 
-/// Returns the figure.
+/// Computes the figure of SIR and data rate by the number of relays, for one direction and for both.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let relays: Vec<u16> = (1..=MOST_RELAYS).collect();
     let rows: Result<Vec<Row>, FigureError> = relays.par_iter().map(|n| row(*n)).collect();

@@ -9,7 +9,7 @@ use super::paper;
 use super::sheet::{FigureError, Sheet, Table};
 use uav_relay_scenario::Scenario;
 
-/// Power of Tx, W, and position (X, Y) of the interferer, m, for each curve of the figure.
+/// Power of Tx, W, and position (x, y) of the interferer, m, for each curve of the figure.
 pub const CHOICES: [(f64, (f64, f64)); 4] = [
     (20.0, (30.0, 30.0)),
     (20.0, (30.0, 60.0)),

@@ -12,33 +12,34 @@ use uav_relay_sim::simulator::setup::Setup;
 
 /// Number of random scenes for each curve of the figure with interferers that do not move.
 pub const SCENES: u64 = 60;
-/// Number of random scenes for each speed of a moving interferer.
+/// Number of random scenes for each speed in the figure with a moving interferer.
 pub const PASSES: u64 = 6;
 
 /// Speeds of the moving interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// Table row: SIR relative to the optimum after a number of agreements, over many scenes.
+/// Table row: SIR relative to the best possible one after a number of agreements, over many scenes.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct AgreementShare {
     scene: &'static str,
     relays: u16,
     /// Number of agreements on positions that used measurements of the interference.
     agreements: usize,
-    /// Median over the scenes of SIR / optimum, linear.
+    /// Median over the scenes of the chain's SIR divided by the best possible one.
     median_linear: f64,
-    /// Ratio SIR / optimum that nine of ten scenes reach, linear.
+    /// Ratio of the chain's SIR to the best possible one that nine of ten scenes reach.
     tenth_linear: f64,
 }
 
-/// Table row: mean SIR relative to the optimum while the interferer moves at one speed.
+/// Table row: mean SIR relative to the best possible one while the interferer moves at one speed.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct Tracked {
     relays: u16,
     speed_mps: f64,
-    /// Mean of SIR / optimum at the same moment, for a chain that tracks the interferer, linear.
+    /// Mean ratio of SIR to the best possible one at that moment, for a chain that tracks the interferer.
     followed_linear: f64,
-    /// Mean of SIR / optimum at the same moment, for a chain that keeps its first positions, linear.
+    /// Mean ratio of SIR to the best possible one at that moment, for a chain that does not move. It keeps the
+    /// positions that were best after the first minute.
     stayed_linear: f64,
 }
 
@@ -59,7 +60,8 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ),
 ];
 
-/// Returns SIR / optimum after each number of agreements, over `scenes` random scenes of each kind.
+/// Returns a row for each kind of scene and number of agreements: the chain's SIR over the best one. Each is over
+/// `scenes` random scenes.
 fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
@@ -77,7 +79,8 @@ fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     Ok(rows)
 }
 
-/// Returns mean SIR / optimum for each speed of the interferer, over `scenes` random scenes each.
+/// Returns a row for each speed of the interferer: the chain's mean SIR over the best one. Each is over `scenes`
+/// random scenes.
 fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {

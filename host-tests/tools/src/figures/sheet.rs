@@ -19,9 +19,9 @@ pub struct Sheet {
     pub name: &'static str,
     /// Title of the figure.
     pub title: &'static str,
-    /// Findings that the figure shows; each is a paragraph of its caption.
+    /// Texts of the figure's caption, a paragraph each: what the figure shows.
     pub says: Vec<String>,
-    /// Parameters with which the figure is computed, and notes on those that the paper omits.
+    /// Notes below the figure: the parameters with which it is computed, and those that the paper omits.
     pub taken: Vec<String>,
     /// Chart of the figure, written as an SVG file.
     pub chart: Chart,

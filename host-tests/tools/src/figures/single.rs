@@ -207,7 +207,7 @@ fn gains(
         .collect())
 }
 
-/// Returns the quantity that `reading` averages, at four positions of the relay, for one altitude.
+/// Returns what `reading` averages (SIR, dB or rate) for four positions of the relay at one altitude.
 ///
 /// The positions are the best one, a random one, the one that ignores interference, and the middle.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
@@ -270,10 +270,10 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger of a row's two differences from the averages that the paper prints.
+/// Returns the larger difference of a row's two averages from those that the paper prints.
 ///
-/// It is in percentage points. The second average is that over the blind method, or over the relay in the middle if
-/// `middle`.
+/// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, else over the
+/// blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent

@@ -13,57 +13,58 @@ use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 /// Numbers of relays, one for each curve of the figure.
 pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];
 
-/// Seed of the random values in the uneven field of interference.
+/// Seed of the random interference in the field that varies along the line.
 pub const SEED: u64 = 4;
 
 const SPACING_M: u32 = 20;
 
 const ALPHA: f64 = 3.0;
 
-/// Largest interference power `I_max` as a multiple of Lambda, the power received from 1 W below.
+/// Largest interference power as a multiple of the power that a relay receives from 1 W right below it.
 const MOST: f64 = 2.0;
 
-/// Kind of interference field, by Upsilon = E[1 / I] along x.
+/// Kind of interference field: varying along the line Tx-Rx, or the same everywhere.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Field whose Upsilon varies along x between 0.6 / Lambda and 1 / Lambda.
+    /// Field that varies along the line: E[1 / I] of the interference power I is within a range. It is between 0.6
+    /// and 1 over the power that a relay receives from 1 W right below it.
     Uneven,
-    /// Field whose Upsilon is 0.8 / Lambda everywhere.
+    /// Field that is the same everywhere: E[1 / I] is 0.8 over the power received from 1 W right below.
     Even,
 }
 
-/// Table row: expected SIR of a chain after one sweep of messages along it.
+/// Table row: expected SIR of a chain in an interference field after one pass of messages along it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     field: Kind,
     relays: u16,
     sweep: u32,
-    /// Target expected SIR of every hop in this sweep, linear.
+    /// Target of every hop's expected SIR in this pass of messages, linear.
     target_linear: f32,
-    /// Expected SIR of the worst hop after this sweep, linear.
+    /// Expected SIR of the worst hop after this pass of messages, linear.
     sir_linear: f64,
 }
 
-/// Table row: distribution of the interference power at one x of the interference field.
+/// Table row: distribution of the interference power I at one x of the field.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PointRow {
     field: Kind,
     x_m: f64,
-    /// First shape parameter of the Beta distribution of I / `I_max`.
+    /// First shape parameter of the Beta distribution of I relative to its maximum.
     alpha: f64,
     beta: f64,
     /// Largest interference power `I_max`, W.
     i_max_w: f64,
 }
 
-/// Returns Lambda, W: the power that a relay receives from 1 W right below it.
+/// Returns the power, W, that a relay receives from a sender of 1 W right below it.
 fn lambda_w(mission: &Mission) -> f64 {
     let height = f64::from(mission.config().common.altitude_m);
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// Returns the points of the field, at which the interference's distribution is given.
+/// Returns the points of the field at which the distribution of the interference power is given.
 fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;
@@ -105,7 +106,7 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     paper::mission(&scenario, relays)
 }
 
-/// Returns a table row for each sweep of every chain, in both fields and for each number of relays.
+/// Returns a table row for each pass of messages, of chains in both fields with each number of relays.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for field in [Kind::Uneven, Kind::Even] {
@@ -178,7 +179,7 @@ fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     Line::new(&format!("N = {relays}"), Look::number(index), points)
 }
 
-/// Computes the figure of the expected SIR by sweep of Algorithm 4, in an uneven and an even field.
+/// Computes the figure of the expected SIR by passes of messages of Algorithm 4, in both fields.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let panel = |heading: &str, field: Kind| Panel {

@@ -63,22 +63,22 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     Some(Chain { places, sir })
 }
 
-/// Sweep (pass of messages along the chain) of Algorithm 1: its target SIR and the resulting chain.
+/// Pass of messages along the chain in Algorithm 1: its target SIR and the chain that results.
 ///
-/// The target falls by the paper's fixed step.
+/// The target falls by the paper's fixed step from one pass to the next.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the sweep, from 1.
+    /// Number of the pass of messages, from 1.
     pub number: u32,
-    /// Target SIR of every hop in this sweep, linear.
+    /// Target SIR of every hop in this pass of messages, linear.
     pub target: f32,
-    /// Chain with each relay as far as the target allows; `None` if a hop cannot meet the target.
+    /// Chain with each relay as far from Tx as the target SIR allows; `None` if a hop cannot meet it.
     pub chain: Option<Chain>,
 }
 
-/// Returns all sweeps of Algorithm 1 (Algorithm 4 in a field) until the chain settles.
+/// Returns all passes of messages of Algorithm 1 until the chain settles (of Algorithm 4 in a field).
 ///
-/// `step` is the decrease of the target SIR from one sweep to the next, linear.
+/// `step` is the decrease of the target SIR from one pass to the next, linear.
 pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
@@ -157,7 +157,7 @@ pub struct Flown {
     pub sir: f64,
     /// SIR of the worst hop before Algorithm 2 and after each of its rounds, linear.
     pub rounds: Vec<f32>,
-    /// Number of sweeps of messages along the chain.
+    /// Number of passes of messages along the chain until it settled.
     pub sweeps: u32,
     /// Number of frames sent on all links.
     pub messages: u64,

@@ -3,7 +3,7 @@
 use uav_relay_scenario::hypothetical::{Centre, graded};
 use uav_relay_scenario::scene::Scene;
 
-/// Relative width of the bracket of the best target SIR at which the bisection ends.
+/// Relative width of the interval around the best target SIR at which the bisection ends.
 const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
@@ -114,7 +114,7 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
     Some(below)
 }
 
-/// Number of steps of the scan over altitudes: so many of equal length, and so many of equal ratio.
+/// Number of steps of the scan over altitudes: 24 of equal length, and 24 more of equal ratio.
 const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;
@@ -219,14 +219,14 @@ pub(super) fn golden(
 // d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
 // target can be bisected.
 
-/// Feasible hop to the next relay, as two intervals of x.
+/// Group of feasible hops from one relay to the next, as an interval of x for each end.
 ///
-/// From each x in `from` the hop reaches some x in `to` at the target SIR.
+/// From each x in `from` some x in `to` is received at the target SIR.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     from: Span,
     to: Span,
-    /// Receiver position in `to` that allows the sender nearest to Tx.
+    /// Receiver's x in `to` for which the sender can be nearest to Tx.
     farthest: f64,
 }
 
@@ -235,9 +235,9 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Feasible positions of every relay for one target SIR, computed from Rx to Tx.
+/// Intervals of x in which each relay may be, so that the rest of the chain meets one target SIR.
 ///
-/// The hop from Tx to the first relay is not checked.
+/// They are computed from Rx to Tx. The hop from Tx to the first relay is not checked.
 pub(super) struct Stages<'a> {
     line: &'a Line<'a>,
     apart: f64,
@@ -248,7 +248,7 @@ pub(super) struct Stages<'a> {
     first: Vec<Span>,
 }
 
-/// Cache of hop ranges at one target SIR and sender's power, for consecutive relays of equal power.
+/// Ranges of hops at one target SIR and one sender's power, kept for the next relay of equal power.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -325,7 +325,7 @@ impl<'a> Stages<'a> {
         }))
     }
 
-    /// Returns the feasible x of the next relay that is nearest to `wish`, with its sender at `x`.
+    /// Returns the feasible x of the next relay that is nearest to `wish`; the sender is at `x`.
     ///
     /// `None` if no feasible hop starts at `x`.
     fn next_place(&self, stage: &Stage, x: f64, wish: f64) -> Option<f64> {
@@ -341,9 +341,9 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the feasible hops to receivers in `spans`, with the ranges `reach`.
+/// Returns the feasible hops from a relay to the next one, which may be anywhere in `spans`.
 ///
-/// Each is at least `apart` metres long.
+/// `reach` has the hop ranges. Each hop is at least `apart` metres long.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -364,7 +364,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns the last point from `sure` toward `wish` up to which `holds` is true.
+/// Returns the last point on the way from `sure` to `wish` up to which `holds` is true.
 ///
 /// `holds` must be true at `sure`.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
@@ -387,17 +387,17 @@ pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Values r = (I + N)^(-1/2) at the nodes, W^(-1/2), with interference power I and noise power N.
+    /// Hop range at the sampled positions, up to a constant factor, W^(-1/2).
     ///
-    /// The range of a hop is proportional to r at its receiver.
+    /// It is (I + N)^(-1/2), with the powers I and N of interference and noise at the hop's receiver, W.
     quiet: Vec<f64>,
     slope: Vec<f64>,
     tops: Vec<f64>,
 }
 
-/// Ratio of a hop's range, m, to r = (I + N)^(-1/2) at its receiver.
+/// Factor of the hop range for a target SIR and sender's power: range, m, over (I + N)^(-1/2).
 ///
-/// It depends on the target SIR and the sender's power. I and N are the powers of interference and noise, W.
+/// I and N are the powers of interference and noise at the hop's receiver, W.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stride(f64);
 
@@ -446,7 +446,7 @@ impl<'a> Line<'a> {
         (quiet, -0.5 * quiet * change / power)
     }
 
-    /// Returns half of the derivative of ln(SIR) of the hop from Tx to a relay at `x`, 1/m.
+    /// Returns half of the derivative of ln(SIR) along x, 1/m, for the hop from Tx to a relay at `x`.
     fn first_rise(&self, x: f64) -> f64 {
         let (quiet, slope) = self.quiet_and_slope(x);
         slope / quiet - x / (x * x + self.altitude_m * self.altitude_m)
@@ -476,9 +476,7 @@ impl<'a> Line<'a> {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// Returns the receiver positions at which [`Line::heard_from`] has a local minimum.
-    ///
-    /// There the sender can be nearest to Tx.
+    /// Returns the receiver's x at which the sender can be nearest to Tx: minima of [`Line::heard_from`].
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
         // The slope of `heard_from` is 1 - stride x slope of the quiet.
         let level = 1.0 / stride.0;
@@ -487,7 +485,7 @@ impl<'a> Line<'a> {
         }))
     }
 
-    /// Returns the intervals of receiver positions with a hop range of at least `apart` metres (>= 0).
+    /// Returns the intervals of x in which a receiver can be at least `apart` metres from its sender.
     pub(super) fn hearing(&self, stride: Stride, apart: f64) -> Vec<Span> {
         let level = apart / stride.0;
         let turns = crossings(&self.nodes, &self.quiet, level, |x| {
@@ -508,10 +506,9 @@ impl<'a> Line<'a> {
         spans
     }
 
-    /// Returns the x nearest to Tx at which the last relay meets the SIR `target` at Rx, m.
+    /// Returns the smallest x, m, at which the last relay meets the SIR `target` at Rx; at least 0.
     ///
-    /// The relay has `power_w` watts; `target` is linear and above 0. At least 0; `None` if the target is missed even
-    /// above Rx.
+    /// The relay has `power_w` watts; `target` is linear and above 0. `None` if the target is missed even above Rx.
     pub(super) fn last_from(&self, power_w: f64, target: f64) -> Option<f64> {
         let scene = self.scene;
         let squared = power_w / (scene.eta * target * (scene.interference_rx_w() + scene.noise_w));
@@ -520,7 +517,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the positions of those crossings at which the function falls below the level.
+/// Returns the positions of the crossings in `turns` at which the function falls below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

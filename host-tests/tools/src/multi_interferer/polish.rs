@@ -39,7 +39,7 @@ pub struct Polished {
     pub rounds: u32,
 }
 
-/// Search of one relay's best position while its two neighbours stay where they are.
+/// Search for one relay's best position while its two neighbours stay where they are.
 struct Turn<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
@@ -175,9 +175,9 @@ impl Turn<'_> {
         }
     }
 
-    /// Returns the smallest and largest x allowed to the relay at altitude `h` and lateral position `y`, m.
+    /// Returns the smallest and largest x, m, that the neighbours leave to the relay.
     ///
-    /// The first is above the second if no x is allowed.
+    /// It is at altitude `h` and lateral position `y`, m. The first is above the second if no x is allowed.
     fn room(&self, y: f64, h: f64) -> (f64, f64) {
         let ahead = |apart: f64, other: Place| {
             let across = (y - other.y).powi(2) + (h - other.h).powi(2);

@@ -16,7 +16,8 @@ use uav_relay_scenario::Scenario;
 
 type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as usize / 10 }>;
 
-/// Returns the best positions of `relays` relays with free altitudes and sides, by the joint method.
+/// Returns the plan of the joint method, which chooses x, side and altitude of each of `relays` relays. If that finds
+/// none, the relays stay at their own altitudes.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     match joint(&briefed) {
@@ -26,7 +27,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     }
 }
 
-/// Returns the joint method's positions; `None` if it finds none.
+/// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
 fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     let mission = &briefed.mission;
     solved(mission, |index| {
@@ -35,9 +36,10 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     })
 }
 
-/// Returns the joint method's positions for relays with the profiles `seat_of`. `None` if it finds none.
+/// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
 ///
-/// Computes what a relay on board solves for the whole chain, and the sweep that follows.
+/// Computes what a relay on board solves for the whole chain, and the pass of messages that follows. `seat_of`
+/// returns a relay's data.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
     let target = loop {
@@ -85,10 +87,10 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
     Some(places)
 }
 
-/// Number of common altitudes tried to bound the number of relays from above.
+/// Number of common altitudes that are tried to find a number of relays that surely suffices.
 const LEVELS: u8 = 9;
 
-/// Returns a plan with the fewest relays that meet `target` with free altitudes.
+/// Returns the plan with the fewest relays that give every hop the SIR `target`, with free altitudes.
 pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     fewest_of(
         scenario,
@@ -98,10 +100,10 @@ pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result
     )
 }
 
-/// Returns a plan with the fewest relays that meet `target`. The search is a bisection on the number of relays.
+/// Returns the plan with the fewest relays that give every hop the SIR `target`, by bisection.
 ///
-/// The upper end is the fewest that meet it `at_level`, at one altitude of the band. `free` plans a given number of relays; more
-/// relays are assumed to do no worse.
+/// The upper end is the fewest by `at_level`, with all relays at one altitude. `free` plans a given number of relays;
+/// more relays are assumed to do no worse.
 pub(super) fn fewest_of(
     scenario: &Scenario,
     target: f64,

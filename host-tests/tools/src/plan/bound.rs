@@ -17,36 +17,36 @@ use std::ops::Range;
 
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Cells of a relay at first.
+/// Number of equal cells along the line Tx-Rx in which a relay may be at first.
 const FIRST: usize = 256;
 
-/// Number of parts of a divided cell.
+/// Number of equal parts into which a cell is divided.
 const PARTS: usize = 4;
 
-/// Largest number of cells of all relays.
+/// Largest number of cells of all relays together. With more, the search ends without a proof.
 const MOST_CELLS: usize = 60_000;
 
-/// Largest number of divisions: the cells are then 1e-8 of the distance.
+/// Largest number of rounds in which cells are divided. The cells are then 1e-8 of the distance from Tx to Rx.
 const MOST_LEVELS: usize = 10;
 
-/// Largest number of relays.
+/// Largest number of relays for which a proof is tried.
 const MOST_RELAYS: usize = 200;
 
 /// Allowance for rounding errors, as a fraction of a squared length.
 const ROUNDING: f64 = 1e-9;
 
-/// SIRs (linear) that every hop has to meet.
+/// Target SIRs, linear, that every hop has to meet: in the direction to Rx and in that to Tx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Targets {
-    /// SIR from Tx to Rx, above 0.
+    /// Target SIR of each hop in the direction to Rx, linear, above 0.
     pub there: f64,
-    /// SIR from Rx to Tx; 0 if that direction does not count.
+    /// Target SIR of each hop in the direction to Tx, linear; 0 if that direction does not count.
     pub back: f64,
 }
 
-/// Returns true if no positions along the line, at the relays' own altitudes, meet `targets`.
+/// Returns true if it is proven that no positions along the line meet `targets`.
 ///
-/// False also if that is not proven.
+/// The relays keep their own altitudes. False means only that there is no proof.
 pub fn excludes(scene: &Scene, targets: Targets) -> bool {
     let relays = scene.relays.len();
     if relays == 0 || relays > MOST_RELAYS || !(targets.there > 0.0 && targets.there.is_finite()) {
@@ -89,14 +89,15 @@ struct Bound<'a> {
     targets: Targets,
 }
 
-/// Cells of a node, ascending, with the largest squared length, m^2, of a hop that it receives.
+/// Node with its possible cells in ascending order of x. For each cell it has the largest squared length, m^2, of a
+/// hop that the node can receive there at its target SIR.
 struct Node<'a> {
     cells: &'a [Range<f64>],
     hears_squared: Vec<f64>,
 }
 
 impl Bound<'_> {
-    /// Drops the cells that no hop reaches from Tx, or from which none leads to Rx.
+    /// Drops the cells that no chain of possible hops from Tx to Rx passes.
     fn drop_cells(&self, cells: &mut [Vec<Range<f64>>]) {
         let distance_m = self.scene.distance_m;
         let ends = [vec![0.0..0.0], vec![distance_m..distance_m]];
@@ -117,9 +118,10 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns for each cell at one end of `hop` whether the hop is possible from any cell at the other.
+    /// Returns, for each cell of one end of `hop`, true if some cell of the other end allows the hop.
     ///
-    /// The cells are those of the receiver if `of_receiver` is true, otherwise those of the sender, on the way from Tx to Rx.
+    /// The cells are the receiver's if `of_receiver` is true, otherwise the sender's. The sender is the node nearer
+    /// to Tx.
     fn reached(
         &self,
         hop: usize,
@@ -157,7 +159,7 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns the smallest interference of a node within a cell, W.
+    /// Returns the smallest interference power, W, that `node` can have at any position in `cell`.
     fn least_w(&self, node: usize, cell: &Range<f64>) -> f64 {
         let altitude_m = self.altitude_m(node);
         let factor = match self.relay(node) {
@@ -196,7 +198,8 @@ fn retain(cells: &mut Vec<Range<f64>>, kept: &[bool]) {
     cells.retain(|_| kept.next() == Some(&true));
 }
 
-/// Returns, for each cell of `here`, true if a cell of `other` is near enough for both.
+/// Returns, for each cell of `here`, true if a hop with some cell of `other` meets the target SIRs. The hop must be
+/// short enough for the receiver at each of its ends.
 fn possible(here: &Node<'_>, other: &Node<'_>) -> Vec<bool> {
     let pairs = here.cells.iter().zip(&here.hears_squared);
     pairs
@@ -236,7 +239,7 @@ mod tests {
     use uav_relay_scenario::Scenario;
     use uav_relay_scenario::scene::Scene;
 
-    /// Compares with the best positions of one direction, which the paper's argument proves.
+    /// Checks that `excludes` rejects targets just above the planner's optimum, and no lower ones.
     #[test]
     fn a_target_above_the_optimum_is_excluded_and_no_other() {
         let mut scenario = Scenario {

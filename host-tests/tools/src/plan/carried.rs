@@ -23,26 +23,27 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
 
-/// Loss on the grid up to which a number of relays is worth a search.
+/// Largest relative loss of rate on the coarse grid at which a number of relays is still refined.
 const WORTH: f64 = 0.05;
 
-/// Steps of the bisection of a rate.
+/// Number of bisection steps that find the largest data rate.
 const HALVINGS: u8 = 18;
 
-/// Planner of positions for data rates.
+/// Planner of the relay positions that maximise the data rate of the chain.
 #[derive(Debug)]
 pub struct Carried<'a> {
     scenario: &'a Scenario,
     radio: &'a Radio,
     tolerance: f64,
-    /// Number of relays for which the table is computed at once.
+    /// Largest number of relays for which the table of grid positions is computed.
     most: u16,
     table: OnceCell<Option<Table>>,
 }
 
 impl<'a> Carried<'a> {
-    /// Creates the planner for up to `most` relays. `None` if the positions of the largest SIR are those of the largest rate, or no
-    /// others are searched for: with free altitudes, a given place, a field or several interferers.
+    /// Creates the planner for up to `most` relays; `None` if the positions of the best SIR are used. They also
+    /// maximise the rate, or no better ones are searched for: with free altitudes, a given x, a field or several
+    /// interferers.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -74,14 +75,16 @@ impl<'a> Carried<'a> {
         table.as_ref()
     }
 
-    /// Returns the largest number of relays, up to the table's, that is worth a search in fitted slots.
+    /// Returns the largest number of relays whose positions are worth a refinement, in fitted slots.
     ///
-    /// More relays take so much longer on the grid that no refinement makes up for it.
+    /// A bit needs at most 5 % more time on the coarse grid than with the best number. With more relays no refinement
+    /// makes up for the loss.
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }
 
-    /// Returns the positions of `relays` relays with the largest data rate. At most as many as in [`Carried::new`].
+    /// Returns the positions of `relays` relays with the largest data rate. `relays` is at most `most` of
+    /// [`Carried::new`].
     ///
     /// # Errors
     /// [`NoPlan`] if there is no mission, or if no positions give every hop an SIR above 0.
@@ -127,7 +130,7 @@ impl<'a> Carried<'a> {
         Ok(Plan { sirs, back, ..plan })
     }
 
-    /// Returns `plan` with a proof that no positions carry more, if there is one. There is none for fitted slots.
+    /// Returns `plan` marked as proven if it is proven that no positions carry more. Fitted slots have no proof.
     #[must_use]
     pub fn proven(&self, plan: Plan) -> Plan {
         let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
@@ -143,8 +146,8 @@ impl<'a> Carried<'a> {
         Plan { proven, ..plan }
     }
 
-    /// Returns the positions of Algorithm 1 for the ratio of SIRs that both rates need. `least` is a rate that is
-    /// met, bit/s/Hz.
+    /// Returns the positions of the largest rate that Algorithm 1 finds, by bisection on the rate. For each rate it
+    /// uses the ratio of the SIRs that the two directions need. `least` is a rate that is met, bit/s/Hz.
     fn by_ratio(&self, briefed: &ProfiledMission, least: f64) -> Option<Vec<Placement>> {
         let reverse = self.scenario.reverse;
         let model = &self.radio.link.model;
@@ -193,7 +196,8 @@ fn chain(
         .then_some(places)
 }
 
-/// Returns true if provably no positions carry `bits_per_hz` per hop to Rx and `reverse` times it back.
+/// Returns true if it is proven that no positions carry `bits_per_hz`, bit/s/Hz, over each hop to Rx. With `reverse`
+/// above 0 each hop must also carry `reverse` times that rate toward Tx.
 pub fn carries_no(scene: &Scene, radio: &Radio, reverse: f64, bits_per_hz: f64) -> bool {
     let model = &radio.link.model;
     let Some(there) = model.sinr(bits_per_hz) else {

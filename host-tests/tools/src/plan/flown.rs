@@ -10,29 +10,29 @@ use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Sce
 use super::multi_interferer::with_one;
 use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, both_ways_only_by_align, source};
 
-/// Chain at the positions that the on-board code finds.
+/// Result of the on-board method for a scenario: the positions on which the relays would agree.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Flown {
-    /// Positions, with SIRs against the full interference.
+    /// Positions that the relays choose, with their SIRs against all interferers of the scenario.
     pub plan: Plan,
-    /// Best SIR (linear) of the worst hop that the planner finds for the same number of relays.
+    /// Best SIR of the worst hop, linear, that the planner finds for this number of relays.
     pub best_sir: f64,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
 }
 
 impl Flown {
-    /// Returns the loss as a fraction of the best SIR; 0 for none.
+    /// Returns the SIR that the relays' positions lose against the best ones, as a fraction of the best.
     pub fn loss(&self) -> f64 {
         (1.0 - self.plan.sir() / self.best_sir).max(0.0)
     }
 
-    /// Returns true if the loss exceeds [`LOSS`].
+    /// Returns true if the relays' positions lose more than 1 % of the best SIR ([`LOSS`]).
     pub fn is_poor(&self) -> bool {
         self.loss() > LOSS
     }
 
-    /// Returns a line with the loss, its cause and the remedy.
+    /// Returns a line for the user: how much SIR the relays' positions lose, why, and what to do.
     pub fn describe(&self) -> String {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
@@ -54,7 +54,7 @@ impl Flown {
     }
 }
 
-/// Returns the chain that `relays` relays in `scenario` settle on by `method`.
+/// Returns the positions on which `relays` relays in `scenario` would agree by `method`.
 ///
 /// Work: that of [`super::plan`] twice.
 pub fn flown(
@@ -82,7 +82,7 @@ pub fn flown(
     })
 }
 
-/// Returns the plan of the relays by themselves, with SIRs against the full interference.
+/// Returns the plan of what the relays find on board. Its SIRs are against all interferers of the scenario.
 fn alone(
     scenario: &Scenario,
     relays: u16,
@@ -113,12 +113,13 @@ fn alone(
     })
 }
 
-/// Tolerated difference between planned and recomputed positions, m. Another machine rounds differently.
+/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed one. Another machine rounds
+/// differently.
 const SAME_M: f64 = 0.1;
-/// Tolerated difference between planned and recomputed SIR, dB.
+/// Tolerated difference of the SIR, dB, between the file's plan and the recomputed one.
 const SAME_DB: f64 = 0.01;
 
-/// Returns the `[plan]` section for `flown`.
+/// Returns the section `[plan]` of a scenario file with the positions of `flown`.
 pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned {
     let places: Vec<PlannedPlace> = flown
         .plan
@@ -139,12 +140,12 @@ pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned 
     }
 }
 
-/// Returns the f64 with the shortest decimal form that rounds to `value`.
+/// Returns `value` as the f64 with the shortest decimal form that rounds to it in f32.
 fn shortest(value: f32) -> f64 {
     format!("{value}").parse().unwrap_or_else(|_| value.into())
 }
 
-/// Returns the scenario file `text` with `planned` at its end, which replaces an existing plan.
+/// Returns the scenario file `text` with the section `[plan]` at its end; an old section is replaced.
 ///
 /// # Errors
 /// The reason if `text` is not valid TOML.
@@ -184,7 +185,8 @@ fn value(of: impl Into<Value>) -> Item {
     Item::Value(of.into())
 }
 
-/// Checks that the scenario's plan still is what the relays fly. `flown`, recomputed with the same number and method.
+/// Checks that the plan in the scenario file equals what the relays would agree on, `flown`. `flown` must be computed
+/// for the same number of relays and method.
 ///
 /// # Errors
 /// A line that states the differences.

@@ -10,27 +10,27 @@ use uav_relay_scenario::{Line, Scenario};
 
 use super::Plan;
 
-/// A feature of the map.
+/// Object on the map: a site, a relay, an interferer or a hop.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Feature {
-    /// Label.
+    /// Label of the object on the map, for example `relay 3`.
     pub name: String,
-    /// `tx`, `rx`, `relay`, `interferer` or `hop`.
+    /// Kind of the object: `tx`, `rx`, `relay`, `interferer` or `hop`.
     pub kind: &'static str,
-    /// Coordinates: one point, or the two ends of a hop.
+    /// Coordinates of the object: one point, or the two ends of a hop.
     pub at: Vec<Geodetic>,
-    /// Numbers of the feature, by names that end in the unit.
+    /// Numbers of the object, such as its position and SIR. Each has a name that ends in the unit.
     pub numbers: Vec<(&'static str, Number)>,
 }
 
-/// A number, rounded for display.
+/// Number on the map, rounded for display.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Number {
-    /// A count.
+    /// Count or index, shown exactly.
     Whole(u16),
-    /// A measure, rounded to three decimals: a millimetre, or a thousandth of a decibel.
+    /// Length in m, level in dB or the like, rounded to three decimals.
     Rounded(f64),
-    /// A ratio, rounded to six decimals.
+    /// Ratio, for example a linear SIR, rounded to six decimals.
     Ratio(f64),
 }
 
@@ -56,19 +56,19 @@ impl fmt::Display for Number {
     }
 }
 
-/// A plan as map features.
+/// Geographic map of a plan, from which the GeoJSON and KML files are made.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Map {
     /// Features of the map: sites, relays and interferers, then the hops in order from Tx.
     pub features: Vec<Feature>,
     /// Height of the mean sea level above the ellipsoid, m, if the scenario states it.
     pub geoid_m: Option<f64>,
-    /// Numbers (from 1) of interferers too far from the line for geographic coordinates.
+    /// Numbers, from 1, of the interferers that are not on the map: they are too far from the line.
     pub left_out: Vec<usize>,
 }
 
 impl Map {
-    /// Creates the map of `plan`.
+    /// Creates the map of the chain in `plan`.
     ///
     /// # Errors
     /// A line that says what the scenario lacks.
@@ -155,7 +155,7 @@ fn dbm(power_w: f64) -> f64 {
     10.0 * power_w.log10() + 30.0
 }
 
-/// Returns longitude and latitude, degrees, and the height above mean sea level, m.
+/// Returns longitude and latitude, degrees, and the height above mean sea level, m, of a point.
 fn position(at: Geodetic) -> [f64; 3] {
     [
         f64::from(at.lon_e7) / 1e7,
@@ -169,7 +169,7 @@ fn position(at: Geodetic) -> [f64; 3] {
 // Positions are longitude and latitude, and with `site.geoid_m` the height above the ellipsoid, as the RFC defines the third
 // number. Heights above mean sea level are in the property `amsl_m`. Hops across the antimeridian are split there.
 
-/// Returns the text of the GeoJSON file.
+/// Returns the map as the text of a GeoJSON file.
 pub fn geojson(map: &Map) -> String {
     let features = map.features.iter().map(|one| feature(one, map.geoid_m));
     let mut text = FeatureCollection::new(features).to_string();
@@ -213,7 +213,8 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
     }
 }
 
-/// Returns the points on either side of the antimeridian where the short way crosses it. `None` if it does not.
+/// Returns the points at which a hop crosses the antimeridian, at longitude 180 and -180 degrees. The hop takes the
+/// shorter way between its ends. `None` if it does not cross.
 fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let [lon, lat, high] = from;
     let [other_lon, other_lat, other_high] = to;
@@ -230,7 +231,7 @@ fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
 
 const NAMESPACE: &str = "http://www.opengis.net/kml/2.2";
 
-/// Colours by kind of feature, as alpha, blue, green and red.
+/// Colours of the objects on a KML map, by kind, as hexadecimal alpha, blue, green and red.
 const STYLES: [(&str, &str); 5] = [
     ("tx", "ff00a000"),
     ("rx", "ffa06000"),
@@ -241,7 +242,7 @@ const STYLES: [(&str, &str); 5] = [
 
 type Xml = Writer<Vec<u8>>;
 
-/// Returns the text of a KML file with the given title.
+/// Returns the map as the text of a KML file with the given title.
 pub fn kml(map: &Map, title: &str) -> io::Result<String> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 1);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
@@ -265,7 +266,7 @@ pub fn kml(map: &Map, title: &str) -> io::Result<String> {
     Ok(text)
 }
 
-/// Writes an element that contains only text.
+/// Writes the XML element `name` that contains only `text`.
 fn leaf(xml: &mut Xml, name: &str, text: &str) -> io::Result<()> {
     xml.create_element(name)
         .write_text_content(BytesText::new(text))?;

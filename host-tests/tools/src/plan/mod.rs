@@ -31,12 +31,12 @@ use uav_relay_sim::report::{WorstBack, hop_sirs, hop_sirs_back};
 
 pub use altitude::solved;
 
-/// Plans `ask` in `scenario`.
+/// Finds the relay positions that `ask` requests for `scenario`, and their SIRs.
 ///
 /// Work: some milliseconds; with free altitudes up to some seconds for fifty relays or more.
 ///
 /// # Errors
-/// [`NoPlan`]: an invalid request, or the best SIR that can be had.
+/// [`NoPlan`]: an invalid request, or one that cannot be met, with the best SIR found.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     match &scenario.interference {
@@ -48,7 +48,7 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     }
 }
 
-/// Checks that the options of the request are compatible.
+/// Checks that the options of the request `ask` fit each other and the scenario.
 fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     let is_several =
         matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);
@@ -79,7 +79,7 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     Err(NoPlan::Wrong(wrong))
 }
 
-/// Refuses `what` for a scenario with a way back.
+/// Returns an error that names the option `what`, if the scenario carries data in both directions.
 fn both_ways_only_by_align(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
     if scenario.reverse > 0.0 {
         return Err(NoPlan::Wrong(format!(
@@ -91,94 +91,98 @@ fn both_ways_only_by_align(scenario: &Scenario, what: &str) -> Result<(), NoPlan
     Ok(())
 }
 
-/// Requested number of relays.
+/// Number of relays that a plan shall have: given, or to be found for a target SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Number {
-    /// A given number, 1 to 1000: the plan has their best positions.
+    /// Given number of relays, 1 to 1000. The plan has their best positions.
     Of(u16),
-    /// The fewest that give every hop this SIR, linear, above 0.
+    /// Smallest number of relays that gives every hop this SIR, linear, above 0.
     Meeting(f64),
 }
 
 /// Request to the planner.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PlanRequest {
-    /// Number of relays.
+    /// Number of relays, given or to be found for a target SIR.
     pub number: Number,
-    /// True if altitudes may be chosen from the scenario's band.
+    /// True if the planner may choose altitudes between the scenario's lowest and highest one.
     pub free_altitude: bool,
-    /// Required x of the only relay, m, 0 to D; its altitude is then chosen from the band.
+    /// Required x of the only relay, m, 0 to the distance of Tx and Rx. The planner then chooses its altitude.
     pub x_m: Option<f64>,
     /// Relative tolerance on the achieved SIR, 1e-6 to 0.1.
     pub tolerance: f64,
 }
 
-/// Tolerated loss of positions against the best ones, as a fraction of the SIR.
+/// Largest loss of SIR against the best positions that is accepted, as a fraction of the best SIR.
 pub const LOSS: f64 = 0.01;
 
-/// The theorem and case that placed the only relay.
+/// Theorem, and its case, by which the position of a single relay was found.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Theorem {
-    /// 1 to 3; 4 for one relay beside the line and 5 for one relay both ways, which are not in the paper.
+    /// Number of the theorem in the paper, 1 to 3; or 4 or 5, which are not in the paper. 4 is one relay beside the
+    /// line, and 5 is one relay for data in both directions.
     pub number: u8,
-    /// Number of the case in the paper; 0 for a case that the paper omits.
+    /// Number of the theorem's case in the paper; 0 for a case that the paper omits.
     pub case: u8,
-    /// Explanation of the case for the user.
+    /// Explanation of the theorem's case for the user: why the relay goes to its position.
     pub words: String,
 }
 
-/// The hypothetical interferer that replaces several.
+/// Result of planning with one hypothetical interferer in place of several.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fitted {
     /// Power, position and error of the hypothetical interferer.
     pub hypothetical: Hypothetical,
-    /// SIR (linear) against all interferers of the positions that are best against it. `None` if there are none.
+    /// SIR, linear, against all interferers, at the best positions for the hypothetical one. `None` if no positions
+    /// were found for the hypothetical interferer.
     pub sir: Option<f64>,
-    /// True if those positions are the plan's. Otherwise the plan's are the best found against all interferers.
+    /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
+    /// against all interferers.
     pub kept: bool,
 }
 
-/// A plan: positions of the relays and their SIRs.
+/// Result of the planner: positions of the relays and SIRs of the hops.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Plan {
-    /// Mission of the relays.
+    /// Mission for which the relays are planned.
     pub mission: Mission,
-    /// Positions and profiles, relay 1 first.
+    /// Positions and profiles (power, altitude) of the relays; relay 1, next to Tx, is first.
     pub places: Vec<(Placement, Profile)>,
-    /// SIR (linear) of hops 1 to N + 1.
+    /// SIR, linear, of each hop from Tx to Rx, N + 1 in all.
     pub sirs: Vec<f64>,
-    /// Worst hop of the way back, if the positions are chosen for both directions.
+    /// Worst hop in the direction from Rx to Tx; `None` for a plan of one direction.
     pub back: Option<WorstBack>,
     /// Name of the algorithm that found the positions.
     pub how: &'static str,
-    /// True if it is proven that no positions are better, or that no fewer relays suffice.
+    /// True if it is proven that no positions are better or no fewer relays suffice; false if unknown.
     pub proven: bool,
-    /// Theorem that placed the only relay, if one did.
+    /// Theorem by which a single relay was placed; `None` if no theorem was used.
     pub theorem: Option<Theorem>,
-    /// Best SIR (linear) of as many relays, if known; only for a target.
+    /// Best SIR, linear, that the plan's number of relays can have. `None` if unknown, or if the request has no
+    /// target SIR.
     pub most: Option<f64>,
-    /// Present with several interferers.
+    /// Result of planning with one hypothetical interferer; `None` unless there are several interferers.
     pub fitted: Option<Fitted>,
 }
 
-/// Reason for which the request cannot be met.
+/// Reason why a valid request cannot be met.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Why {
-    /// An explanation.
+    /// Explanation for the user, one line.
     Plain(String),
-    /// The target cannot be met by any number of relays.
+    /// Error: no number of relays gives every hop the target SIR.
     Short {
-        /// Requested SIR, linear.
+        /// Requested SIR of every hop, linear.
         target: f64,
-        /// Best SIR found, linear.
+        /// Best SIR of the worst hop that was found, linear.
         most: f64,
-        /// Number of relays with the best SIR; `None` if more might do better.
+        /// Number of relays with the best SIR found; `None` if a number that was not tried might do better.
         relays: Option<u16>,
     },
 }
 
 impl Why {
-    /// Returns the reason in one line, with SIRs in `unit`.
+    /// Returns the reason as one line of text, with SIRs in `unit`.
     pub fn say(&self, unit: Unit) -> String {
         match self {
             Self::Plain(line) => line.clone(),
@@ -208,12 +212,12 @@ impl Default for Why {
     }
 }
 
-/// Reason for which there is no plan.
+/// Error of the planner: there is no plan for the request.
 #[derive(Clone, PartialEq, Debug)]
 pub enum NoPlan {
-    /// The scenario is not a valid mission, or the request does not fit it.
+    /// Error: the scenario is not a valid mission, or the request does not fit it, for this reason.
     Wrong(String),
-    /// The request cannot be met; with the best SIR found (linear).
+    /// Error: the request cannot be met, for this reason. The number is the best SIR found, linear.
     Unmet(Why, Option<f64>),
 }
 
@@ -227,7 +231,8 @@ impl From<Refusal> for NoPlan {
 }
 
 impl Plan {
-    /// Returns the SIR (linear) of the worst hop; for both directions the way back counts divided by r.
+    /// Returns the SIR of the worst hop, linear. In a plan for both directions an SIR toward Tx counts divided by
+    /// `reverse`, the fraction that suffices there.
     pub fn sir(&self) -> f64 {
         let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
         self.back.map_or(there, |back| back.worst_both)
@@ -238,10 +243,10 @@ impl Plan {
     }
 }
 
-/// Largest number of relays while the number is not yet known.
+/// Largest number of relays that the planner tries when it looks for the number.
 const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
-/// A mission, the relays' own profiles and the indices of relays with a fixed altitude.
+/// Mission with the relays' own profiles (power, altitude), and the indices of fixed-altitude relays.
 struct ProfiledMission {
     mission: Mission,
     own: Vec<(u16, Profile)>,
@@ -272,7 +277,7 @@ impl ProfiledMission {
             .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
     }
 
-    /// Returns the plan with these positions; its SIRs are computed by the crate's own formulas.
+    /// Returns the plan with the relays at `places`; its SIRs are those of the crate's own formulas.
     fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
         let held: Vec<(Placement, Profile)> = (1..)
             .zip(places)
@@ -299,7 +304,8 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if there is no least separation, or `is_as_good` says that removing it gains nothing.
+/// Returns true if the least separation of the relays does not cost any SIR. That is so if there is none, or if
+/// `is_as_good` returns `Some(true)` for the scenario without it.
 fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
     let free = Scenario {
         min_separation_m: 0.0,
@@ -308,18 +314,18 @@ fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) 
     !(scenario.min_separation_m > 0.0) || is_as_good(&free) == Some(true)
 }
 
-/// Unit of SIRs.
+/// Unit in which SIRs are shown to the user.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Unit {
-    /// Ratio of powers.
+    /// SIR as a ratio of powers.
     #[default]
     Linear,
-    /// Decibels.
+    /// SIR in decibels.
     Decibels,
 }
 
 impl Unit {
-    /// Formats an SIR (linear) in this unit, rounded as a result.
+    /// Formats an SIR, given as a linear ratio, in this unit, rounded for display.
     pub fn say(self, sir: f64) -> String {
         match self {
             Self::Linear => format!("{sir:.6}"),
@@ -327,7 +333,7 @@ impl Unit {
         }
     }
 
-    /// Formats an SIR (linear) in this unit with all the digits of the request.
+    /// Formats a requested SIR, given as a linear ratio, in this unit without rounding it.
     pub fn asked(self, sir: f64) -> String {
         match self {
             Self::Linear => format!("{sir}"),
@@ -336,7 +342,7 @@ impl Unit {
         }
     }
 
-    /// Formats an SIR (linear) in both units, this one first.
+    /// Formats an SIR, given as a linear ratio, in both units; this unit comes first.
     pub fn both(self, sir: f64) -> String {
         let sir_db = 10.0 * sir.log10();
         match self {

@@ -16,10 +16,10 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// Number of starting chains that are polished: the best against the true sum.
+/// Number of start chains that are improved by local search: those with the best SIR.
 const POLISHED: usize = 2;
 
-/// Number of interferers that are tried alone for starting chains.
+/// Largest number of interferers that are each taken as the only one, to compute a start chain.
 const ALONE: usize = 4;
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
@@ -70,7 +70,7 @@ struct Planner<'a> {
     hypothetical: Hypothetical,
 }
 
-/// Two chains of the same number of relays, with their SIRs against the true sum.
+/// Chains of one number of relays: the best for the hypothetical interferer, the best for all of them.
 struct Candidates {
     scene: Scene,
     relays: u16,
@@ -78,7 +78,7 @@ struct Candidates {
     by_all: Option<Best>,
 }
 
-/// Best chain found against the true sum.
+/// Best chain found against the sum of all interferers.
 struct Best {
     places: Vec<Placement>,
     sir: f64,
@@ -111,7 +111,8 @@ impl Planner<'_> {
         })
     }
 
-    /// Returns the best chain against the true sum. Polished from several starts if altitudes differ or are free.
+    /// Returns the best chain against the sum of all interferers; `None` if none is found. If altitudes are free or
+    /// differ, it improves several start chains by local search.
     fn by_all(&self, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
         if let Some(x_m) = self.ask.x_m {
             return at(scene, x_m);
@@ -153,9 +154,10 @@ impl Planner<'_> {
             .max_by(|a, b| a.sir.total_cmp(&b.sir))
     }
 
-    /// Returns single-interferer scenarios whose chains may take another route.
+    /// Returns scenarios with a single interferer, whose best chains serve as further start chains.
     ///
-    /// They have the hypothetical interferer on the other side, room on one side or none, or one of the first interferers alone.
+    /// They have the hypothetical interferer mirrored, lateral room on one side or none, or one of the first
+    /// interferers alone.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();
@@ -188,7 +190,8 @@ impl Planner<'_> {
         variants
     }
 
-    /// Returns the fewest relays that meet `target`; more relays are assumed to do no worse.
+    /// Returns the plan with the fewest relays that give every hop the SIR `target`. It assumes that more relays do
+    /// no worse.
     fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
         let mut most: f64 = 0.0;
         let mut meets = |relays: u16| -> Result<Option<Candidates>, NoPlan> {
@@ -234,8 +237,9 @@ impl Candidates {
         one.max(all)
     }
 
-    /// Returns the hypothetical interferer's chain if it is good enough. It is good enough, too, if it meets `target`; otherwise
-    /// returns the chain against the true sum.
+    /// Returns the chain for the hypothetical interferer if its SIR suffices, else that for all of them.
+    ///
+    /// It suffices if it is at least `target`, or, without a target, at most 1 % below that of the other chain.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, sir)| *sir);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.sir);
@@ -305,7 +309,8 @@ fn places(plan: &Plan) -> Vec<Place> {
     plan.chain().into_iter().map(Place::from).collect()
 }
 
-/// Returns the best position of one relay at `x_m`: a scan of the altitude band, refined four times.
+/// Returns the best altitude of a single relay at `x_m`, by a scan of the permitted altitudes. The scan is refined
+/// four times. `None` if every SIR is 0.
 fn at(scene: &Scene, x_m: f64) -> Option<Best> {
     const ROWS: u16 = 200;
     let band = scene.band;

@@ -26,18 +26,18 @@
 
 use uav_relay_scenario::scene::Scene;
 
-/// Best position of the only relay.
+/// Best position of the only relay between Tx and Rx, for data in both directions.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Best {
-    /// Distance from Tx, m.
+    /// Distance of the relay from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// Number of the case: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
+    /// Reason for the position: 1 above Tx, 2 above Rx, 3 two SIRs are equal, 4 the maximum of one SIR.
     pub case: u8,
-    /// Explanation of the case for the user.
+    /// Explanation, for the user, of why the relay goes to its position.
     pub words: String,
 }
 
-/// Descriptions of F1, F2, B1 and B2.
+/// Names for the user of the four hop SIRs: those of both hops to Rx, then those back to Tx.
 const NAMES: [&str; 4] = [
     "the first hop",
     "the second hop",
@@ -45,13 +45,14 @@ const NAMES: [&str; 4] = [
     "the second hop on the way back",
 ];
 
-/// Relative difference of SIRs that count as equal.
+/// Largest relative difference of two hops' SIRs that count as equal in the explanation.
 const EQUAL: f64 = 1e-6;
 
-/// Polynomial, coefficients from the constant on.
+/// Coefficients of a polynomial, from the constant term to the highest power.
 type Polynomial = Vec<f64>;
 
-/// Returns the best position of the scene's only relay for `reverse` r above 0. `None` if no position gives an SIR above 0.
+/// Returns the best position of the scene's only relay for both directions; `None` if every SIR is 0. The SIR from Rx
+/// to Tx needs to be only `reverse` (above 0) times the SIR from Tx to Rx.
 pub fn best(scene: &Scene, reverse: f64) -> Option<Best> {
     let ([relay], [source]) = (scene.relays.as_slice(), scene.sources.as_slice()) else {
         return None;
@@ -166,7 +167,7 @@ fn slope(of: &[f64]) -> Polynomial {
         .collect()
 }
 
-/// Returns the real roots within 0 to `end`, found between those of the derivative.
+/// Returns the real roots of the polynomial `of` within 0 to `end`. They are located between those of its derivative.
 fn roots(of: &[f64], end: f64) -> Vec<f64> {
     let size = of.iter().rposition(|coefficient| *coefficient != 0.0);
     let Some(of) = size.and_then(|degree| of.get(..=degree)) else {

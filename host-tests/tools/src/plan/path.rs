@@ -20,46 +20,48 @@ use uav_relay_scenario::link::{Access, Radio, RateModel};
 use uav_relay_scenario::number::{factor, narrow};
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Least number of even parts of the grid.
+/// Number of equal intervals of the first grid, unless the least separation sets the spacing.
 const EVEN: f64 = 700.0;
 
-/// Largest number of even points.
+/// Largest number of equally spaced points in the first grid.
 const MOST_EVEN: u32 = 1_402;
 
-/// Points at each side of the ends and interferers, and the ratio of their distances.
+/// Number of dense grid points on each side of Tx, Rx and every interferer.
 const DENSE: i32 = 22;
+/// Ratio of the distances of two successive dense grid points from their end or interferer.
 const RATIO: f64 = 1.4;
 
-/// Distance of the nearest of them, as a fraction of the line.
+/// Distance of the nearest dense grid point from its end or interferer, relative to the line's length.
 const NEAREST: f64 = 1e-4;
 
-/// Points of a window, odd.
+/// Number of grid points in the window around a relay's position; odd, to include the position.
 const WINDOW: i32 = 9;
 
-/// Largest number of windows in the refinement.
+/// Largest number of searches in windows around the relays' positions.
 const MOST_WINDOWS: u32 = 260;
 
-/// Half of the first window and of the last one, as fractions of the line.
+/// Distance from a relay to the edges of its first search window, as a fraction of the line Tx-Rx.
 const WIDEST: f64 = 0.02;
+/// Distance from a relay to its window's edges at which the refinement ends, as a fraction of the line.
 const NARROWEST: f64 = 1e-7;
 
-/// Rounding error of a distance between two positions, as a fraction of the line.
+/// Rounding error allowed in a distance of two positions, as a fraction of the line Tx-Rx.
 const ROUNDING: f64 = 1.2e-7;
 
-/// Share of the guiding time.
+/// Factor of the small term of a hop's time that decides between equal times in favour of higher SIRs.
 const GUIDE: f64 = 1e-3;
 
-/// Times of the hops of a scene for one bit of data to Rx, s Hz.
+/// Calculator of the time, s Hz, that each hop of a scene needs for one bit of data to Rx.
 #[derive(Clone, Debug)]
 pub struct Times<'a> {
     scene: &'a Scene,
     radio: &'a Radio,
     reverse: f64,
-    /// Least SINR (linear) and bit/s/Hz of each step of the radio, if it has steps.
+    /// Rate steps of the radio: each with its least SINR, linear, and its bit/s/Hz. Empty for Shannon's formula.
     steps: Vec<(f64, f64)>,
 }
 
-/// Position of a node, m, and the interference plus noise there, W.
+/// Possible position of a node: its x, m, and the interference plus noise there, W.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     x: f64,
@@ -67,7 +69,7 @@ struct Point {
 }
 
 impl<'a> Times<'a> {
-    /// Creates the times of a scene. `reverse` is r, 0 if only the way to Rx counts.
+    /// Creates the calculator for a scene. `reverse` is the rate back to Tx over that to Rx, 0 for one direction.
     pub fn new(scene: &'a Scene, radio: &'a Radio, reverse: f64) -> Self {
         let steps = match &radio.link.model {
             RateModel::Shannon { .. } => Vec::new(),
@@ -99,7 +101,7 @@ impl<'a> Times<'a> {
         self.scene.relays.get(node.checked_sub(1)?)
     }
 
-    /// Returns the point of `node`, where `relays` is the number of relays.
+    /// Returns the position `x`, m, of `node` with its interference plus noise. Node 0 is Tx; a number above N is Rx.
     fn point(&self, node: usize, x: f64) -> Point {
         let interference_w = match self.relay(node) {
             Some(relay) => self.scene.interference_w((x, relay.altitude_m)),
@@ -119,7 +121,7 @@ impl<'a> Times<'a> {
         self.point(usize::MAX, self.scene.distance_m)
     }
 
-    /// Returns a hop between relays `from` and `to`, from 1; `None` for Tx or Rx.
+    /// Returns the hop from relay `from` to relay `to`, counted from 1. `None` stands for Tx or Rx.
     fn hop(&self, from: Option<usize>, to: Option<usize>) -> Hop {
         let [low, high] = [from, to].map(|node| node.and_then(|node| self.relay(node)));
         let climb =
@@ -146,8 +148,8 @@ impl<'a> Times<'a> {
         }
     }
 
-    /// Returns the time of a hop; infinite if it carries nothing. With `guide` it is a little more, which falls with
-    /// every SIR.
+    /// Returns the time of a hop for one bit, s Hz; infinite if the hop carries nothing or is too short. With `guide`
+    /// a radio's rate steps get a small extra time that falls as the SIR rises, to decide between equal times.
     fn time(&self, hop: &Hop, from: Point, to: Point, guide: bool) -> f64 {
         let apart = to.x - from.x;
         if apart < hop.least_m - ROUNDING * self.scene.distance_m || apart < 0.0 {
@@ -175,15 +177,15 @@ impl<'a> Times<'a> {
         if guide { time + Self::guide(sir) } else { time }
     }
 
-    /// Returns a small time that falls with every SIR.
+    /// Returns the small extra time that falls as the SIR rises, to decide between equal times.
     fn guide(sir: f64) -> f64 {
         GUIDE / libm::log1p(sir)
     }
 
-    /// Returns the time of a chain with relays at `x`, m. It is infinite if it carries nothing, or relays are too
-    /// close.
+    /// Returns the time of a chain for one bit, s Hz, with the relays at `x`, m.
     ///
-    /// Distances may be less than the least separation by the rounding of positions.
+    /// It is infinite if the chain carries nothing, or if relays are closer than the least separation. Rounding of
+    /// the positions is allowed for.
     pub fn total(&self, x: &[f64]) -> f64 {
         self.along(x, false)
     }
@@ -201,7 +203,7 @@ impl<'a> Times<'a> {
         self.add(total, self.time(&last, from, self.rx(), guide))
     }
 
-    /// Returns the grid of the first search, ascending.
+    /// Returns the x of the first grid's points, m, ascending. They are dense near ends and interferers.
     fn grid(&self) -> Vec<f64> {
         let d = self.scene.distance_m;
         // Relays that gather keep exactly their least separation: it is a whole number of steps.
@@ -229,9 +231,9 @@ impl<'a> Times<'a> {
         points
     }
 
-    /// Improves positions in windows about all of them, narrower ones when that no longer helps.
+    /// Improves the positions `start` by repeated search in a window around each relay.
     ///
-    /// Returns them with their time.
+    /// The windows shrink when they no longer help. Returns the time of the best chain, s Hz, and its positions.
     pub fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let d = self.scene.distance_m;
         let mut x = start.to_vec();
@@ -269,7 +271,7 @@ impl<'a> Times<'a> {
         best
     }
 
-    /// Returns the best positions with relay k on `grids[k - 1]`.
+    /// Returns the x of the relays, m, with the least time, if relay k is at a point of `grids[k - 1]`.
     fn best_on(&self, grids: &[Vec<f64>]) -> Vec<f64> {
         let mut layers = Layers::new(self);
         for (node, grid) in (1..).zip(grids) {
@@ -280,26 +282,26 @@ impl<'a> Times<'a> {
     }
 }
 
-/// Hop between two nodes without their positions.
+/// Constants of a hop that do not depend on the x of its two nodes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Hop {
-    /// Powers of the node nearer to Tx and of the other one, W.
+    /// Transmit powers of the hop's node nearer to Tx, and of its node nearer to Rx, W.
     powers_w: [f64; 2],
     factor: f64,
     levels_m: [f64; 2],
     climb_squared: f64,
-    /// Least distance along the line, m.
+    /// Least distance of the two nodes along the line, m, due to the least separation of relays.
     least_m: f64,
 }
 
-/// Best time at a point and the point of the relay before.
+/// Least time of a chain from Tx to a grid point, and the index of the previous relay's point in it.
 #[derive(Clone, Copy)]
 struct Best {
     time: f64,
     before: usize,
 }
 
-/// Relays whose best positions up to each point are known.
+/// State of the dynamic programming: for each relay so far, the best chain from Tx to each grid point.
 struct Layers<'a> {
     times: &'a Times<'a>,
     layers: Vec<(Vec<Point>, Vec<Best>)>,
@@ -313,7 +315,8 @@ impl<'a> Layers<'a> {
         }
     }
 
-    /// Adds the next relay on `points`. `known` has the times between all pairs of points, if they are known.
+    /// Adds the next relay, which may be at `points`. `known` has the hop times between all pairs of points, if
+    /// computed.
     fn add(&mut self, points: Vec<Point>, known: Option<&[f64]>) {
         let node = self.layers.len() + 1;
         let times = self.times;
@@ -354,7 +357,7 @@ impl<'a> Layers<'a> {
         self.layers.push((points, bests));
     }
 
-    /// Returns the best time of a chain that ends with the last relay, and its point.
+    /// Returns the least time of a whole chain to Rx, and the index of the last relay's grid point in it.
     fn last(&self) -> (f64, usize) {
         let hop = self.times.hop(Some(self.layers.len()), None);
         let rx = self.times.rx();
@@ -372,7 +375,8 @@ impl<'a> Layers<'a> {
         (time, at)
     }
 
-    /// Returns the positions that lead to point `at` of the last relay, relay 1 first.
+    /// Returns the x of all relays, m, in the best chain whose last relay is at its grid point `at`. Relay 1 comes
+    /// first.
     fn path(&self, mut at: usize) -> Vec<f64> {
         let mut x: Vec<f64> = Vec::with_capacity(self.layers.len());
         for (points, bests) in self.layers.iter().rev() {
@@ -384,15 +388,15 @@ impl<'a> Layers<'a> {
     }
 }
 
-/// Best positions on one grid of 1, 2, 3 and more relays.
+/// Table of the best chains on a grid, one for each number of relays from 1.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Time on the grid and positions, m, of each number of relays, from 1.
+    /// Best chain of each number of relays from 1: its time on the grid, s Hz, and the relays' x, m.
     starts: Vec<(f64, Vec<f64>)>,
 }
 
 impl Table {
-    /// Computes the best positions on the grid for 1 relay up to all relays of the scene of `times`.
+    /// Computes the best chains on the grid, for 1 relay up to the number of relays of the scene.
     pub fn new(times: &Times<'_>) -> Self {
         let grid = times.grid();
         let mut layers = Layers::new(times);
@@ -418,8 +422,9 @@ impl Table {
         Self { starts }
     }
 
-    /// Returns the largest number of relays whose time on the grid is within `loss` of the best one. 0 if no time is
-    /// finite.
+    /// Returns the largest number of relays whose grid time is at most 1 + `loss` times the least one.
+    ///
+    /// It is 0 if no time is finite.
     pub fn largest_within(&self, loss: f64) -> u16 {
         let times = || self.starts.iter().map(|(time, _)| *time);
         let best = times().fold(f64::INFINITY, f64::min);
@@ -428,7 +433,7 @@ impl Table {
         u16::try_from(last).unwrap_or(u16::MAX)
     }
 
-    /// Returns the positions of `relays` relays, m.
+    /// Returns the x of the relays, m, in the best grid chain of `relays` relays; `None` if there is none.
     pub fn start(&self, relays: u16) -> Option<&[f64]> {
         let at = usize::from(relays).checked_sub(1)?;
         self.starts.get(at).map(|(_, x)| x.as_slice())

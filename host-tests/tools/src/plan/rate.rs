@@ -15,30 +15,30 @@ use uav_relay_scenario::{Interference, Scenario};
 use super::carried::{Carried, carries_no};
 use super::{NoPlan, Number, Plan, PlanRequest, source};
 
-/// Largest number of relays tried where a plan takes milliseconds.
+/// Largest number of relays whose rate is computed, where one plan takes milliseconds.
 const MOST_FAST: u16 = 200;
 
-/// Largest number of relays tried where a plan takes seconds.
+/// Largest number of relays whose rate is computed, where one plan takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Largest number of relays tried where positions are searched for the rate.
+/// Largest number of relays whose rate is computed, where positions are chosen for the largest rate.
 const MOST_SEARCHED: u16 = 60;
 
-/// Least number of relays up to which rates are listed, if the room allows it.
+/// Smallest number of relays up to which a list of rates goes, unless so many do not fit on the line.
 const LEAST_LISTED: u16 = 10;
 
 /// Data rate of a chain, bit/s.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Rate {
-    /// Rate from Tx to Rx, bit/s, with all of the time.
+    /// Rate from Tx to Rx, bit/s, of a chain that carries data only in that direction.
     There(f64),
-    /// Rates to Rx and back at the same time, bit/s, of a chain planned for both directions.
+    /// Rates to Rx and to Tx at the same time, bit/s, of a chain planned for both directions.
     Both([f64; 2]),
 }
 
 impl Rate {
-    /// Returns the data rate of `plan`.
+    /// Returns the data rate of the chain in `plan` over the data link `radio`.
     pub fn of(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Self {
         match Self::both_sirs(plan, scenario) {
             Some([there, back]) => Self::Both(radio.both_bps(&there, &back, scenario.reverse)),
@@ -46,7 +46,7 @@ impl Rate {
         }
     }
 
-    /// Returns the data rate of the worst hop while it sends.
+    /// Returns the data rate of the worst hop in `plan` while it sends, without the time that it waits.
     pub fn of_hop(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Self {
         let worst = |sirs: &[f64]| {
             let worst = sirs.iter().copied().reduce(f64::min);
@@ -58,7 +58,7 @@ impl Rate {
         }
     }
 
-    /// Returns the SIRs to Rx and of the way back if the chain is planned for both directions.
+    /// Returns the SIRs of all hops, linear, to Rx and then to Tx; `None` for a plan of one direction.
     fn both_sirs(plan: &Plan, scenario: &Scenario) -> Option<[Vec<f64>; 2]> {
         plan.back?;
         let relays = u16::try_from(plan.places.len()).ok()?;
@@ -76,43 +76,44 @@ impl Rate {
     }
 }
 
-/// Data rate of one number of relays.
+/// Data rate of a chain with a certain number of relays.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct RateOf {
-    /// Number of relays.
+    /// Number of relays in the chain whose rate this is.
     pub uavs: u16,
     /// Data rate of the chain, bit/s.
     pub rate_bps: Rate,
 }
 
-/// The number of relays with the largest data rate among those tried.
+/// Number of relays with the largest data rate among the numbers tried, and that rate.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct BestRate {
-    /// Number of relays.
+    /// Number of relays with the largest data rate.
     pub best_uavs: u16,
-    /// Data rate, bit/s; both ways the smaller of the rate to Rx and of the rate back divided by r.
+    /// Largest data rate, bit/s. For both directions it is the smaller of the rate to Rx and the rate to Tx over r.
     pub best_rate_bps: f64,
-    /// Numbers tried: 1 to this one.
+    /// Largest number of relays tried; all numbers from 1 to it were tried.
     pub tried_uavs: u16,
-    /// True if a larger number of relays is proven not to carry more.
+    /// True if it is proven that no other number of relays carries more; false if unknown.
     pub best_is_proven: bool,
 }
 
-/// Data rates of a scenario's chains over one bandwidth.
+/// Data rates of a scenario's chains with 1, 2, 3 and more relays, over one data link.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Rates {
     /// The number of relays with the largest data rate.
     pub best: BestRate,
-    /// Data rates of all numbers tried.
+    /// Data rate of each number of relays tried, from 1.
     pub all: Vec<RateOf>,
-    /// Plan with the fewest relays that carry the target, if one is given and can be met.
+    /// Plan with the fewest relays that carry the target rate; `None` without a target, or if none does.
     pub meeting: Option<Plan>,
 }
 
 impl Rates {
-    /// Plans 1, 2, 3 and more relays. It ends when no larger number can carry more, or at the limit for a few seconds.
+    /// Plans 1, 2, 3 and more relays, and computes their data rates over `radio`.
     ///
-    /// `target_bps` is the wanted rate to Rx; both ways the rate back is then at least r times it.
+    /// Ends when provably no larger number carries more, or at a limit of some seconds. `target_bps` is the wanted
+    /// rate to Rx; for both directions the rate to Tx is then at least r times it.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
@@ -212,15 +213,17 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     }
 }
 
-/// Relative gain above which a larger number of relays counts as better. Without a least separation more relays never
-/// carry less.
+/// Relative gain in rate above which a larger number of relays counts as better.
+///
+/// Without a least separation more relays never carry less, so tiny gains are ignored.
 const RISE: f64 = 1e-4;
 
 /// Largest number of relays for which [`carry_no_more`] looks for a proof.
 const MOST_PROVEN: u16 = MOST_FAST;
 
-/// Returns true if provably no tried number of relays carries more than the best one. For both directions, in equal
-/// slots or channels.
+/// Returns true if it is proven that no tried number of relays carries more than the best one.
+///
+/// Used for both directions, in equal slots or with a frequency for each hop.
 fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
     let more_bps = best.best_rate_bps * (1.0 + 2.0 * tolerance);
     best.tried_uavs <= MOST_PROVEN
@@ -235,18 +238,18 @@ fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: 
 /// Upper bounds on the data rates of hops, bit/s, for any number of relays and any positions.
 #[derive(Clone, Copy, Default)]
 struct MostRate {
-    /// Bound of the hop to Rx.
+    /// Upper bound on the rate of the hop to Rx, bit/s.
     receiver_bps: f64,
-    /// Bound of the hop from Tx.
+    /// Upper bound on the rate of the hop from Tx, bit/s.
     first_bps: f64,
-    /// Bound of a hop between relays, which keep their least separation.
+    /// Upper bound on the rate of a hop between relays, bit/s. Relays keep their least separation.
     relay_bps: f64,
-    /// Number of directions.
+    /// Number of directions of the data: 1.0 for Tx to Rx only, 2.0 for both.
     ways: f64,
 }
 
 impl MostRate {
-    /// Computes the bounds; `plan` has any positions of one relay.
+    /// Computes the bounds on the rates of hops; `plan` is any plan with one relay.
     fn new(scenario: &Scenario, radio: &Radio, plan: &Plan) -> Self {
         let [first, relay] = most_between(scenario);
         Self {
@@ -257,7 +260,8 @@ impl MostRate {
         }
     }
 
-    /// Returns an upper bound on the rate that counts of `relays` relays and more.
+    /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s. For both directions
+    /// the data rate is the smaller of the rate to Rx and the rate to Tx over r.
     fn of(&self, radio: &Radio, relays: u16) -> f64 {
         let relays = f64::from(relays);
         match radio.link.access {
@@ -271,10 +275,10 @@ impl MostRate {
     }
 }
 
-/// Returns upper bounds on the SIR (linear) of the first hop and of a hop between relays.
+/// Returns upper bounds on the SIR, linear, of the first hop and of a hop between relays.
 ///
-/// Relays keep their least separation, and the interferers are at most as far as from the farther end of the line. In a field: no
-/// bound.
+/// Relays keep their least separation, and interferers count as if at the farther end of the line. Infinite in a
+/// field.
 fn most_between(scenario: &Scenario) -> [f64; 2] {
     let Some(scene) = Scene::new(scenario, 1) else {
         return [f64::INFINITY; 2];

@@ -13,71 +13,76 @@ use uav_relay_sim::report::{RelayReport, WorstBack, db, hops_table, relays};
 use super::rate::{BestRate, Rate, RateOf};
 use super::{Number, Plan, Unit, Why};
 
-/// The hypothetical interferer that replaces several.
+/// Hypothetical interferer that replaces several, with its error and its effect on the plan.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct HypotheticalReport {
-    /// Transmit power, W.
+    /// Transmit power of the hypothetical interferer, W.
     pub power_w: f64,
-    /// Position along x, m.
+    /// Position of the hypothetical interferer along the line Tx-Rx, m.
     pub x_m: f64,
-    /// Lateral position, m; positive to the right of the line.
+    /// Distance of the hypothetical interferer from the line, m; positive to the right.
     pub y_m: f64,
-    /// Mean absolute error of its interference against the true sum, W. The mean is over the positions that relays may take.
+    /// Mean absolute error of the hypothetical interferer's power at a receiver, W. The error is against the sum of
+    /// all interferers; the mean is over the positions that relays may take.
     pub mean_abs_error_w: f64,
-    /// Mean absolute error divided by the mean interference.
+    /// Mean absolute error divided by the mean interference power.
     pub relative_error: f64,
-    /// SIR (linear) against all interferers of the positions that are best against it. Absent if there are none.
+    /// SIR, linear, against all interferers, at the best positions for the hypothetical one. Absent if no positions
+    /// were found for the hypothetical interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// True if these positions are the plan's. Otherwise the plan's are the best found against all interferers.
+    /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
+    /// against all interferers.
     pub kept: bool,
-    /// Loss of these positions against the plan's, as a fraction of the plan's SIR.
+    /// SIR that the hypothetical interferer's positions lose, as a fraction of the plan's SIR; 0 if kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// Gain of the plan's SIR over that of these positions, as a fraction of the latter.
+    /// SIR that the plan gains over the hypothetical interferer's positions, as a fraction of theirs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
 }
 
-/// Data rates of a chain.
+/// Data rates of a planned chain, and of other numbers of relays.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RateReport {
     /// Data rate of the chain, bit/s; to Rx and back if it is planned for both directions. Absent without a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_bps: Option<Rate>,
-    /// Data rate of the worst hop while it sends, bit/s; as `rate_bps`.
+    /// Data rate of the worst hop while it sends, bit/s; to Rx and back if planned for both directions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<Rate>,
-    /// Number of time slots. One per hop and direction on one frequency; one per direction with a frequency for each
-    /// hop.
+    /// Number of time slots among which the hops share the time.
+    ///
+    /// It is one per hop and direction on one frequency; one per direction if each hop has a frequency of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
-    /// Access of the hops to the radio, as in the file.
+    /// Way in which the hops share the radio: the word in the scenario file's `link.access`.
     pub access: &'static str,
     /// Bandwidth of one frequency, Hz.
     pub bandwidth_hz: f64,
-    /// Target, bit/s.
+    /// Requested data rate of the chain, bit/s; absent if none is requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_rate_bps: Option<f64>,
-    /// The number of relays with the largest data rate.
+    /// Number of relays with the largest data rate, and that rate.
     #[serde(flatten)]
     pub best: BestRate,
-    /// Data rates of all numbers tried, if they are requested.
+    /// Data rate of each number of relays tried; empty unless the user wants the list.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rates: Vec<RateOf>,
     /// Number of relays of the plan; 0 without a plan.
     #[serde(skip)]
     relays: u16,
-    /// Rate of the way back relative to that to Rx; 0 if only the way to Rx counts.
+    /// Required rate back to Tx, as a fraction of the rate to Rx; 0 for one direction.
     #[serde(skip)]
     reverse: f64,
-    /// Description of the access of the plan's hops to the radio.
+    /// Text that says how the plan's hops share the radio.
     #[serde(skip)]
     sharing: String,
 }
 
 impl RateReport {
-    /// Creates the report of `plan`; without a plan it has only the largest rate. `rates` are those to list.
+    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are those to list. Without a
+    /// plan the report has only these.
     pub fn new(
         plan: Option<&Plan>,
         (scenario, radio): (&Scenario, &Radio),
@@ -142,7 +147,7 @@ impl RateReport {
         _ = writeln!(text, "{}", self.largest());
     }
 
-    /// Returns the sentence on the largest data rate.
+    /// Returns the sentence that tells the user the largest data rate and its number of relays.
     pub fn largest(&self) -> String {
         let BestRate {
             best_uavs,
@@ -186,7 +191,7 @@ impl RateReport {
     }
 }
 
-/// Formats a data rate.
+/// Formats a data rate in bit/s, or the rates to Rx and back.
 fn bps(rate: Rate) -> String {
     match rate {
         Rate::There(rate_bps) => format!("{rate_bps:.6e} bit/s"),
@@ -204,30 +209,32 @@ const fn relays_carry(number: u16) -> (&'static str, &'static str) {
     }
 }
 
-/// SIR on the way back from Rx to Tx. The positions are chosen for it if `reverse` is present.
+/// SIRs of the hops in the direction from Rx to Tx. The fields `reverse`, `worst_both` and `worst_direction` are
+/// present if the relays are placed for both directions.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WayBack {
-    /// SIR at the last relay of the hop from Rx, linear.
+    /// SIR with which the last relay receives Rx, linear.
     pub rx_sir_back: f64,
-    /// SIR of the worst hop, linear.
+    /// SIR of the worst hop in the direction from Rx to Tx, linear.
     pub worst_back: f64,
-    /// SIR of the worst hop, dB.
+    /// SIR of the worst hop in the direction from Rx to Tx, dB.
     pub worst_back_db: f64,
-    /// SIR needed on the way back, relative to that on the way there, if the positions are chosen for it.
+    /// Fraction of the SIR to Rx that suffices toward Tx; absent if relays are placed for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
-    /// Smaller of the worst SIR to Rx and of that back divided by `reverse`. Absent if the positions are chosen for
-    /// one direction.
+    /// SIR of the worst hop of both directions, linear; an SIR toward Tx counts divided by `reverse`.
+    ///
+    /// Absent if the relays are placed for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_both: Option<f64>,
     /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. The SIR of the way back
     /// is divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_direction: Option<&'static str>,
-    /// Node that receives the worst hop: 0 for Tx, otherwise the relay.
+    /// Receiver of the worst hop in the direction from Rx to Tx: 0 for Tx, otherwise the relay's index.
     #[serde(skip)]
     hop: usize,
-    /// Number of relays.
+    /// Number of relays in the planned chain.
     #[serde(skip)]
     relays: u16,
 }
@@ -256,58 +263,59 @@ impl WayBack {
     }
 }
 
-/// Limits of the model.
+/// Text at the end of each plan: what the model leaves out.
 const NOT_MODELLED: &str = "not modelled: terrain and obstacles";
 
-/// Limit of a plan for one direction.
+/// Text added to a plan for one direction: the direction from Rx to Tx is not optimised.
 const ONE_WAY: &str = "; not optimised: the way back from Rx to Tx";
 
-/// Result of `cargo plan`.
+/// Report of `cargo plan`, printed as a table or as JSON.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct PlanReport {
-    /// Number of relays; absent if no number meets the target.
+    /// Number of relays in the plan; absent if no number meets the target.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uavs: Option<u16>,
-    /// Error message, if any.
+    /// Error message for the user; absent if there is a plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best SIR found (linear) if the request cannot be met.
+    /// Best SIR found, linear; present only if the request cannot be met.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
-    /// `best_sir` in dB, if above 0.
+    /// Best SIR found, dB; present only if the request cannot be met and the SIR is above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
-    /// SIR of the worst hop, linear; the way back counts divided by `reverse` if that is above 0.
+    /// SIR of the plan's worst hop, linear. For both directions an SIR toward Tx counts divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// SIR of the worst hop, dB.
+    /// SIR of the plan's worst hop, dB. For both directions an SIR toward Tx counts divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
-    /// SIR on the way back; absent in a field.
+    /// SIRs in the direction from Rx to Tx; absent in a field of interference known only along the line.
     #[serde(flatten)]
     pub way_back: Option<WayBack>,
-    /// Data rates over the given bandwidth.
+    /// Data rates over the data link; absent without a bandwidth.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub rates: Option<RateReport>,
-    /// Target SIR, linear.
+    /// Requested SIR of every hop, linear; absent if the request is a number of relays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_sir: Option<f64>,
-    /// Target SIR, dB.
+    /// Requested SIR of every hop, dB; absent if the request is a number of relays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_sir_db: Option<f64>,
-    /// Best SIR of as many relays, linear; only for a target.
+    /// Best SIR, linear, that the plan's number of relays can have; only for a requested SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_sir: Option<f64>,
-    /// `most_sir` in dB.
+    /// Best SIR, dB, that the plan's number of relays can have; only for a requested SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_sir_db: Option<f64>,
-    /// Name of the algorithm that found the positions.
+    /// Name of the algorithm that found the relays' positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub how: Option<&'static str>,
-    /// True if no positions are better and no fewer relays suffice; false if unknown.
+    /// True if it is proven that no positions are better and no fewer relays suffice; false if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
-    /// Theorem that placed the only relay, 1 to 3. 4 for one relay beside the line, 5 for one relay both ways.
+    /// Number of the paper's theorem, 1 to 3, that placed the only relay. 4 means one relay beside the line, and 5
+    /// one relay for both directions; both are not in the paper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
     /// Case number of the theorem in the paper; 0 for a case that the paper omits.
@@ -318,33 +326,33 @@ pub struct PlanReport {
     /// maximum of one SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case: Option<u8>,
-    /// Explanation of the case for the user.
+    /// Explanation of the theorem's case for the user: why the relay goes to its position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub case_words: Option<String>,
-    /// Relays, from the transmitter on.
+    /// Reports of the relays, in order from Tx.
     pub relays: Vec<RelayReport>,
-    /// SIR at the receiver, linear.
+    /// SIR with which Rx receives the last relay, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir: Option<f64>,
-    /// SIR at the receiver, dB.
+    /// SIR with which Rx receives the last relay, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
-    /// Noise computed from a bandwidth and a noise figure.
+    /// Receiver noise, if it is computed from a bandwidth and a noise figure; otherwise absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseReport>,
-    /// Present with several interferers.
+    /// Hypothetical interferer in place of several; absent unless there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
-    /// True if the corridor has lateral room: the table then has a column for it.
+    /// True if relays may leave the line sideways: the table then has a column for that distance.
     #[serde(skip)]
     pub room: bool,
-    /// Unit of the SIRs in the request.
+    /// Unit in which the table shows SIRs: that of the user's request.
     #[serde(skip)]
     pub unit: Unit,
 }
 
 impl PlanReport {
-    /// Creates the report of a plan for the request `number`.
+    /// Creates the report of `plan`. `number` is the request, `unit` the unit of SIRs in the table.
     pub fn new(plan: &Plan, number: Number, unit: Unit) -> Self {
         let sir = plan.sir();
         let rx_sir = plan.sirs.last().copied();
@@ -415,7 +423,7 @@ impl PlanReport {
         }
     }
 
-    /// Adds the SIR of every hop on the way back from Rx to Tx, if the interference at Tx is known.
+    /// Adds the SIR of each hop in the direction from Rx to Tx, if the interference at Tx is known.
     #[must_use]
     pub fn with_way_back(mut self, scenario: &Scenario, plan: &Plan) -> Self {
         let places: Vec<Placement> = plan.places.iter().map(|(place, _)| *place).collect();
@@ -448,13 +456,13 @@ impl PlanReport {
         self
     }
 
-    /// Adds data rates.
+    /// Adds the data rates to the report, if there are any.
     #[must_use]
     pub fn with_rates(self, rates: Option<RateReport>) -> Self {
         Self { rates, ..self }
     }
 
-    /// Adds the scenario's noise.
+    /// Adds the scenario's receiver noise to the report.
     #[must_use]
     pub fn in_noise(self, noise: &Noise) -> Self {
         Self {
@@ -463,7 +471,7 @@ impl PlanReport {
         }
     }
 
-    /// Returns the report as a table.
+    /// Returns the report as a table for the terminal.
     pub fn table(&self) -> String {
         let rx_sir_back = self
             .way_back
@@ -553,25 +561,26 @@ impl HypotheticalReport {
     }
 }
 
-/// Noise at the input of every receiver, k T0 B F, and its parameters.
+/// Receiver noise k T0 B F: Boltzmann constant, temperature, bandwidth and noise figure.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct NoiseReport {
-    /// Noise power, W.
+    /// Noise power at the input of every receiver, W.
     pub power_w: f64,
-    /// Noise power, dBm.
+    /// Noise power at the input of every receiver, dBm.
     pub power_dbm: f64,
-    /// B, Hz.
+    /// Bandwidth B of the receivers, Hz.
     pub bandwidth_hz: f64,
-    /// F, dB.
+    /// Noise figure F of the receivers, dB.
     pub figure_db: f64,
-    /// T0, K.
+    /// Reference temperature T0 of the noise, K.
     pub temperature_k: f64,
-    /// Effective noise power with receiver antenna gain, W: the noise power over the lower gain.
+    /// Noise power divided by the receive antenna gain, W, as the SIRs use it. The lower gain counts.
     pub effective_w: f64,
 }
 
 impl NoiseReport {
-    /// Returns the noise of a scenario. `None` if there is none, or if the scenario states the power itself.
+    /// Returns the noise of a scenario with its parameters. `None` without noise, or if the scenario states the noise
+    /// power itself.
     pub fn of(noise: &Noise) -> Option<Self> {
         let power_w = noise.receiver_w();
         let is_made = noise.power_dbm.is_none() && power_w > 0.0;

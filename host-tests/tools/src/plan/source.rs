@@ -15,7 +15,7 @@ use super::{
     one_both_ways,
 };
 
-/// Returns the fewest relays at their own altitudes, by eq. (Opt).
+/// Returns the plan with the fewest relays, at their own altitudes, that meet the SIR `target`.
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     let how = if scenario.reverse > 0.0 {
         "eq. (Opt) for both directions"
@@ -56,8 +56,9 @@ fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> 
     })
 }
 
-/// Returns true if no positions of `relays` relays meet `target` both ways. The bound shares no code with Algorithm
-/// 1.
+/// Returns true if it is proven that no positions of `relays` relays meet `target` in both directions.
+///
+/// The proof shares no code with Algorithm 1.
 fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
     let targets = Targets {
         there: target,
@@ -66,7 +67,7 @@ fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool 
     Scene::new(scenario, relays).is_some_and(|scene| excludes(&scene, targets))
 }
 
-/// Returns the best positions for both directions, with a proof if there is one.
+/// Returns the best positions of Algorithm 1 for both directions, marked as proven if a proof is found.
 fn best_both_ways(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let plan = best(scenario, relays, tolerance)?;
     let more = plan.sir() * (1.0 + 2.0 * tolerance);
@@ -74,7 +75,8 @@ fn best_both_ways(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Pl
     Ok(Plan { proven, ..plan })
 }
 
-/// Returns the best position of one relay, by a theorem or beside the line. With a fixed altitude it stays above the line.
+/// Returns the best position of a single relay, by one of the closed solutions, such as Theorem 1. A relay with a
+/// fixed altitude stays above the line.
 pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, 1, ask.tolerance)?;
     let profile = briefed.profile(1);
@@ -108,7 +110,7 @@ pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPl
     })
 }
 
-/// Returns the mission with the relay's own altitude as its band.
+/// Returns `mission` with the relay's own altitude as the only permitted one.
 fn at_one_altitude(mission: &Mission, profile: Profile) -> Mission {
     let config = MissionConfig {
         band: Band::at(profile.altitude_m),
@@ -172,7 +174,7 @@ fn beside(mission: &Mission, power_w: f32) -> Option<(Found, Theorem)> {
     ))
 }
 
-/// Returns the best positions of relays at their own altitudes: Algorithm 1 without messages.
+/// Returns the plan of the relays at their own altitudes by Algorithm 1, computed without messages.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let target = solved(&briefed)?;
@@ -192,7 +194,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// Returns the target that the relays would agree on.
+/// Returns the target SIR, linear, on which the relays would agree.
 pub(super) fn solved(briefed: &ProfiledMission) -> Result<f32, NoPlan> {
     silent::solve(&briefed.mission, Schedule::Bracketed, |index| {
         briefed.profile(index)
@@ -201,7 +203,7 @@ pub(super) fn solved(briefed: &ProfiledMission) -> Result<f32, NoPlan> {
     .map_err(|_| nothing())
 }
 
-/// Returns the relays' positions for a target.
+/// Returns the relays' positions for the target SIR `target`; `None` if the chain cannot meet it.
 pub(super) fn placed(briefed: &ProfiledMission, target: f32) -> Option<Vec<Placement>> {
     let mut places = vec![Placement::default(); usize::from(briefed.mission.relays())];
     let profile_of = |index| briefed.profile(index);
@@ -211,7 +213,8 @@ pub(super) fn placed(briefed: &ProfiledMission, target: f32) -> Option<Vec<Place
         .then_some(places)
 }
 
-/// Returns the fewest relays at their own altitudes, and their positions for the target.
+/// Returns the plan with the fewest relays that give every hop the SIR `target`. `how` names the method. The relays
+/// stay at their own altitudes.
 pub(super) fn fewest(
     scenario: &Scenario,
     target: f64,
@@ -223,7 +226,8 @@ pub(super) fn fewest(
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// Returns the mission of the fewest relays that meet `target`, and true if that is proven. Relays are at their own altitudes.
+/// Returns the mission of the fewest relays that give every hop the SIR `target`. They stay at their own altitudes.
+/// The `bool` is true if it is proven that fewer do not suffice.
 pub(super) fn enough(
     scenario: &Scenario,
     target: f64,
@@ -308,7 +312,7 @@ pub(super) fn plan_in_field(scenario: &Scenario, ask: &PlanRequest) -> Result<Pl
     }
 }
 
-/// Returns the best positions of `relays` relays.
+/// Returns the plan with the best positions of `relays` relays in a field of interference.
 fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let profile = briefed.profile(1);
@@ -333,14 +337,14 @@ fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Pla
     Ok(briefed.plan(&places, "ranges that can be continued to Rx", proven))
 }
 
-/// Explanation for an interferer at Rx.
+/// Explanation, for the user, of a single relay's position if the interferer is at Rx.
 const DROWNED: &str =
     "the interferer is at Rx, so the SIR of the second hop is 0 wherever the drone is";
 
-/// Explanation for an interferer at Tx.
+/// Explanation, for the user, of a single relay's position if the interferer is at Tx.
 const LEVEL: &str = "the drone goes right above Rx: the interferer is at Tx, so the first hop has the same SIR everywhere, and the second is best there";
 
-/// Explains a case of Theorem 1.
+/// Explains to the user why a relay with a fixed altitude goes to its x (a case of Theorem 1).
 pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
     use theorems::PlaceCase;
     match case {
@@ -376,7 +380,7 @@ pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
     }
 }
 
-/// Explains a case of Theorem 2.
+/// Explains to the user why a relay with a fixed x flies at its altitude (a case of Theorem 2).
 pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
     use theorems::AltitudeCase;
     match case {
@@ -393,7 +397,7 @@ pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
     }
 }
 
-/// Returns the number and explanation of a case of Theorem 3.
+/// Explains to the user why a relay goes to its x and altitude, with the number of Theorem 3's case.
 pub(super) fn anywhere_above(case: theorems::FreeCase) -> (u8, String) {
     match case {
         theorems::FreeCase::Lowest(case) => (1, format!("as low as may be, {}", along_x(case))),
@@ -407,7 +411,7 @@ pub(super) fn anywhere_above(case: theorems::FreeCase) -> (u8, String) {
     }
 }
 
-/// Explains a case of one relay beside the line.
+/// Explains to the user why a single relay that may leave the line goes to its position.
 pub(super) fn sideways(case: aside::AsideCase) -> &'static str {
     use aside::{AsideCase, EdgeCoordinate};
     match case {

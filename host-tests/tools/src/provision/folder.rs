@@ -66,7 +66,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
     Ok(())
 }
 
-/// Writes `content` to a temporary file in `dir`. The file is deleted unless it is renamed.
+/// Writes `content` to a temporary file in `dir`, which is deleted unless it is renamed.
 fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     let mut file = NamedTempFile::new_in(dir)?;
     file.write_all(content)?;
@@ -74,7 +74,7 @@ fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     Ok(file)
 }
 
-/// Returns the paths in `dir` of configuration blocks of any relay, and of the names in `files`.
+/// Returns the paths of the files in `dir` that are blocks of any relay, or have a name in `files`.
 fn there(dir: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>, String> {
     if !dir.exists() {
         return Ok(Vec::new());

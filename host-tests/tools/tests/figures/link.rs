@@ -31,7 +31,7 @@ fn the_rates_are_those_of_the_sirs_and_both_ways_cost_some() {
     }
 }
 
-/// The README has the numbers of eight relays.
+/// Checks that the README states the figure's numbers for eight relays.
 #[test]
 fn the_readme_says_what_both_ways_give() {
     let table = Table::read("link");

@@ -4,7 +4,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// Returns the default scenario with a power of Rx and `[link]`.
+/// Writes a scenario file: the default one with `rx_w` as power of Rx, W, and the section `[link]`.
 fn scenario(rx_w: f64, link: &str) -> tempfile::NamedTempFile {
     let file = tempfile::NamedTempFile::new().unwrap();
     let powers = format!("uav_w = 1.0\nrx_w = {rx_w:?}\n");
@@ -36,7 +36,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value}"))
 }
 
-/// Returns the SIRs of all hops to Rx, and back.
+/// Returns the SIRs of all hops in a report, linear: in the direction to Rx, then in that to Tx.
 fn sirs(report: &Value) -> [Vec<f64>; 2] {
     [("sir", "rx_sir"), ("sir_back", "rx_sir_back")].map(|(of, of_rx)| {
         let relays = report["relays"].as_array().unwrap().iter();

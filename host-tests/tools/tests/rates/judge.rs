@@ -1,48 +1,48 @@
 //! Judge of data rates: dynamic programming on its own grid in f64, then one relay after the other. It shares no code
 //! with the planner or the crate.
 
-/// Spectral efficiency.
+/// Relation of a hop's SINR to its bit/s/Hz, for the independent computation of rates.
 #[derive(Debug, Clone)]
 pub(crate) enum Model {
-    /// Gap to Shannon's limit, linear.
+    /// Shannon's formula log2(1 + SINR / gap); the value is the gap, linear.
     Gap(f64),
-    /// Least SINR (linear) and bit/s/Hz of each step.
+    /// Rate steps of a radio, each with its least SINR, linear, and its bit/s/Hz.
     Steps(Vec<(f64, f64)>),
 }
 
-/// Chain of relays at one altitude above the line from Tx (0) to Rx.
+/// Independent model of a chain and its data rate: relays at one altitude above the line from Tx to Rx.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     /// Distance from Tx to Rx, m.
     pub(crate) distance_m: f64,
-    /// Altitude of the relays, m.
+    /// Common altitude of the relays, m.
     pub(crate) altitude_m: f64,
-    /// Least distance of relays, m.
+    /// Least distance between neighbouring relays along the line, m.
     pub(crate) apart_m: f64,
-    /// Powers of Tx, the relays and Rx, W.
+    /// Transmit powers of Tx, of the relays in order, and of Rx, W.
     pub(crate) powers_w: Vec<f64>,
-    /// Power of the interferer, W, its x and its y, m.
+    /// Interferer: its power in W, and its x and y in m.
     pub(crate) interferer: [f64; 3],
-    /// Path-loss factors in the air and on the ground, 1/m^2.
+    /// Path-loss factors, 1/m^2: of links with a drone at one or both ends, and of links on the ground.
     pub(crate) loss: [f64; 2],
     /// Noise power of every receiver, W.
     pub(crate) noise_w: f64,
-    /// Rate of the way back relative to that to Rx; 0 for one direction.
+    /// Required rate from Rx to Tx, as a fraction of the rate to Rx; 0 for one direction.
     pub(crate) reverse: f64,
-    /// True if each slot is as long as its hop needs; otherwise the worst hop counts.
+    /// True if each time slot is as long as its hop needs; false if all slots are equally long.
     pub(crate) fitted: bool,
-    /// Spectral efficiency.
+    /// Relation of a hop's SINR to its bit/s/Hz.
     pub(crate) model: Model,
 }
 
-/// Points of the even part of the grid.
+/// Number of grid points over the whole line, beside the dense ones near ends and interferer.
 const EVEN: usize = 171;
 
-/// Golden ratio.
+/// Inverse of the golden ratio, for golden-section search.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 impl Chain {
-    /// Number of relays.
+    /// Returns the number of relays in the chain.
     pub(crate) fn relays(&self) -> usize {
         self.powers_w.len() - 2
     }
@@ -67,8 +67,9 @@ impl Chain {
         power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
     }
 
-    /// Returns the time of a bit on the hop from node `node` - 1 at `from` to `node` at `to`. The last node is
-    /// `last`.
+    /// Returns the time for one bit on the hop to `node`, in units of 1 / bandwidth.
+    ///
+    /// The hop goes from x = `from` to x = `to`, m. Node 0 is Tx, and node `last` is Rx.
     fn time(&self, node: usize, last: usize, from: f64, to: f64) -> f64 {
         let (first, end) = (node == 1, node == last);
         let least = if first || end { 0.0 } else { self.apart_m };
@@ -102,7 +103,7 @@ impl Chain {
         }
     }
 
-    /// Returns the time of a chain with relays at `x`.
+    /// Returns the time for one bit of a chain with relays at `x`, m: all hops' sum, or the longest hop.
     fn total(&self, x: &[f64]) -> f64 {
         let last = x.len() + 1;
         let mut from = 0.0;
@@ -114,8 +115,9 @@ impl Chain {
         total
     }
 
-    /// Returns the rate of relays at `x` in bit/s/Hz. Both ways that is the smaller of the rate to Rx and the rate
-    /// back divided by `reverse`.
+    /// Returns the data rate of a chain with relays at `x`, m, in bit/s/Hz.
+    ///
+    /// For both directions it is the smaller of the rate to Rx and the rate to Tx divided by `reverse`.
     pub(crate) fn rate(&self, x: &[f64]) -> f64 {
         self.rate_of(self.total(x), x.len())
     }
@@ -128,7 +130,7 @@ impl Chain {
         }
     }
 
-    /// Returns the same chain with fewer relays.
+    /// Returns the same chain with only its first `relays` relays.
     pub(crate) fn with(&self, relays: usize) -> Self {
         let mut powers_w = self.powers_w[..=relays].to_vec();
         powers_w.extend(self.powers_w.last());
@@ -157,7 +159,7 @@ impl Chain {
         points
     }
 
-    /// Returns the best positions on the grid for 1 relay up to all relays.
+    /// Returns the x of the relays with the largest rate on the grid, for each number of relays from 1.
     fn on_grid(&self) -> Vec<Vec<f64>> {
         let grid = self.grid();
         let never = usize::MAX - 1;
@@ -196,7 +198,8 @@ impl Chain {
         all
     }
 
-    /// Improves positions: golden sections over groups of neighbours that move together.
+    /// Improves the positions `start` by golden-section search. It moves groups of one to four neighbouring relays
+    /// together.
     fn improved(&self, start: &[f64]) -> Vec<f64> {
         let mut x = start.to_vec();
         let mut best = self.total(&x);
@@ -236,7 +239,7 @@ impl Chain {
         x
     }
 
-    /// Returns the largest rate found for all relays, also from positions `others`.
+    /// Returns the largest data rate found with all relays, bit/s/Hz. The search also starts from `others`.
     pub(crate) fn best(&self, others: &[f64]) -> f64 {
         let grid = self.on_grid();
         let starts = [grid.last().unwrap().as_slice(), others];
@@ -244,7 +247,7 @@ impl Chain {
         rates[0].max(rates[1])
     }
 
-    /// Returns the largest rate found for 1 relay up to all relays, and its number.
+    /// Returns the largest data rate found with any number of relays, bit/s/Hz, and that number.
     pub(crate) fn best_number(&self) -> (f64, usize) {
         let grid = self.on_grid();
         let mut starts: Vec<&Vec<f64>> = grid.iter().collect();

@@ -23,20 +23,20 @@ use uav_relay_tools::plan::{Number, PlanRequest, plan};
 
 use judge::{Chain, Model};
 
-/// Relative tolerance of the SIR.
+/// Relative tolerance of the SIR in the plans that the tests request.
 const TOLERANCE: f64 = 1e-5;
 
-/// Bandwidth, Hz.
+/// Bandwidth of the data link in the tests, Hz.
 const BANDWIDTH_HZ: f64 = 1e6;
 
-/// Largest number of relays of the judge.
+/// Largest number of relays that the independent search of the tests computes.
 const MOST: usize = 24;
 
 fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-/// Random scene and data link for the planner and for the judge.
+/// Draws a random scene and data link, for the planner and for the independent model `Chain`.
 fn drawn(seed: u64, access: Access, has_steps: bool) -> (Scenario, Radio, Chain) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let relays = rng.random_range(1..=16_u16);

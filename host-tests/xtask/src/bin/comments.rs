@@ -29,15 +29,15 @@ const WRONG: [&str; 8] = [
     "did can could may might must shall should will would whoever whatever whichever wherever whenever our ones maybe perhaps",
 ];
 
-/// Doc comments exempt from the check, each as path, colon, first sentence. The list stays empty.
+/// Doc comments exempt from the check, each as path, colon and first sentence. The list stays empty.
 const EXEMPT: [&str; 0] = [];
 
-/// Names of items before a renaming, one a line, that must not be used any more.
+/// Old names of items that were renamed, one a line. The check rejects any file that still uses one.
 ///
-/// Nothing else uses these words.
+/// Only words that nothing else uses are in the list.
 const OLD_NAMES: &str = include_str!("../../data/old_names.txt");
 
-/// Files that may contain replaced names: the list of these names, and the table of old and new names.
+/// Files that may contain old names of items: the list of them, and the table of old and new names.
 const WITH_OLD_NAMES: [&str; 2] = ["host-tests/xtask/data/old_names.txt", "CHANGELOG.md"];
 
 /// Doc comment in a source file: the number of its first line, from 1, and its first paragraph.
@@ -133,7 +133,7 @@ fn sources(folder: &Path, into: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Returns the replaced names that a text still contains, each with its line number, from 1.
+/// Returns the old names of renamed items in a text, each with its line number, from 1.
 fn old_names(text: &str) -> Vec<(usize, &'static str)> {
     let is_letter = |c: char| c.is_alphanumeric() || c == '_';
     let mut found = Vec::new();
@@ -152,7 +152,7 @@ fn tracked() -> std::io::Result<Vec<String>> {
     Ok(names.lines().map(str::to_owned).collect())
 }
 
-/// Returns an error message for each replaced name that a tracked text file still contains.
+/// Returns an error message for each old name of an item that a tracked text file still contains.
 fn check_names() -> std::io::Result<Vec<String>> {
     let mut faults = Vec::new();
     for file in tracked()? {

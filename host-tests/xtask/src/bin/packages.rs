@@ -35,7 +35,7 @@ fn is_allowed(expression: &str) -> bool {
     plain.split(" AND ").all(|part| part.split(" OR ").any(one))
 }
 
-/// Packages that the library may need in two versions.
+/// Packages of which the library may need two versions at once.
 ///
 /// embedded-hal 1.0 needs the older defmt, which re-exports the newer one.
 const TWICE: [&str; 1] = ["defmt"];
@@ -83,7 +83,7 @@ fn licences() -> Result<Vec<String>, String> {
 
 /// Returns an error message for each package that the library needs in several versions.
 ///
-/// Packages that only tests or the build need are not counted, nor those in [`TWICE`].
+/// Packages in [`TWICE`], and packages that only tests or the build need, are not counted.
 fn twice() -> Result<Vec<String>, String> {
     let text = tree(&[
         "--package=uav-relay",

@@ -139,7 +139,7 @@ fn median(mut all: Vec<f64>) -> f64 {
     all[all.len() / 2]
 }
 
-/// Returns the median computing time, ms, of `times` runs without recording.
+/// Returns the median computing time, ms, of `times` runs without a recording.
 ///
 /// The page makes such runs while the user drags something.
 fn took(browser: &mut Browser, times: u32) -> f64 {

@@ -107,7 +107,7 @@ fn run<'a>(
 /// Number of last output lines that are repeated at the end for a failed step without tests.
 const LAST_LINES: usize = 20;
 
-/// Largest number of lines repeated for one test binary: of its panics, and of its failed tests' names.
+/// Largest number of lines repeated from each list of failures: panics, or names of failed tests.
 const LINES_OF_FAILURES: usize = 100;
 
 /// Relevant output of a failed step: the `failures:` of each test binary, or else the last lines.

@@ -212,7 +212,7 @@ fn with(
     })
 }
 
-/// Returns the README's three table rows with costs, each as its fixed beginning and its measured text.
+/// Returns the README's table rows with costs, each as its fixed beginning and its measured text.
 fn lines(rows: &[Row]) -> Option<[(&'static str, String); 4]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;

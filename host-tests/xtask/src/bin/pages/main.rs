@@ -136,7 +136,7 @@ fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
     Ok(faults)
 }
 
-/// Programs for Linux by name, each with its alias in `.cargo/config.toml`.
+/// Names of the programs for Linux, each with its cargo alias in `.cargo/config.toml`.
 const PROGRAMS: [(&str, &str); 2] = [("linux_companion", "companion"), ("linux_ground", "ground")];
 
 /// Cargo aliases of programs that are built beforehand and run without the compiler.
@@ -149,7 +149,7 @@ const ALIASES: [&str; 6] = [
     "provision",
 ];
 
-/// Exit statuses of a program that has accepted its options.
+/// Exit statuses that show that a program has accepted its options.
 ///
 /// It succeeded, found no hardware, or was still running at the time limit.
 const ACCEPTED: [i32; 3] = [0, 1, TIMEOUT];

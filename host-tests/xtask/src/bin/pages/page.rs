@@ -13,7 +13,7 @@ const WHY_NOT: [&str; 6] = ["hardware", "itself", "root", "slow", "tested", "win
 pub(crate) enum Kind {
     /// Shell commands. `Some` holds the word that marks them as not run.
     Commands(Option<String>),
-    /// Block `text`: the output of the commands before it, or any other text.
+    /// Block `text`: the output of the preceding commands, or any other text.
     Text,
     Other,
 }
@@ -58,7 +58,7 @@ impl Block {
         }
     }
 
-    /// Returns true if this block is the expected output of `commands`, the block before it.
+    /// Returns true if this block is the expected output of `commands`, the block of commands before it.
     pub(crate) fn prints(&self, commands: &Self) -> bool {
         self.kind == Kind::Text && self.heading == commands.heading
     }
