@@ -14,7 +14,7 @@ use super::shares::Shares;
 /// Checks chains for both directions if one hypothetical interferer replaces several. The positions chosen for both
 /// directions must have a higher median SIR than those for one direction.
 #[test]
-fn one_interferer_in_place_of_several_costs_no_more_than_in_one_direction() {
+fn places_for_both_directions_beat_one_way_ones_against_several() {
     let mut rng = generator(3325);
     let [mut both_ways, mut one_way, mut ignored] = [(); 3].map(|()| Shares::default());
     for round in 0..count(20) {
