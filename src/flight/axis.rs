@@ -87,13 +87,17 @@ impl core::error::Error for AxisError {}
 pub struct Axis {
     sites: Sites,
     middle: Vector,
-    /// Unit vector toward the receiver, at the middle of the line. The next fields are those to the right and up.
+    /// Unit vector toward the receiver, at the middle of the line.
     along: Vector,
+    /// Unit vector to the right of the line, at its middle.
     right: Vector,
+    /// Unit vector upward, at the middle of the line.
     up: Vector,
-    /// Half the length of the chord from transmitter to receiver, m. The next field is the radius of curvature, m.
+    /// Half the length of the chord from transmitter to receiver, m.
     half_chord_m: f64,
+    /// Radius of curvature of the line, m.
     radius_m: f64,
+    /// Distance from transmitter to receiver along the ground, m.
     distance_m: f64,
     /// Height of the ground above mean sea level at the transmitter and at the receiver, m.
     ends_amsl_m: [f64; 2],
@@ -363,8 +367,9 @@ pub const SHORTEST_M: f64 = 10.0;
 #[doc(hidden)] // for the tests of this workspace
 pub const LONGEST_M: f64 = 100_000.0;
 
-/// Semi-major axis of the WGS84 ellipsoid, m. The next constant is its squared eccentricity.
+/// Semi-major axis of the WGS84 ellipsoid, m.
 const A_M: f64 = 6_378_137.0;
+/// Squared eccentricity of the WGS84 ellipsoid.
 const E2: f64 = 6.694_379_990_141_316e-3;
 
 /// Earth-centred, earth-fixed vector: a position in m, or a direction.

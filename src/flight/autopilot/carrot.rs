@@ -288,18 +288,19 @@ fn length(a: [f32; 3]) -> f32 {
     libm::sqrtf(dot(a, a))
 }
 
-/// Interval between targets while the target moves. The next constant is the interval while it stands: a PX4 leaves
-/// its mode after a second without a target.
+/// Interval at which a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
+/// Interval at which a standing target is sent again. A PX4 leaves its mode after a second without one.
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
 /// repetition makes it wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Number of consecutive reports of another target before an event is raised. An ArduCopter reports its target twice
-/// a second. The target must also have been sent for the time in the next constant.
+/// Number of consecutive reports of another target after which the target counts as refused. An ArduCopter reports
+/// its target twice a second.
 const REFUSED_AFTER: u8 = 6;
+/// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
 /// Tolerance between the target that an ArduCopter reports and a standing target, 1e-7 degrees. For a moving target

@@ -20,8 +20,9 @@ use crate::side::Side;
 /// Number of the MAVLink command that clears lost relays, MAV_CMD_USER_1.
 pub(super) const CLEAR_LOST: u16 = 31_010;
 
-/// Value of `MAV_RESULT` for an accepted command; the next constant is for a denied one.
+/// Value of `MAV_RESULT` for an accepted command.
 const ACCEPTED: u8 = 0;
+/// Value of `MAV_RESULT` for a denied command.
 const DENIED: u8 = 2;
 
 /// Lost relays on one side of this relay, upstream or downstream.

@@ -41,18 +41,19 @@ const HEARTBEAT: Duration = Duration::from_millis(1_000);
 /// Delay of a due target after which a PX4 may be in its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
-/// Time for which positions must be received regularly before a blind link recovers. The next constants: the longer
-/// time if the link was blind a short time ago, and that short time.
+/// Time for which positions must be received regularly, after a loss, before the drone is controlled again.
 const RECOVERY: Duration = Duration::from_millis(1_000);
+/// Time used instead of [`RECOVERY`] if the position was also lost less than [`SHORT_TIME`] before.
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
+/// Time between two losses of the drone's position within which the second one needs [`LONG_RECOVERY`].
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
 /// Time within which an ArduCopter reports its fence after a mode change caused by a breach.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason not to engage the drone must last before it is reported. The next constant is the minimum
-/// time since the last report.
+/// Time for which a reason not to engage the drone must last before it is reported.
 const SETTLED: Duration = Duration::from_millis(1_000);
+/// Minimum time between two reports of reasons not to engage the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
 /// Time for which a reason of the guard to hold the drone must last before it is reported.
@@ -86,17 +87,17 @@ pub struct Autopilot {
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
-    /// Time at which the drone's position was last lost. The next field is the time since which positions are
-    /// received again.
+    /// Time at which the drone's position was last lost.
     blind_at: Option<Instant>,
+    /// Time since which positions are received again, after the drone's position was lost.
     located_at: Option<Instant>,
     /// Time for which positions must be received regularly to end the state [`State::Blind`].
     recovery: Duration,
     /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason for which the drone cannot be engaged, and its start. The next field is the last reported reason, and
-    /// its time.
+    /// Reason for which the drone cannot be engaged, and its start. `None` if the drone can be engaged.
     wait: (Option<WaitReason>, Instant),
+    /// Last reported reason for which the drone cannot be engaged, and the time of the report.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the relay is ready to be engaged.
     ready: bool,

@@ -15,8 +15,9 @@ const WINDOW: Duration = Duration::from_millis(4_000);
 const ANSWER: Duration = Duration::from_millis(400);
 
 /// Number of [`WINDOW`]s without a message after which requests for it end. A message without which the drone cannot
-/// fly is requested every 16 windows instead: the next constant.
+/// fly is requested every [`SELDOM`] windows instead.
 const MAX_SILENT_WINDOWS: u8 = 4;
+/// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.
 const SELDOM: u8 = 16;
 
 /// Number of unanswered requests after which the autopilot seems not to receive the link's frames.

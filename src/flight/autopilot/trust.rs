@@ -60,8 +60,9 @@ pub(super) struct Trust {
     refused: u32,
     /// Kind of signature mismatch of the last heartbeats, and their number in a row.
     row: Option<(Mistrust, u8)>,
-    /// Bits of the mismatches to be reported. The next field has the bits of all kinds found so far.
+    /// Kinds of signature mismatch that have to be reported, as bits.
     due: u8,
+    /// Kinds of signature mismatch found since the start, as bits. Each kind is reported once.
     found: u8,
 }
 

@@ -27,16 +27,19 @@ const MEASURED: Duration = Duration::from_millis(300);
 /// MAVLink component number of an autopilot.
 pub(super) const AUTOPILOT: u8 = 1;
 
-/// Flag of `MAV_MODE_FLAG`: the custom mode is valid. The next constant: the vehicle is armed.
+/// Flag of `MAV_MODE_FLAG`: the custom mode is valid.
 const CUSTOM_MODE: u8 = 1;
+/// Flag of `MAV_MODE_FLAG`: the vehicle is armed.
 const ARMED: u8 = 128;
 
-/// Value of `MAV_LANDED_STATE` for a vehicle in the air; the next constant is for a landing one.
+/// Value of `MAV_LANDED_STATE` for a vehicle in the air.
 const IN_AIR: u8 = 2;
+/// Value of `MAV_LANDED_STATE` for a landing vehicle.
 const LANDING: u8 = 4;
 
-/// Value of `MAV_STATE` for a PX4 outside of a failsafe; the next constant is for one in a failsafe.
+/// Value of `MAV_STATE` for a PX4 outside of a failsafe.
 const ACTIVE: u8 = 4;
+/// Value of `MAV_STATE` for a PX4 in a failsafe.
 const CRITICAL: u8 = 5;
 
 /// Measured position and velocity of the drone, and the time of the measurement.
@@ -384,9 +387,10 @@ const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
 /// Maximum age of a TIMESYNC question whose answer counts.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// Number of low bits of a TIMESYNC question that hold the link's tag. The higher bits hold µs, for 200 days. The
-/// autopilot only returns them. The next constant is the tag without a seed.
+/// Number of low bits of a TIMESYNC question that hold the link's tag. The higher bits hold the link's time in µs,
+/// enough for 200 days. The autopilot returns all bits unchanged.
 const SHIFT: u32 = 20;
+/// Tag in the TIMESYNC questions of a link without a seed.
 const TAG: u32 = 0xA_52A5;
 
 /// Measurement of the link's delay by echoes (TIMESYNC): an upper bound of a message's age.

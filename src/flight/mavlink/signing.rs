@@ -83,9 +83,10 @@ pub enum Flaw {
 pub struct Signing {
     key: [u8; 32],
     link: u8,
-    /// Timestamp that belongs to the time `at`. The field `sent` is the timestamp of the last sent frame.
+    /// Present timestamp for signatures. It belongs to the time `at`.
     stamp: u64,
     at: Instant,
+    /// Timestamp of the last sent frame.
     sent: u64,
     senders: [Sender; SENDERS],
 }
