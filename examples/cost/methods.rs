@@ -78,7 +78,7 @@ impl Flight {
     }
 }
 
-/// Result of a chain: 1 if it settled, instructions of its most expensive call, longest frame.
+/// Result of a simulated chain: 1 if it settled, cost of its most expensive call, longest frame.
 struct Flown {
     settled: u32,
     most: u32,

@@ -112,7 +112,7 @@ impl FileOptions {
         }
     }
 
-    /// Adds an option without a value if `is` is true.
+    /// Adds the option `name`, which has no value, if `is` is true.
     pub fn flag(&mut self, name: &'static str, is: Option<bool>) {
         if is == Some(true) {
             self.options.push((name, None));

@@ -197,8 +197,8 @@ mod tests {
         }
     }
 
-    /// Moves a setpoint by 0.1 m every 0.2 s. It is logged every 0.6 m and where it stops; a small later change is
-    /// not logged.
+    /// Checks the log lines of a setpoint that moves by 0.1 m every 0.2 s: every 0.6 m, and where it stops. A small
+    /// later change is not logged.
     #[test]
     fn a_line_for_each_half_metre_and_the_exact_end() {
         let mut movement = Movement::new(true);
@@ -218,7 +218,8 @@ mod tests {
         }
     }
 
-    /// Flies a drone past its goal and back. The overshoot within 2 s is no arrival; the final stay is one.
+    /// Checks that a drone which flies past its goal and back is logged as arrived once. The overshoot within 2 s is
+    /// no arrival.
     #[test]
     fn a_drone_that_stays_has_arrived_once() {
         let mut movement = Movement::new(true);

@@ -20,7 +20,8 @@ const STALE: Duration = Duration::from_millis(3_000);
 /// Distance outside the geofence up to which nothing is reported, m.
 const FENCE_M: f64 = 100.0;
 
-/// Factor by which the line must be nearer to the drone with swapped sites, before a swap is suggested.
+/// Minimum ratio of the drone's distances from the given line and from the line between swapped sites. From this
+/// ratio on, the log suggests that latitude and longitude were swapped.
 const NEARER: f64 = 10.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

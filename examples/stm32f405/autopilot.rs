@@ -79,8 +79,8 @@ impl Autopilot {
         Self::along(&course, uart, now)
     }
 
-    /// Creates the autopilot link along a course. A separate function keeps its stack frame out of the computation of
-    /// the course.
+    /// Creates the autopilot link along a course. The computation of the course is in another function, to save
+    /// stack.
     #[inline(never)]
     fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;

@@ -18,9 +18,9 @@ use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 use crate::serial::READ_LIMIT;
 use crate::time::Duration;
 
-/// Pause before a port is used again after an error, the end of its stream or a full buffer.
+/// Pause before a failed, ended or full port is used again.
 ///
-/// Also the minimum time between two exchanges with the relay that no event has caused.
+/// The data exchange with the relay also pauses for this time, unless an event requests it earlier.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.

@@ -46,7 +46,7 @@ struct Sender<W, D> {
     tx: W,
     pin: Option<D>,
     byte_time: Duration,
-    /// Earliest time at which all bytes written so far can have left.
+    /// Time before which the port is still sending written bytes, computed from the baud rate.
     quiet_at: Instant,
     /// True if the last frame may have been cut short on the line.
     cut: bool,

@@ -347,8 +347,7 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the arc length that belongs to the length `chord` from the middle of a chord; all in m. `radius` is that
-/// of the arc.
+/// Returns half the length of an arc, m, from half the length of its `chord` and its `radius`, m.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)
@@ -536,8 +535,7 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Tests of special cases of a line on earth: its ends, a pole, the antimeridian, its rotation. It rotates with the
-/// earth's curvature.
+/// Tests of special cases of a line on earth: its ends, a pole, the antimeridian, its azimuth's change.
 #[cfg(test)]
 mod tests {
     use super::{Axis, AxisError, LONGEST_M};

@@ -78,7 +78,7 @@ pub struct Ground {
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last question to the relays which mission they fly; 0 before the first.
+    /// Number of the last question which mission the relays fly; 0 before the first question.
     query_number: u16,
     flown: Option<FlownMission>,
     /// Distance of the polled relay, in relays along the chain: 1 for the nearest.
@@ -88,7 +88,7 @@ pub struct Ground {
     relay_mission: Option<MissionId>,
     /// True after a question to the polled relay: its next hello is the answer.
     query_sent: bool,
-    /// Number of the relay's hello that the pending offer of the mission answers; `None` without one.
+    /// Number of the relay's hello that the next offer of the mission answers; `None` if no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
@@ -540,28 +540,29 @@ pub enum Progress {
     Offering,
     /// A relay holds the mission; the ground station polls until the chain flies it.
     Stored {
-        /// Node number of the relay that holds it.
+        /// Node number of the relay that holds the mission.
         by: u16,
     },
     /// A relay flies the mission, but the station does not know yet that all relays of its view do.
     Adopted {
-        /// Node number of the relay that flies it.
+        /// Node number of the relay that flies the mission.
         by: u16,
     },
-    /// The mission is active in all relays of a view (an agreed set of members). Relays outside the view take no part
-    /// until they fly it, too.
+    /// The mission is active in all relays of a view (an agreed set of members). Other relays do not take part until
+    /// they fly the mission.
     Flown {
-        /// Node number of the relay that reports it.
+        /// Node number of the relay that reports that its whole view flies the mission.
         by: u16,
         /// Latest view (agreed set of members) that the relay knows.
         view: ViewId,
-        /// Number of relays that fly the mission: the reporting relay and all of its view beyond it.
+        /// Number of relays that fly the mission. They are the reporting relay, and those of its view farther from
+        /// the station.
         relays: u16,
     },
     /// A relay refuses the mission: no valid line on earth, or outside that relay's own geofence. The chain does not
     /// fly it.
     Refused {
-        /// Node number of the relay that reports it: it refuses the mission, or a relay beyond it does.
+        /// Node number of the relay that reports the refusal: its own, or that of a relay farther away.
         by: u16,
     },
     /// The upload is outdated: a relay holds a newer mission.

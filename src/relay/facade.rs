@@ -549,20 +549,24 @@ impl Relay {
         self.node.sites()
     }
 
-    /// Returns the estimate of a field's interference from this relay's measurements. It is of the present position;
-    /// `None` before there are enough measurements.
+    /// Returns the estimate of the interference at this relay's present position, from its measurements.
+    ///
+    /// It is for missions with an interference field, which varies along the line. `None` before there are enough
+    /// measurements.
     pub fn estimate(&self) -> Option<Estimate> {
         self.node.round().meter().estimate()
     }
 
-    /// Returns Upsilon = E[1/I] of the interference I, as this relay has measured and uses it, 1/W. It replaces the
-    /// mission's field once this relay has measured enough; `None` before.
+    /// Returns Upsilon = E[1/I], 1/W, of the interference power I, as this relay has measured and uses it.
+    ///
+    /// `None` before there are enough measurements. Until then the relay uses the mission's value.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
     }
 
-    /// Returns the estimate of the interference and its number. It is the mission's until the chain has estimated
-    /// another.
+    /// Returns the chain's newest estimate of the interferer, and the number of the estimate.
+    ///
+    /// It is the interferer of the mission until the chain has estimated one.
     pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
@@ -658,8 +662,9 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Sets if the drone flies to setpoints, as [`handle_control`](Self::handle_control) does. Returns true if the
-    /// relay has a guard that did not know this.
+    /// Handles [`handle_control`](Self::handle_control): `flown` is true while the drone flies to setpoints.
+    ///
+    /// Returns true if the relay has a guard (collision avoidance) that had the other state.
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         self.node.handle_control(self.clock.advance(now), flown)
     }

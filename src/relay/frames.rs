@@ -11,8 +11,9 @@ use crate::wire::frame::{FrameBuf, Opened};
 use crate::wire::message::Message;
 use crate::wire::session::{Checked, Session};
 
-/// Number of heartbeat requests to a silent neighbour for each handshake that requests a reply. The reply shows
-/// whether the neighbour takes another node with this relay's index for this relay.
+/// Number of heartbeat requests to a silent neighbour for each handshake that requests a reply.
+///
+/// The reply shows if the neighbour mistakes another node with the same index for this relay.
 const QUESTIONS: u16 = 4;
 
 /// Handles an intact frame of this relay's network, received at `port`.

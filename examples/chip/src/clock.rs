@@ -330,7 +330,7 @@ mod tests {
         }
     }
 
-    /// Starts the clocks under every combination of faults. The mock panics at a write that the reference manuals
+    /// Checks the clocks under every combination of faults. The mock panics at a write that the reference manuals
     /// forbid.
     #[test]
     fn the_clocks_are_correct_under_all_combinations_of_faults() {

@@ -65,7 +65,7 @@ mod tests {
     use crate::mock::MockRegisters;
     use crate::registers::{Register, Registers as _};
 
-    /// Reads the values that RCC_CSR has after each kind of reset, by the reference manuals.
+    /// Checks the reset cause for each kind of reset. RCC_CSR has the values that the reference manuals state.
     #[test]
     fn the_reset_cause_is_read_once() {
         for (status, cause) in [

@@ -39,9 +39,9 @@ pub(super) enum Topic {
     Control,
     /// Reason for which the pilot cannot engage the drone.
     Wait,
-    /// Reason for which the guard holds the drone, concerning its upstream neighbour.
+    /// Reason why the guard (collision avoidance) holds the drone back because of its upstream neighbour.
     Upstream,
-    /// Reason for which the guard holds the drone, concerning its downstream neighbour.
+    /// Reason why the guard (collision avoidance) holds the drone back because of its downstream neighbour.
     Downstream,
     /// Event of the relay, such as a lost neighbour.
     Relay,
@@ -80,8 +80,9 @@ impl Line {
         }
     }
 
-    /// Returns the line for the guard's new reason to hold the drone because of its neighbour on `side`. `None` is
-    /// the end of a reason.
+    /// Returns the text for the guard's (collision avoidance) reason to hold the drone back on `side`.
+    ///
+    /// `None` says that the reason has ended.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
             Side::Upstream => (Topic::Upstream, " the previous drone"),
@@ -139,7 +140,7 @@ pub(super) struct Report {
     /// Last line sent on each topic.
     newest_sent: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
-    /// Number of values already sent in the current round.
+    /// Number of values (SIR and position) already sent in the present second.
     sent: usize,
     next_values_at: Option<Instant>,
 }
@@ -316,7 +317,7 @@ pub enum AutopilotEvent {
         /// Sender of the command.
         from: Address,
     },
-    /// Denied command of the operator to clear lost relays: it does not name exactly those of one side.
+    /// Denied command of the operator to clear lost relays. It does not name exactly the lost relays of one side.
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: RelayNumbers,

@@ -30,8 +30,8 @@ const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// False for a message that the link can do without. These are the fence, and the target, which only an ArduCopter reports and
-    /// only while it flies to one.
+    /// True for a message without which the drone cannot be controlled. False for the fence's state and the target,
+    /// which not every autopilot sends.
     is_vital: bool,
 }
 

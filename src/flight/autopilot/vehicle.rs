@@ -17,8 +17,8 @@ pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 /// Age of a position of the drone from which on it is not used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// Silence of the link that may have caused a failsafe of a PX4. A PX4 enters its failsafe after a second without a target, and a
-/// target is sent every 0.2 s.
+/// Silence of the autopilot from which on a PX4 may have entered its failsafe. It does so after a second without a
+/// target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
 /// Maximum time between the measurement of a position and its message.
@@ -484,16 +484,18 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the window over which the minimum delay of messages is taken. The minimum covers the last one to two
-/// halves.
+/// Time after which one of the two parts of the window for the minimum delay of messages is replaced. The minimum
+/// thus covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of the window for the minimum delay. A gap and the burst after it then do
-/// not change that delay.
+/// Minimum number of messages in each half of the window for the minimum delay.
+///
+/// So a gap, and the late messages that arrive at once after it, do not increase the minimum.
 const LEAST: u8 = 8;
 
-/// Assumed maximum drift between the clocks of relay and autopilot: one part in 2^10. With more drift the minimum
-/// delay lags behind by the drift of two halves.
+/// Assumed maximum drift between the clocks of relay and autopilot, as an exponent: one part in 2^10.
+///
+/// With more drift, messages seem late by the drift within the window for the minimum delay.
 const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's, by the message with the minimum delay.
@@ -558,8 +560,9 @@ impl RemoteClock {
     }
 }
 
-/// Returns `micros` in milliseconds, which wrap after 49 days as the autopilot's do. The division has two steps with
-/// instructions of the target: a 64-bit division takes a kilobyte of flash.
+/// Converts `micros`, µs, to milliseconds, which wrap after 49 days as the autopilot's do.
+///
+/// It uses two 32-bit divisions, because a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
@@ -677,8 +680,9 @@ mod clock_tests {
         Instant::from_millis(ms)
     }
 
-    /// Returns the apparent age of each message of a flight, ms. `said` returns the autopilot's clock at a time,
-    /// `delay` the link's delay.
+    /// Returns the apparent age of each message of a simulated flight, ms.
+    ///
+    /// `clock_ms` returns the autopilot's clock at a time, and `delay` the link's delay at a time.
     fn ages(clock_ms: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();

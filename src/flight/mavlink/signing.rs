@@ -41,8 +41,10 @@ const BEGIN_S: u64 = 1_420_070_400;
 /// Number of senders whose timestamps are remembered. An autopilot forwards frames that others have signed.
 const SENDERS: usize = 8;
 
-/// Sender of signed frames, and the minimum timestamp of its next one. A new sender replaces the one with the oldest
-/// last frame, whose last minute could then be replayed.
+/// Sender of signed frames, and the minimum timestamp of its next frame, against replays.
+///
+/// With [`SENDERS`] known senders, a new one replaces the sender with the oldest last frame. A frame of that sender
+/// can then be replayed for up to a minute.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,

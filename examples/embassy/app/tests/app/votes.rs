@@ -19,7 +19,7 @@ fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
 
-/// Reboots a relay three times; the other two fly on and readmit it. Its stored promise never falls.
+/// Checks that a relay's stored promise never falls over three reboots. The other two relays fly on and readmit it.
 #[test]
 fn no_promise_is_forgotten_over_reboots() {
     let flash = Ram::blank();
