@@ -203,8 +203,8 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the instructions of the calls in which a leader of 100 relays solves its chain in advance. Prints the
-/// largest cost and the number of calls.
+/// Measures the instructions of the calls in which the first of 100 relays predicts the chain. Prints the largest
+/// cost and the number of calls.
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

@@ -87,7 +87,7 @@ impl Basis {
         }
     }
 
-    /// Returns an uploaded mission as the basis. Without sites of its own it is flown between `sited`.
+    /// Returns an uploaded mission as the basis. If the upload has no sites, the mission is flown between `sited`.
     pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
         Self {
             config: *upload.config(),

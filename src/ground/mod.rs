@@ -26,7 +26,7 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay after which another node with its index is accepted: 15 s, as for relays.
+/// Silence of a relay, 15 s, after which another node with its index is accepted. Relays use the same time.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a question that a relay has not answered.
@@ -393,7 +393,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next question, to the same relay or the next one, if it is due. Takes constant time.
+    /// Schedules the next question if it is due: to the same relay again, or to the next relay. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if self.repeat_at.is_none_or(|again| again > now) {
@@ -543,7 +543,7 @@ pub enum Progress {
         /// Node number of the relay that holds the mission.
         by: u16,
     },
-    /// A relay flies the mission, but the station does not know yet that all relays of its view do.
+    /// A relay flies the mission, but the station does not know yet if all relays do.
     Adopted {
         /// Node number of the relay that flies the mission.
         by: u16,
@@ -553,7 +553,7 @@ pub enum Progress {
     Flown {
         /// Node number of the relay that reports that its whole view flies the mission.
         by: u16,
-        /// Latest view (agreed set of members) that the relay knows.
+        /// Latest view (agreed set of members) that the reporting relay knows.
         view: ViewId,
         /// Number of relays that fly the mission. They are the reporting relay, and those of its view farther from
         /// the station.

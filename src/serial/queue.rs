@@ -167,9 +167,10 @@ impl fmt::Debug for InterruptEnd<'_> {
 }
 
 impl InterruptEnd<'_> {
-    /// Queues a received byte or a fault.
+    /// Queues a received byte or a fault for the main loop.
     ///
-    /// Without room it is lost and counted, and the main loop reads one [`Fault::Overrun`] in its place.
+    /// If the queue is full, the byte is lost and counted, and the main loop reads one [`Fault::Overrun`] in its
+    /// place.
     pub fn received(&mut self, item: Result<u8, Fault>) {
         if self.gap && self.received.put(encode(Err(Fault::Overrun))) {
             self.gap = false;

@@ -8,9 +8,9 @@ const FORGET: u32 = 1 << 24;
 /// The cause of the last reset.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Reset {
-    /// Power-up.
+    /// Reset by switching the power on.
     Power,
-    /// Supply voltage too low.
+    /// Reset because the supply voltage was too low.
     Brownout,
     /// Reset pin: a button, or a debug probe.
     Pin,

@@ -370,8 +370,8 @@ impl Autopilot {
 
     /// Processes an event of the relay, and sends events that matter in flight to the operator as text.
     ///
-    /// A new view (agreed set of relays) is reported once its positions are agreed, if the drone is engaged. The
-    /// reason why a drone does not fly to its position is reported elsewhere: see [`handle_hold`](Self::handle_hold).
+    /// A new view (agreed set of relays) is reported once its positions are agreed, if the drone is engaged and not
+    /// held back. The reason to hold a drone back is reported by [`handle_hold`](Self::handle_hold).
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {

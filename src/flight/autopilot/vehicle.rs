@@ -339,7 +339,7 @@ impl Vehicle {
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the time at which the next known value becomes too old without a new message.
+    /// Returns the time at which the next known value becomes too old, if no message renews it.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);

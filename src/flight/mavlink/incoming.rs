@@ -324,7 +324,7 @@ impl Parser {
         self.counters
     }
 
-    /// Discards the first `length` received bytes, and those up to the next possible start of a frame.
+    /// Discards the first `length` received bytes, and more bytes up to the next possible start of a frame.
     fn drop_front(&mut self, length: usize) {
         let rest = self.bytes.get(length..).unwrap_or_default();
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();

@@ -81,7 +81,7 @@ impl<const IN: usize> Buffers<IN> {
     }
 }
 
-/// Longest time between two feedings of the watchdog while the relay makes progress.
+/// Longest time between two feedings of the watchdog, while the relay's timers are not late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
 /// Calls `feed` every [`TURN`] for ever, for a drone that does not join the chain. The watchdog then does not restart
