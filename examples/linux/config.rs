@@ -136,8 +136,9 @@ impl FileOptions {
         })
     }
 
-    /// Removes the file's options that the command line also gives or excludes. Returns the remaining options, and
-    /// the removed ones with a different value as overrides.
+    /// Removes the file's options that the command line also gives, or excludes.
+    ///
+    /// Returns the remaining options, and as overrides the removed ones whose value differs from the command line's.
     fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {

@@ -50,7 +50,7 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Request to confirm that all earlier lines have been written or dropped.
+    /// Request to confirm that the writer thread has written or dropped all earlier lines.
     Flush(SyncSender<()>),
 }
 

@@ -29,7 +29,8 @@ impl fmt::Display for Exact {
 pub(crate) struct Report {
     log: Log,
     identity: Identity,
-    /// Number of relays in the mission of the options. Relays keep their numbers when some are lost.
+    /// Number of relays in the mission that this program was started with. Relays keep their numbers when some are
+    /// lost.
     relays: u16,
     digest: u16,
     fence: Option<Geofence>,

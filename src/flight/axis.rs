@@ -31,8 +31,7 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Maximum difference between the mission's distance and the distance of its sites, m. It covers the rounding of the
-/// sites and of f32.
+/// Maximum difference, m, between the mission's distance and that of the sites of Tx and Rx. It covers rounding.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why the positions of transmitter and receiver define no line.
@@ -484,9 +483,10 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
 /// Factor that converts units of 10⁻⁷ degrees to radians.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
-/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees. The angle is reduced to an eighth of a turn exactly, in
-/// integers; sine and cosine of the remainder are fdlibm's series, within a unit in the last place. A function for any f64 would
-/// be ten times as large, for angles that no position has.
+/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees, within a unit in the last place.
+///
+/// The angle is reduced to an eighth of a turn in integers, without an error. Sine and cosine of the rest are
+/// fdlibm's series. A general function for f64 would be ten times as large.
 #[inline(never)] // called from several places
 pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     const EIGHTH: i32 = 450_000_000;

@@ -526,7 +526,7 @@ impl Relay {
         self.node.member().view
     }
 
-    /// Returns the expiry time of the agreement's lease; `None` before the first lease and after its expiry.
+    /// Returns the time at which the lease of the agreement expires; `None` while there is no lease.
     ///
     /// Until that time no other relay uses another agreement. Without a renewal the relay then requests a new view
     /// (agreed set of members), and keeps its setpoint.

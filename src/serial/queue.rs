@@ -84,7 +84,7 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
-/// Trigger of a UART's interrupt: a closure, or a type of its own for a port whose type must be named.
+/// Trigger of a UART's interrupt. It is a closure, or a type of the firmware if the port's type has to be named.
 pub trait Pend {
     /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);

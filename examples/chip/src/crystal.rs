@@ -7,7 +7,7 @@ use crate::registers::{Register, Registers};
 /// Crystal or external clock of a board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Crystal {
-    /// Frequency, Hz: a multiple of 2 MHz.
+    /// Frequency of the crystal or external clock, Hz: a multiple of 2 MHz.
     pub hz: u32,
     /// True for an external clock at the pin OSC_IN, false for a crystal.
     pub bypass: bool,

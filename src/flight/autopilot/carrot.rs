@@ -346,7 +346,7 @@ impl Target {
         }
     }
 
-    /// Restarts the schedule after a change of the setpoint, whose position has not been sent yet.
+    /// Restarts the schedule of transmissions after a change of the setpoint. The new target is sent at once.
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
         self.times_sent = 0;

@@ -42,7 +42,8 @@ pub(super) struct Clearance {
     accepted: Option<(Address, RelayNumbers)>,
     /// Pending answer to a command: its addressee, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays the operator has cleared, until the relay is told.
+    /// Side whose lost relays the operator has cleared. The relay has not been told yet; `None` if there is nothing
+    /// to tell.
     cleared: Option<Side>,
 }
 
@@ -100,7 +101,7 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true until both the answer to the last command and the cleared side have been taken.
+    /// Returns true while the answer to the last command, or the side to clear, has not been taken.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }

@@ -38,7 +38,7 @@ const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Delay of a due target after which a PX4 may be in its failsafe.
+/// Lateness of a target from which on a PX4 may have entered its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
 /// Time for which positions must be received regularly before [`State::Blind`] ends.
@@ -548,7 +548,7 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the reason not to engage the drone is reported; `None` if nothing is due.
+    /// Returns the time at which the reason not to engage the drone is reported; `None` without a report.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {

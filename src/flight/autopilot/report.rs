@@ -101,7 +101,7 @@ impl Line {
         Self::warning(topic, [what, whom])
     }
 
-    /// Returns the line for an event of the relay; `None` for events that operators do not read.
+    /// Returns the text for the operator about an event of the relay; `None` for events without a text.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
             Event::Infeasible => "relay: no target SIR can be met",
@@ -170,7 +170,8 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent.
+    /// Returns true if a line with this hash may be sent at `now`: not within 10 s after an equal line. Marks it as
+    /// sent.
     fn passes(&mut self, now: Instant, hash: u32) -> bool {
         self.recent.retain(|(_, until)| *until > now);
         self.recent.iter().all(|(of, _)| *of != hash)

@@ -127,7 +127,7 @@ impl Streams {
         }
     }
 
-    /// Schedules requests for messages that arrived less than half as often as requested.
+    /// Schedules requests for messages that were received less than half as often as requested.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         let passed = now.since(self.since);
         if passed < WINDOW {

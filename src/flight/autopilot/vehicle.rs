@@ -511,7 +511,7 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum difference between the clocks, µs: in the previous half of the window, and the present one.
+    /// Minimum difference of the relay's clock and the autopilot's, µs, in the last and this half window.
     least: [i64; 2],
     since: Instant,
     messages: u8,

@@ -118,7 +118,7 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that the parser knows: those that this crate uses, and those whose payload may contain frames.
+/// Messages that the parser knows: messages of this crate, and those whose payload may contain frames.
 ///
 /// The parser skips the latter as a whole, so that it does not find a frame inside.
 const TABLE: [Known; 26] = [

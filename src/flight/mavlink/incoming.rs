@@ -229,7 +229,7 @@ pub struct Received {
     pub from: Address,
     /// Decoded message; `None` for a kind that this crate skips, or that only companions send.
     pub message: Option<Incoming>,
-    /// Message id of MAVLink.
+    /// MAVLink id of the received message.
     pub id: u32,
     /// True if the frame has a signature, which the parser does not check.
     pub is_signed: bool,

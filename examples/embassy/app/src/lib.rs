@@ -93,7 +93,7 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     }
 }
 
-/// Feeds the watchdog every [`TURN`] while the relay's timers are not late, by [`watchdog::may_feed`].
+/// Feeds the watchdog every [`TURN`], unless the relay's timers are late: see [`watchdog::may_feed`].
 ///
 /// It runs in the task of ports and timers, so a hanging turn of that task, a panic or a fault ends the feeding.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
