@@ -107,9 +107,8 @@ impl Clock for FixedClock {
     }
 }
 
-/// Returns relay 2 of 3, and the first sweep message to it, its length, and the time.
-///
-/// A sweep message passes the search for positions down the chain from relay to relay.
+/// Returns relay 2 of 3, and the first sweep message to it, its length, and the time. A sweep message passes the
+/// search for positions down the chain from relay to relay.
 fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {

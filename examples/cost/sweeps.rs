@@ -32,8 +32,9 @@ pub(crate) fn reach() {
     reach_in_noise();
 }
 
-/// Measures the instructions of `Hop::reach` with receiver noise. The noise is 1e-4 to 100 times the interference 100
-/// m from the interferer.
+/// Measures the instructions of `Hop::reach` (farthest position that meets a target SIR) with noise.
+///
+/// The receiver noise is 1e-4 to 100 times the interference 100 m from the interferer.
 fn reach_in_noise() {
     const LEVELS: usize = 4;
     let mut all = [0; LEVELS * 30];
@@ -64,9 +65,8 @@ fn reach_in_noise() {
     hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
-/// Largest costs, in instructions, of the calls that handle a sweep and its verdict.
-///
-/// A sweep is the search that passes along the chain from relay to relay; the verdict is its result on the way back.
+/// Largest costs, in instructions, of the calls that handle a sweep and its verdict. A sweep is the search that
+/// passes along the chain from relay to relay; the verdict is its result on the way back.
 struct SweepCost {
     begin: u32,
     through: u32,

@@ -119,7 +119,7 @@ impl FileOptions {
         }
     }
 
-    /// Refuses autopilot settings in the file when no autopilot is configured there or on the command line.
+    /// Returns an error if the file has autopilot settings, but no autopilot is given there or in `line`.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {

@@ -125,7 +125,7 @@ impl Log {
         self.event(now, event, Value::Null, text);
     }
 
-    /// Logs that frames are signed, with this epoch.
+    /// Logs that frames are signed, and the epoch, a number that rises at every start.
     pub fn signed(&self, epoch: u32) {
         let what = format_args!("frames are signed, epoch {epoch}");
         self.event(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);

@@ -87,7 +87,7 @@ pub struct StoredFile {
     /// Newest record to store.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
-    /// Record of the last write, successful or not.
+    /// Record of the last write that has ended, successful or not.
     tried: Option<Vec<u8>>,
     writes: u64,
     slowest: Span,

@@ -62,7 +62,7 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns the line to log at `now` for a drone at `drone`, if any, and the time of the next check.
+    /// Returns the line to log at `now` for a drone at `drone`, if any, and the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -118,8 +118,9 @@ impl Movement {
         self.near_since = None;
     }
 
-    /// Returns the drone's arrival at `goal`, if it must be logged. `goal` is the setpoint once that equals the
-    /// agreed position.
+    /// Returns the drone's arrival at `goal`, if it must be logged; `None` otherwise.
+    ///
+    /// `goal` is the setpoint if that is the agreed position, and `None` while it is not.
     fn arrival(
         &mut self,
         now: Instant,

@@ -65,8 +65,9 @@ impl OffLineMonitor {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Returns the report of a drone outside its geofence, if one is due. Compares `off_line`, else the newest
-    /// position, with the line between `sites` and the mission's `lateral` range.
+    /// Returns the report of a drone outside its geofence, if one is due. The drone's position is `off_line`, or if
+    /// that is `None` the newest measured one. The geofence is the line between `sites` with the mission's `lateral`
+    /// range.
     pub(crate) fn check(
         &mut self,
         now: Instant,

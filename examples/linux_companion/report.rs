@@ -57,7 +57,7 @@ impl Report {
         }
     }
 
-    /// Logs the relay's identity, ports and mission digest. The digest is equal at relays with the same mission.
+    /// Logs the relay's identity, ports and mission digest, which is equal at relays with the same mission.
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
@@ -79,7 +79,7 @@ impl Report {
         );
     }
 
-    /// Logs the signing epoch, or that frames are not signed.
+    /// Logs the signing epoch, a number that rises at every start. `None` says that frames are not signed.
     pub(crate) fn signing(&self, epoch: Option<u32>) {
         match epoch {
             Some(epoch) => self.log.signed(epoch),

@@ -263,10 +263,9 @@ fn next<'f>(
     })
 }
 
-/// Awaits `future`; returns its output, and true if the future was pending at least once.
-///
-/// False means that it never waited. The caller must then yield to the executor, so that a port that is always ready
-/// does not block other tasks.
+/// Awaits `future`; returns its output, and true if the future was pending at least once. False means that it never
+/// waited. The caller must then yield to the executor, so that a port that is always ready does not block other
+/// tasks.
 pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;

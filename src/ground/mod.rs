@@ -86,7 +86,7 @@ pub struct Ground {
     unanswered: u8,
     /// Mission that the polled relay holds, once it has reported it.
     relay_mission: Option<MissionId>,
-    /// True after a question to the polled relay: its next hello is the answer.
+    /// True from a question to the polled relay until its next hello, which is the answer.
     query_sent: bool,
     /// Number of the relay's hello that the next offer of the mission answers; `None` if no offer is due.
     offer_number: Option<u16>,
@@ -184,7 +184,8 @@ impl Ground {
         self.repeat_at = Some(now + REPEAT_AFTER);
     }
 
-    /// Reports the interference measured here to the relays nearby. Returns false if outside 1e-30 to 1e6 W.
+    /// Reports the interference measured at this station to the relays nearby. Returns false, and does nothing, if
+    /// `power_w` is outside 1e-30 to 1e6 W.
     ///
     /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged long enough
     /// for the relative error of [`Listen`](crate::Listen). One measurement per [`Listen::every`](crate::Listen::every) is

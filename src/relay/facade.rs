@@ -555,10 +555,8 @@ impl Relay {
         self.node.sites()
     }
 
-    /// Returns the estimate of the interference at this relay's present position, from its measurements.
-    ///
-    /// It is for missions with an interference field, which varies along the line. `None` before there are enough
-    /// measurements.
+    /// Returns the estimate of the interference at this relay's present position, from its measurements. It is for
+    /// missions with an interference field, which varies along the line. `None` before there are enough measurements.
     pub fn estimate(&self) -> Option<Estimate> {
         self.node.round().meter().estimate()
     }
@@ -584,10 +582,8 @@ impl Relay {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns why the last collected measurements gave no estimate of the interferer.
-    ///
-    /// Only the leader (the relay that starts the search) knows it. `None` at other relays, and after a successful
-    /// estimate.
+    /// Returns why the last collected measurements gave no estimate of the interferer. Only the leader (the relay
+    /// that starts the search) knows it. `None` at other relays, and after a successful estimate.
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }

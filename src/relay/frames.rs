@@ -166,7 +166,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules a handshake to node `to`, if one has to accompany `message`.
+/// Schedules a handshake to node `to`, if one has to be sent with `message`.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0

@@ -30,8 +30,9 @@ const CATCH_UP_PER_S: f32 = 1.25;
 /// speed.
 const CARROT_PART: f32 = 0.96;
 
-/// Rate at which the moving target approaches its maximum speed, 1/s. The approach is smooth, since an accelerating
-/// drone goes on accelerating for a moment.
+/// Ratio of the moving target's acceleration to the speed that it lacks to its maximum, 1/s.
+///
+/// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
 const TOP_PER_S: f32 = 0.5;
 
 /// Minimum speed of a target whose drone lags behind, as a fraction of the speed limit. The target never stops for

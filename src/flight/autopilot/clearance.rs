@@ -29,7 +29,8 @@ const DENIED: u8 = 2;
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
-    /// True if more relays are lost than a command can name.
+    /// True if more relays are lost on this side than one command can name. They then can not be cleared by a
+    /// command.
     is_full: bool,
 }
 

@@ -101,9 +101,8 @@ pub struct Autopilot {
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the relay is ready to be engaged.
     ready: bool,
-    /// Reasons why the guard (collision avoidance) holds the drone back, as last reported to the operator.
-    ///
-    /// The first is because of the upstream neighbour, the second because of the downstream one.
+    /// Reasons why the guard (collision avoidance) holds the drone back, as last reported to the operator. The first
+    /// is because of the upstream neighbour, the second because of the downstream one.
     hold: [Option<HoldReason>; 2],
     /// Newest reasons why the guard (collision avoidance) holds the drone back, with their start.
     newest_hold: ([Option<HoldReason>; 2], Instant),
@@ -121,9 +120,8 @@ pub struct Autopilot {
 }
 
 impl Autopilot {
-    /// Creates the link to the autopilot of a drone.
-    ///
-    /// The drone flies along the line `axis` from Tx to Rx, within the speed and acceleration of `pace`.
+    /// Creates the link to the autopilot of a drone. The drone flies along the line `axis` from Tx to Rx, within the
+    /// speed and acceleration of `pace`.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
         Self {
             loaded: [axis.sites(); UPLOAD as usize],
@@ -710,10 +708,9 @@ impl Autopilot {
         Some(Position { at, ..position })
     }
 
-    /// Returns the position of a drone that is too far from its line, and its distance from the line.
-    ///
-    /// Such a drone has no position in the mission's coordinates. `None` for a drone near the line, and without a
-    /// position for 3 s. Constant work.
+    /// Returns the position of a drone that is too far from its line, and its distance from the line. Such a drone
+    /// has no position in the mission's coordinates. `None` for a drone near the line, and without a position for 3
+    /// s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
         let at = self.off_line_detector.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)

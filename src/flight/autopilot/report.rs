@@ -300,8 +300,9 @@ pub enum AutopilotEvent {
     Waits(WaitReason),
     /// Readiness: the pilot may now engage the drone by choosing the companion's mode.
     Ready,
-    /// Refused target: for 3 s the autopilot has reported another target than it was sent. The position is outside its own fence,
-    /// or another companion controls it.
+    /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
+    ///
+    /// The sent position is outside the autopilot's own fence, or another companion sends targets to it.
     Refused,
     /// Report of the autopilot that it is outside of its fence.
     FenceBreached,

@@ -41,10 +41,9 @@ const BEGIN_S: u64 = 1_420_070_400;
 /// Number of senders whose timestamps are remembered. An autopilot forwards frames that others have signed.
 const SENDERS: usize = 8;
 
-/// Sender of signed frames, and the minimum timestamp of its next frame, against replays.
-///
-/// With [`SENDERS`] known senders, a new one replaces the sender with the oldest last frame. A frame of that sender
-/// can then be replayed for up to a minute.
+/// Sender of signed frames, and the minimum timestamp of its next frame, against replays. With [`SENDERS`] known
+/// senders, a new one replaces the sender with the oldest last frame. Frames of that sender that are at most a minute
+/// old could then be replayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
