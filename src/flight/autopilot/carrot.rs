@@ -30,7 +30,7 @@ const CATCH_UP_PER_S: f32 = 1.25;
 /// speed.
 const CARROT_PART: f32 = 0.96;
 
-/// Ratio of the moving target's acceleration to the speed that it lacks to its maximum, 1/s.
+/// Ratio of the target's acceleration, near its maximum speed, to the speed that it still lacks, 1/s.
 ///
 /// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
 const TOP_PER_S: f32 = 0.5;

@@ -484,8 +484,8 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Time after which one of the two parts of the window for the minimum delay of messages is replaced. The minimum
-/// thus covers the last 4 to 8 s.
+/// Half of the window over which the minimum delay of messages is taken. Each half is replaced in turn, so that the
+/// minimum covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
 /// Minimum number of messages in each half of the window for the minimum delay.
@@ -562,7 +562,7 @@ impl RemoteClock {
 
 /// Converts `micros`, µs, to milliseconds, which wrap after 49 days as the autopilot's do.
 ///
-/// It uses two 32-bit divisions, because a 64-bit division takes a kilobyte of flash.
+/// It uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
