@@ -107,7 +107,8 @@ impl Clock for FixedClock {
     }
 }
 
-/// Returns relay 2 of 3, the first sweep message that relay 1 sends to it, its length, and the time.
+/// Returns relay 2 of 3, and the first sweep message to it, its length, and the time. A sweep message passes the
+/// search for positions down the chain from relay to relay.
 fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -124,7 +125,8 @@ fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Measures the instructions for a sweep message through relay 2, by the blocking and the async runner.
+/// Measures the instructions for a sweep message through relay 2, by the blocking and the async runner. A sweep
+/// message is the search message that goes down the chain from relay to relay.
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = relay_and_sweep() else {
         return;

@@ -34,7 +34,7 @@ fn exchange_all(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     }
 }
 
-/// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay.
+/// Measures the instructions for authentication tags, a signed search message, and a rejected replay.
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));

@@ -9,8 +9,9 @@ use super::missions::{HIGH, UNEVEN};
 /// Simulated chain of three relays that records the cost of every call.
 pub(crate) struct Flight {
     relays: [Relay; 3],
-    /// Instructions of the most expensive call so far. The next field is the length of the longest frame.
+    /// Instructions of the most expensive call so far.
     most: u32,
+    /// Length of the longest frame so far, bytes.
     longest: usize,
 }
 
@@ -77,7 +78,7 @@ impl Flight {
     }
 }
 
-/// Result of a chain: 1 if it settled, instructions of its most expensive call, longest frame.
+/// Result of a simulated chain: 1 if it settled, cost of its most expensive call, longest frame.
 struct Flown {
     settled: u32,
     most: u32,

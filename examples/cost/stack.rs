@@ -59,9 +59,9 @@ pub(crate) fn paint() {
     black_box(&words);
 }
 
-/// Returns the number of stack bytes that no longer have the pattern.
+/// Returns the number of stack bytes that no longer have the pattern of [`paint`].
 ///
-/// Its array lies where that of `paint` was, and is not written.
+/// Its array is at the same stack addresses as that of [`paint`], and is not initialised.
 #[inline(never)]
 pub(crate) fn unpainted_bytes() -> u32 {
     let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();

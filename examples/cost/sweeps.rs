@@ -32,8 +32,9 @@ pub(crate) fn reach() {
     reach_in_noise();
 }
 
-/// Measures the instructions of `Hop::reach` with receiver noise. The noise is 1e-4 to 100 times the interference 100
-/// m from the interferer.
+/// Measures the instructions of `Hop::reach` (farthest position that meets a target SIR) with noise.
+///
+/// The receiver noise is 1e-4 to 100 times the interference 100 m from the interferer.
 fn reach_in_noise() {
     const LEVELS: usize = 4;
     let mut all = [0; LEVELS * 30];
@@ -64,7 +65,8 @@ fn reach_in_noise() {
     hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
-/// Largest costs of the calls of a sweep and its verdict.
+/// Largest costs, in instructions, of the calls that handle a sweep and its verdict. A sweep is the search that
+/// passes along the chain from relay to relay; the verdict is its result on the way back.
 struct SweepCost {
     begin: u32,
     through: u32,
@@ -77,7 +79,7 @@ struct SweepCost {
     settled: bool,
 }
 
-/// Prints the costs of sweeps of one direction and of both.
+/// Prints the costs of a sweep (search along the chain), for traffic in one direction and in both.
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     const BOTH_WAYS: Mission = Mission::new(MissionConfig {
@@ -101,7 +103,7 @@ pub(crate) fn sweep() {
     hprintln!("settled_both_ways {}", u32::from(cost.settled));
 }
 
-/// Measures a full sweep through a middle and the last relay of three, and the verdict on its way back.
+/// Measures a full sweep (search along the chain of three relays), and the verdict on its way back.
 #[inline(never)]
 fn measured(mission: Mission) -> SweepCost {
     let settings = Settings {
@@ -172,7 +174,7 @@ fn measured(mission: Mission) -> SweepCost {
     }
 }
 
-/// Measures the instructions for deframing and checking one sweep message, the first of eight relays.
+/// Measures the instructions for deframing and checking the first sweep message of eight relays.
 pub(crate) fn deframe() {
     let settings = Settings {
         predict: false,
@@ -201,8 +203,8 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the instructions of the calls in which a leader of 100 relays solves its chain in advance. Prints the
-/// largest cost and the number of calls.
+/// Measures the instructions of the calls in which the first of 100 relays predicts the chain. Prints the largest
+/// cost and the number of calls.
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

@@ -10,9 +10,9 @@ pub const READY: &[u8] = b"ready\0";
 
 /// Answers received frames, so that a test can compare the results of target and PC.
 ///
-/// A valid frame is answered with itself, decoded and encoded again. A sweep is also answered with a verdict that
-/// repeats the sweep's targets as slacks and its `chosen` field as `own`. An invalid frame is answered with a digit
-/// for the error, and a delimiter.
+/// A valid frame is answered with itself, decoded and encoded again. A sweep message is also answered with a verdict
+/// message that contains values of the sweep. An invalid frame is answered with a digit for the error, and a
+/// delimiter.
 pub struct Answerer {
     deframer: Deframer,
 }

@@ -112,14 +112,14 @@ impl FileOptions {
         }
     }
 
-    /// Adds an option without a value if `is` is true.
+    /// Adds the option `name`, which has no value, if `is` is true.
     pub fn flag(&mut self, name: &'static str, is: Option<bool>) {
         if is == Some(true) {
             self.options.push((name, None));
         }
     }
 
-    /// Refuses autopilot settings in the file when no autopilot is configured there or on the command line.
+    /// Returns an error if the file has autopilot settings, but no autopilot is given there or in `line`.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {
@@ -136,8 +136,9 @@ impl FileOptions {
         })
     }
 
-    /// Removes the file's options that the command line also gives or excludes. Returns the remaining options, and
-    /// the removed ones with a different value as overrides.
+    /// Removes the file's options that the command line also gives, or excludes.
+    ///
+    /// Returns the remaining options, and as overrides the removed ones whose value differs from the command line's.
     fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {

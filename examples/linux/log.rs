@@ -50,7 +50,7 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Request to confirm that all earlier lines have been written or dropped.
+    /// Request to confirm that the writer thread has written or dropped all earlier lines.
     Flush(SyncSender<()>),
 }
 
@@ -125,7 +125,7 @@ impl Log {
         self.event(now, event, Value::Null, text);
     }
 
-    /// Logs that frames are signed, with this epoch.
+    /// Logs that frames are signed, and the epoch, a number that rises at every start.
     pub fn signed(&self, epoch: u32) {
         let what = format_args!("frames are signed, epoch {epoch}");
         self.event(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);

@@ -34,7 +34,7 @@ pub struct Service {
     clock: Clock,
     socket: Option<StatusSocket>,
     signals: SignalDelivery<UnixStream, SignalOnly>,
-    /// True after SIGHUP, a request to reopen the log, until it is handled.
+    /// True from a SIGHUP, which requests to reopen the log, until the log is reopened.
     hangup: bool,
     /// True from a SIGUSR1, which requests the status in the log, until the status is logged.
     asks_status: bool,

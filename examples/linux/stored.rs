@@ -87,7 +87,7 @@ pub struct StoredFile {
     /// Newest record to store.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
-    /// Record of the last write, successful or not.
+    /// Record of the last write that has ended, successful or not.
     tried: Option<Vec<u8>>,
     writes: u64,
     slowest: Span,
@@ -142,8 +142,9 @@ impl StoredFile {
         })
     }
 
-    /// Begins to write `record`. Returns true once it is written, or once the write has failed: a drone in the air must not fall
-    /// silent for a full disk.
+    /// Begins to write `record`; returns true once the write has ended, also if it has failed.
+    ///
+    /// After a failure the program flies on, because a drone in the air must not fall silent for a full disk.
     pub fn store(&mut self, record: &[u8]) -> bool {
         if self.record.as_deref() != Some(record) {
             self.record = Some(record.to_vec());

@@ -74,7 +74,7 @@ impl Tap {
         self.is_over
     }
 
-    /// Returns the error that ended the capture. Further calls return `None`, also on other taps of that capture.
+    /// Returns the error that ended the capture, once. All taps of the capture share it.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let was_reported = self.state.is_reported.swap(true, Ordering::Relaxed);

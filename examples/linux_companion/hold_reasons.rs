@@ -6,7 +6,7 @@ use uav_relay::{Duration, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;
 
-/// Time that a reason for waiting must last before it is logged. Shorter ones occur while an agreement spreads.
+/// Time that a reason for waiting must last before it is logged. Shorter waits occur while an agreement spreads.
 const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];

@@ -62,7 +62,7 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns the line to log at `now` for a drone at `drone`, if any, and the time of the next check.
+    /// Returns the line to log at `now` for a drone at `drone`, if any, and the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -118,8 +118,9 @@ impl Movement {
         self.near_since = None;
     }
 
-    /// Returns the drone's arrival at `goal`, if it must be logged. `goal` is the setpoint once that equals the
-    /// agreed position.
+    /// Returns the drone's arrival at `goal`, if it must be logged; `None` otherwise.
+    ///
+    /// `goal` is the setpoint if that is the agreed position, and `None` while it is not.
     fn arrival(
         &mut self,
         now: Instant,
@@ -197,8 +198,8 @@ mod tests {
         }
     }
 
-    /// Moves a setpoint by 0.1 m every 0.2 s. It is logged every 0.6 m and where it stops; a small later change is
-    /// not logged.
+    /// Checks the log lines of a setpoint that moves by 0.1 m every 0.2 s: every 0.6 m, and where it stops. A small
+    /// later change is not logged.
     #[test]
     fn a_line_for_each_half_metre_and_the_exact_end() {
         let mut movement = Movement::new(true);
@@ -218,7 +219,8 @@ mod tests {
         }
     }
 
-    /// Flies a drone past its goal and back. The overshoot within 2 s is no arrival; the final stay is one.
+    /// Checks that a drone which flies past its goal and back is logged as arrived once. The overshoot within 2 s is
+    /// no arrival.
     #[test]
     fn a_drone_that_stays_has_arrived_once() {
         let mut movement = Movement::new(true);

@@ -20,7 +20,8 @@ const STALE: Duration = Duration::from_millis(3_000);
 /// Distance outside the geofence up to which nothing is reported, m.
 const FENCE_M: f64 = 100.0;
 
-/// Factor by which the line must be nearer to the drone with swapped sites, before a swap is suggested.
+/// Minimum ratio of the drone's distances from the given line and from the line between swapped sites. From this
+/// ratio on, the log suggests that latitude and longitude were swapped.
 const NEARER: f64 = 10.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -64,8 +65,9 @@ impl OffLineMonitor {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Returns the report of a drone outside its geofence, if one is due. Compares `off_line`, else the newest
-    /// position, with the line between `sites` and the mission's `lateral` range.
+    /// Returns the report of a drone outside its geofence, if one is due. The drone's position is `off_line`, or if
+    /// that is `None` the newest measured one. The geofence is the line between `sites` with the mission's `lateral`
+    /// range.
     pub(crate) fn check(
         &mut self,
         now: Instant,

@@ -86,7 +86,7 @@ pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
     StoredFile::new(UPLOADS, file, None)
 }
 
-/// Begins to store an uploaded mission. A mission that can not be stored is flown all the same.
+/// Begins to store an uploaded mission. The relay flies the mission also if it can not be stored.
 pub(crate) fn store_upload(file: &mut StoredFile, upload: &Upload) {
     let mut bytes = [0; Upload::LENGTH];
     // The buffer has room for every upload.

@@ -27,8 +27,9 @@ struct Flight {
     ports: Ports,
     positions: Option<Positions>,
     autopilot: Option<Companion>,
-    /// File with the relay's votes. The next field is the file with the newest uploaded mission.
+    /// File with the relay's votes on the chain's membership.
     views: Option<StoredFile>,
+    /// File with the newest uploaded mission.
     uploads: Option<StoredFile>,
     rejections: RejectionReasons,
     hold_reasons: HoldReasonLog,

@@ -29,7 +29,8 @@ impl fmt::Display for Exact {
 pub(crate) struct Report {
     log: Log,
     identity: Identity,
-    /// Number of relays in the mission of the options. Relays keep their numbers when some are lost.
+    /// Number of relays in the mission that this program was started with. Relays keep their numbers when some are
+    /// lost.
     relays: u16,
     digest: u16,
     fence: Option<Geofence>,
@@ -56,7 +57,7 @@ impl Report {
         }
     }
 
-    /// Logs the relay's identity, ports and mission digest. The digest is equal at relays with the same mission.
+    /// Logs the relay's identity, ports and mission digest, which is equal at relays with the same mission.
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
@@ -78,7 +79,7 @@ impl Report {
         );
     }
 
-    /// Logs the signing epoch, or that frames are not signed.
+    /// Logs the signing epoch, a number that rises at every start. `None` says that frames are not signed.
     pub(crate) fn signing(&self, epoch: Option<u32>) {
         match epoch {
             Some(epoch) => self.log.signed(epoch),

@@ -2,7 +2,7 @@
 
 use uav_relay::{Duration, Instant};
 
-/// Time that an autopilot has to answer before it is reported. It sends a HEARTBEAT every second.
+/// Time without a HEARTBEAT after which a missing autopilot is reported. An autopilot sends one every second.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(3_000);
 
 /// Kind of the data received from the autopilot's port since the start; the most specific kind counts.

@@ -157,8 +157,9 @@ pub(crate) fn moves(
     Some(moves.collect())
 }
 
-/// Returns the distance, m, between a relay's positions before and after, each relative to its line. Without both
-/// lines they count as the same line.
+/// Returns the distance, m, between a relay's positions before and after an upload.
+///
+/// `lines` are the lines from Tx to Rx before and after; without both of them the line counts as unchanged.
 fn apart_m(lines: &[Option<Axis>; 2], before: Placement, after: Placement) -> f64 {
     let on_earth = |axis: &Option<Axis>, place| axis.as_ref().and_then(|axis| axis.point(place));
     let [one, other] = lines;

@@ -65,7 +65,8 @@ pub(crate) struct NewOptions {
 /// position error.
 const ORDER_M: f32 = 2.0;
 
-/// Maximum distance between a new line and the present line, m. The length of the new line is added to it.
+/// Maximum distance of a new line from the present line, m, beyond the new line's own length. A line farther away
+/// is rejected.
 const FAR_M: f64 = 100_000.0;
 
 /// Mission that supplies the values which the `--new-` options do not give.
@@ -87,7 +88,7 @@ impl Basis {
         }
     }
 
-    /// Returns an uploaded mission as the basis. Without sites of its own it is flown between `sited`.
+    /// Returns an uploaded mission as the basis. If the upload has no sites, the mission is flown between `sited`.
     pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
         Self {
             config: *upload.config(),

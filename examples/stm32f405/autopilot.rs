@@ -24,8 +24,8 @@ use crate::firmware::config::{self, Sites};
 use crate::firmware::port::{self, OUTGOING, Port, Queues, Slot};
 use crate::firmware::{board, chip, log};
 
-/// Capacity of the receive queue, bytes: 44 ms. It must hold an autopilot's bursts while the main loop is busy with a
-/// sweep.
+/// Capacity of the receive queue, bytes: 44 ms of traffic. It must hold an autopilot's bursts while the main loop is
+/// busy with a long message.
 const RECEIVED: usize = 512;
 
 /// Maximum position error of a hovering drone, m.
@@ -51,7 +51,8 @@ pub(crate) struct Autopilot {
 }
 
 impl Autopilot {
-    /// Returns the guard's configuration `of` with the position error and the stopping time of this drone.
+    /// Returns the guard's configuration `of` with this drone's position error and stopping time. The guard keeps
+    /// drones apart.
     #[expect(
         clippy::unnecessary_wraps,
         reason = "an image that does not fly has none"
@@ -79,8 +80,8 @@ impl Autopilot {
         Self::along(&course, uart, now)
     }
 
-    /// Creates the autopilot link along a course. A separate function keeps its stack frame out of the computation of
-    /// the course.
+    /// Creates the autopilot link along a course. The computation of the course is in another function, to save
+    /// stack.
     #[inline(never)]
     fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;

@@ -10,7 +10,7 @@ use uav_relay::Instant;
 use crate::firmware::chip;
 use crate::firmware::clock::{self, Clock};
 
-/// Clock of the board, and the earliest time at which the task counters_requested to be woken.
+/// Clock of the board, and the earliest time at which the task asked to be woken.
 pub(crate) struct Time {
     clock: RefCell<Clock>,
     next: Cell<Option<Instant>>,

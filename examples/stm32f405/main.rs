@@ -60,8 +60,9 @@ fn main() -> ! {
     main_loop::fly(clock, links, drone)
 }
 
-/// Creates clock, links to both neighbours and the autopilot's UART. The links are in static RAM; not inlined, so
-/// that the stack frame is released.
+/// Creates the clock, the links to both neighbours and the autopilot's UART.
+///
+/// The links are in static RAM. The function is not inlined, so that its stack frame is released.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(firmware::clock::Clock, &'static mut Links, autopilot::Uart)> {

@@ -86,9 +86,10 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
     }
 }
 
-/// Returns no measurement. Replace it by your receiver's newest one, if the relay measures a field or listens for an
-/// interferer. To listen, the relay needs the drone's position, too. After enough samples of a field `Relay::restart`
-/// at the leader lets the chain agree again.
+/// Returns no measurement. Replace it if the relay measures a field or listens for an interferer.
+///
+/// Return your receiver's newest measurement then. To listen, the relay also needs the drone's position. After enough
+/// samples of a field, call `Relay::restart` at the leader, so that the chain agrees again.
 const fn measured() -> Option<Sample> {
     None
 }

@@ -32,8 +32,9 @@ fn main() -> ! {
     main_loop::fly(clock, channel, drone)
 }
 
-/// Creates clock, radio channel and the autopilot's UART. The channel is in static RAM; not inlined, so that the
-/// stack frame is released.
+/// Creates the clock, the radio channel and the autopilot's UART.
+///
+/// The channel is in static RAM. The function is not inlined, so that its stack frame is released.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(

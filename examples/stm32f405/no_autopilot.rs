@@ -23,7 +23,7 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
 pub(crate) enum Autopilot {}
 
 impl Autopilot {
-    /// Returns `None`: an image without an autopilot link needs no guard.
+    /// Returns `None`: an image without an autopilot link needs no guard (collision avoidance).
     pub(crate) const fn guard(_: &Sites, _: GuardConfig) -> Option<GuardConfig> {
         None
     }

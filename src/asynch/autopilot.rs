@@ -18,9 +18,9 @@ use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 use crate::serial::READ_LIMIT;
 use crate::time::Duration;
 
-/// Pause before a port is used again after an error, the end of its stream or a full buffer.
+/// Pause before a failed, ended or full port is used again.
 ///
-/// Also the minimum time between two exchanges with the relay that no event has caused.
+/// The data exchange with the relay also pauses for this time, unless an event requests it earlier.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.
@@ -30,9 +30,10 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Signal to exchange data with the relay: raised after received bytes and after events of the relay.
+    /// Signal to the future that exchanges data with the relay. It is raised after received bytes and events of the
+    /// relay.
     exchange_signal: Signal,
-    /// Signal to the sending future: a frame for the autopilot may be pending.
+    /// Signal to the future that sends frames to the autopilot: a frame may be pending.
     send_signal: Signal,
     /// Waker of the task in `next_event`, which waits for an event of the autopilot link.
     listener: Cell<Option<Waker>>,

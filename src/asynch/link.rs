@@ -46,7 +46,7 @@ struct Sender<W, D> {
     tx: W,
     pin: Option<D>,
     byte_time: Duration,
-    /// Earliest time at which all bytes written so far can have left.
+    /// Time before which the port is still sending written bytes, computed from the baud rate.
     quiet_at: Instant,
     /// True if the last frame may have been cut short on the line.
     cut: bool,
@@ -263,8 +263,9 @@ fn next<'f>(
     })
 }
 
-/// Awaits `future`; returns its output, and true if the future was pending at least once. With false, the caller must
-/// yield to the executor, because a port that is always ready would block the other tasks.
+/// Awaits `future`; returns its output, and true if the future was pending at least once. False means that it never
+/// waited. The caller must then yield to the executor, so that a port that is always ready does not block other
+/// tasks.
 pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;

@@ -254,8 +254,9 @@ async fn run_relay(
     }
 }
 
-/// Handles a due timeout, stores the relay's record and queues its frames. Returns the time of the relay's next
-/// timeout; `None` if there is none.
+/// Handles the relay's due timeouts, stores its changed record and queues its frames for the ports.
+///
+/// Returns the time of the relay's next timeout; `None` if there is none.
 fn turn(
     of: &mut Relay,
     now: Instant,

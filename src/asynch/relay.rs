@@ -72,7 +72,8 @@ impl<'a> AsyncRelay<'a> {
         })
     }
 
-    /// Returns the counters of `port`. The upstream and the shared port use the same ones, since no relay has both.
+    /// Returns the counters of `port`. The upstream and the shared port share one set of counters, since no relay has
+    /// both.
     pub fn stats(&self, port: Port) -> SerialStats {
         self.counters(port).get()
     }

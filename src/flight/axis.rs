@@ -31,8 +31,7 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Maximum difference between the mission's distance and the distance of its sites, m. It covers the rounding of the
-/// sites and of f32.
+/// Maximum difference, m, between the mission's distance and that of the sites of Tx and Rx. It covers rounding.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why the positions of transmitter and receiver define no line.
@@ -87,13 +86,17 @@ impl core::error::Error for AxisError {}
 pub struct Axis {
     sites: Sites,
     middle: Vector,
-    /// Unit vector toward the receiver, at the middle of the line. The next fields are those to the right and up.
+    /// Unit vector toward the receiver, at the middle of the line.
     along: Vector,
+    /// Unit vector to the right of the line, at its middle.
     right: Vector,
+    /// Unit vector upward, at the middle of the line.
     up: Vector,
-    /// Half the length of the chord from transmitter to receiver, m. The next field is the radius of curvature, m.
+    /// Half the length of the chord from transmitter to receiver, m.
     half_chord_m: f64,
+    /// Radius of curvature of the line, m.
     radius_m: f64,
+    /// Distance from transmitter to receiver along the ground, m.
     distance_m: f64,
     /// Height of the ground above mean sea level at the transmitter and at the receiver, m.
     ends_amsl_m: [f64; 2],
@@ -343,8 +346,7 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the arc length that belongs to the length `chord` from the middle of a chord; all in m. `radius` is that
-/// of the arc.
+/// Returns half the length of an arc, m, from half the length of its `chord` and its `radius`, m.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)
@@ -363,8 +365,9 @@ pub const SHORTEST_M: f64 = 10.0;
 #[doc(hidden)] // for the tests of this workspace
 pub const LONGEST_M: f64 = 100_000.0;
 
-/// Semi-major axis of the WGS84 ellipsoid, m. The next constant is its squared eccentricity.
+/// Semi-major axis of the WGS84 ellipsoid, m.
 const A_M: f64 = 6_378_137.0;
+/// Squared eccentricity of the WGS84 ellipsoid.
 const E2: f64 = 6.694_379_990_141_316e-3;
 
 /// Earth-centred, earth-fixed vector: a position in m, or a direction.
@@ -480,9 +483,10 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
 /// Factor that converts units of 10⁻⁷ degrees to radians.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
-/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees. The angle is reduced to an eighth of a turn exactly, in
-/// integers; sine and cosine of the remainder are fdlibm's series, within a unit in the last place. A function for any f64 would
-/// be ten times as large, for angles that no position has.
+/// Returns sine and cosine of an angle in units of 10⁻⁷ degrees, within a unit in the last place.
+///
+/// The angle is reduced to an eighth of a turn in integers, without an error. Sine and cosine of the rest are
+/// fdlibm's series. A general function for f64 would be ten times as large.
 #[inline(never)] // called from several places
 pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     const EIGHTH: i32 = 450_000_000;
@@ -531,8 +535,7 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Tests of special cases of a line on earth: its ends, a pole, the antimeridian, its rotation. It rotates with the
-/// earth's curvature.
+/// Tests of special cases of a line on earth: its ends, a pole, the antimeridian, its azimuth's change.
 #[cfg(test)]
 mod tests {
     use super::{Axis, AxisError, LONGEST_M};

@@ -26,7 +26,7 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay after which another node with its index is accepted: 15 s, as for relays.
+/// Silence of a relay, 15 s, after which another node with its index is accepted. Relays use the same time.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a question that a relay has not answered.
@@ -78,7 +78,7 @@ pub struct Ground {
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last question to the relays which mission they fly; 0 before the first.
+    /// Number of the last question which mission the relays fly; 0 before the first question.
     query_number: u16,
     flown: Option<FlownMission>,
     /// Distance of the polled relay, in relays along the chain: 1 for the nearest.
@@ -86,9 +86,9 @@ pub struct Ground {
     unanswered: u8,
     /// Mission that the polled relay holds, once it has reported it.
     relay_mission: Option<MissionId>,
-    /// True after a question to the polled relay: its next hello is the answer.
+    /// True from a question to the polled relay until its next hello, which is the answer.
     query_sent: bool,
-    /// Number of the relay's hello that the pending offer of the mission answers; `None` without one.
+    /// Number of the relay's hello that the next offer of the mission answers; `None` if no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
@@ -184,7 +184,8 @@ impl Ground {
         self.repeat_at = Some(now + REPEAT_AFTER);
     }
 
-    /// Reports the interference measured here to the relays nearby. Returns false if outside 1e-30 to 1e6 W.
+    /// Reports the interference measured at this station to the relays nearby. Returns false, and does nothing, if
+    /// `power_w` is outside 1e-30 to 1e6 W.
     ///
     /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged long enough
     /// for the relative error of [`Listen`](crate::Listen). One measurement per [`Listen::every`](crate::Listen::every) is
@@ -393,7 +394,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next question, to the same relay or the next one, if it is due. Takes constant time.
+    /// Schedules the next question if it is due: to the same relay again, or to the next relay. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if self.repeat_at.is_none_or(|again| again > now) {
@@ -540,28 +541,29 @@ pub enum Progress {
     Offering,
     /// A relay holds the mission; the ground station polls until the chain flies it.
     Stored {
-        /// Node number of the relay that holds it.
+        /// Node number of the relay that holds the mission.
         by: u16,
     },
-    /// A relay flies the mission, but the station does not know yet that all relays of its view do.
+    /// A relay flies the mission, but the station does not know yet if all relays do.
     Adopted {
-        /// Node number of the relay that flies it.
+        /// Node number of the relay that flies the mission.
         by: u16,
     },
-    /// The mission is active in all relays of a view (an agreed set of members). Relays outside the view take no part
-    /// until they fly it, too.
+    /// The mission is active in all relays of a view (an agreed set of members). Other relays do not take part until
+    /// they fly the mission.
     Flown {
-        /// Node number of the relay that reports it.
+        /// Node number of the relay that reports that its whole view flies the mission.
         by: u16,
-        /// Latest view (agreed set of members) that the relay knows.
+        /// Latest view (agreed set of members) that the reporting relay knows.
         view: ViewId,
-        /// Number of relays that fly the mission: the reporting relay and all of its view beyond it.
+        /// Number of relays that fly the mission. They are the reporting relay, and those of its view farther from
+        /// the station.
         relays: u16,
     },
     /// A relay refuses the mission: no valid line on earth, or outside that relay's own geofence. The chain does not
     /// fly it.
     Refused {
-        /// Node number of the relay that reports it: it refuses the mission, or a relay beyond it does.
+        /// Node number of the relay that reports the refusal: its own, or that of a relay farther away.
         by: u16,
     },
     /// The upload is outdated: a relay holds a newer mission.

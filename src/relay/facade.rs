@@ -88,7 +88,8 @@ pub struct Relay {
 impl Relay {
     /// Creates a relay that is switched on at `now`.
     ///
-    /// The leader starts the first search by itself: relay 1, or relay N with an interference field.
+    /// The leader starts the first search for positions by itself. It is relay 1, or relay N in a mission with an
+    /// interference field.
     ///
     /// `seed` must differ between boards, even if their image and configuration are the same, and should differ between starts:
     /// use a chip's unique number, a random number generator, or the noise of RAM after power-up. It lets two relays with the
@@ -159,8 +160,9 @@ impl Relay {
 
     /// Processes bytes received at `port`, in pieces of any length. Bytes at a port that `Settings::wiring` lacks are dropped.
     ///
-    /// Takes a dozen instructions per byte; a CRC for at most one frame per 16 bytes; the positions for 16 target SIRs, with a
-    /// tag if frames are signed, for at most one message per 19 bytes. Longer work is left to [`handle_timeout`](Self::handle_timeout).
+    /// Takes a dozen instructions per byte, and a CRC for at most one frame per 16 bytes. For at most one message per 19 bytes it
+    /// computes positions for 16 target SIRs, and checks a tag if frames are signed. Longer work is left to
+    /// [`handle_timeout`](Self::handle_timeout).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -197,8 +199,8 @@ impl Relay {
 
     /// Handles timers that have expired by `now`, and one portion of a computation.
     ///
-    /// The portion is bounded: 256 positions of relays while the leader predicts, the chain's hops over ten relays (over forty
-    /// where nothing changes) of the joint method, 624 positions of Algorithm 2; almost nothing otherwise.
+    /// The portion is bounded: 256 positions of relays while the leader predicts the result, the hops of 10 to 40 relays in the
+    /// joint method, 624 positions in Algorithm 2. Without a computation the call takes almost no time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -219,7 +221,8 @@ impl Relay {
 
     /// Restarts the placement method from its beginning. A closed loop calls it after measuring the actual position.
     ///
-    /// Only the leader (relay 1; in a field relay N) restarts; at other relays the call has no effect.
+    /// Only the leader restarts; at other relays the call has no effect. The leader is relay 1, or relay N in a mission with an
+    /// interference field.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -425,14 +428,15 @@ impl Relay {
         self.node.setpoint()
     }
 
-    /// Returns the agreed position, before the guard limits it; `None` before the first agreement.
+    /// Returns the agreed position, before the guard (collision avoidance) limits it. `None` before the first
+    /// agreement.
     pub fn agreed_place(&self) -> Option<Placement> {
         self.node.agreed_place()
     }
 
-    /// Returns true unless the drone is known to be out of order with a flown neighbour.
+    /// Returns true unless the drone is on the wrong side of a flown neighbour along the line.
     ///
-    /// If false, its pilot must fly it to its own side along the line before engaging. `Autopilot::exchange` passes the value on.
+    /// If false, the pilot must first fly the drone to its own side of that neighbour. `Autopilot::exchange` passes the value on.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -446,16 +450,16 @@ impl Relay {
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
     }
 
-    /// Returns the reason why the guard holds the drone back on `side`; `None` without a guard.
+    /// Returns why the guard (collision avoidance) holds the drone back on `side`; `None` if it does not.
     ///
-    /// While the drone is not flown only [`HoldReason::Order`] is possible.
+    /// While the drone does not fly to setpoints only [`HoldReason::Order`] is possible. `None` also without a guard.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
     }
 
     /// Returns the bearing from the setpoint to the next relay at `side`, or to Tx or Rx at the end.
     ///
-    /// `None` without a setpoint, and while the position of that relay is unknown: its guard has to send it.
+    /// `None` without a setpoint, and while the position of that relay is unknown. A relay sends its position only with a guard.
     pub fn bearing(&self, side: Side) -> Option<Bearing> {
         Bearing::between(self.setpoint()?, self.node.place_toward(side)?)
     }
@@ -466,10 +470,10 @@ impl Relay {
         self.node.round().target().filter(|_| known)
     }
 
-    /// Returns an upper bound of the worst hop's SIR at the current altitudes, linear. The leader has it after
-    /// Algorithm 1 or 4.
+    /// Returns an upper bound of the worst hop's SIR at the current altitudes, linear; no chain reaches it.
     ///
-    /// No chain reaches it. `None` at other relays, and with the paper's fixed step, which omits chains.
+    /// The leader (the relay that starts the search) has it after Algorithm 1 or 4. `None` at other relays, and with
+    /// the paper's fixed step, which omits possible chains.
     pub fn bound(&self) -> Option<f32> {
         self.node.round().bound()
     }
@@ -487,10 +491,11 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive: another relay with a larger claim uses its index.
+    /// Returns true while this relay is passive: another relay with the same index has the larger claim.
     ///
-    /// It has no setpoint and takes no part in the protocol until the other relay has been silent for twice
-    /// `Settings::dead_after`, or until [`clear_duplicate_index`](Self::clear_duplicate_index) is called.
+    /// A passive relay has no setpoint and takes no part in the protocol. It becomes active once the other relay has
+    /// been silent for twice `Settings::dead_after`, or when [`clear_duplicate_index`](Self::clear_duplicate_index)
+    /// is called.
     pub fn is_passive(&self) -> bool {
         self.node.is_passive()
     }
@@ -521,10 +526,10 @@ impl Relay {
         self.node.member().view
     }
 
-    /// Returns the expiry time of the lease; `None` before the first lease and after its expiry.
+    /// Returns the time at which the lease of the agreement expires; `None` while there is no lease.
     ///
-    /// Without a renewal the relay requests a new view at that time, and keeps its setpoint. No other relay uses another agreement
-    /// before.
+    /// Until that time no other relay uses another agreement. Without a renewal the relay then requests a new view
+    /// (agreed set of members), and keeps its setpoint.
     pub fn lease(&self) -> Option<Instant> {
         let until = self.node.lease()?;
         Some(self.clock.external(until))
@@ -542,27 +547,30 @@ impl Relay {
         &self.node.member().mission
     }
 
-    /// Returns the sites of Tx and Rx of the active mission; `None` for those configured before flight.
+    /// Returns the sites of Tx and Rx of the active mission. `None` if they are the sites configured before flight.
     ///
-    /// They define the line of all positions: once they change, convert latitude and longitude by the new ones only.
+    /// They define the line of all positions. Once they change, convert between latitude, longitude and positions by
+    /// the new sites.
     pub fn sites(&self) -> Option<Sites> {
         self.node.sites()
     }
 
-    /// Returns the estimate of a field's interference from this relay's measurements. It is of the present position;
-    /// `None` before there are enough measurements.
+    /// Returns the estimate of the interference at this relay's present position, from its measurements. It is for
+    /// missions with an interference field, which varies along the line. `None` before there are enough measurements.
     pub fn estimate(&self) -> Option<Estimate> {
         self.node.round().meter().estimate()
     }
 
-    /// Returns Upsilon = E[1/I] of the interference I, as this relay has measured and uses it, 1/W. It replaces the
-    /// mission's field once this relay has measured enough; `None` before.
+    /// Returns Upsilon = E[1/I], 1/W, of the interference power I, as this relay has measured and uses it.
+    ///
+    /// `None` before there are enough measurements. Until then the relay uses the mission's value.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
     }
 
-    /// Returns the estimate of the interference and its number. It is the mission's until the chain has estimated
-    /// another.
+    /// Returns the chain's newest estimate of the interferer, and the number of the estimate.
+    ///
+    /// It is the interferer of the mission until the chain has estimated one.
     pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
@@ -574,14 +582,15 @@ impl Relay {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns the reason why the last collected measurements gave no estimate. `None` if they gave one, and except
-    /// at the leader.
+    /// Returns why the last collected measurements gave no estimate of the interferer. Only the leader (the relay
+    /// that starts the search) knows it. `None` at other relays, and after a successful estimate.
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
 
-    /// Returns the number of completed rounds of Algorithm 2 while it runs, at the leader. The second value is the
-    /// chain's linear SIR after the last round.
+    /// Returns the number of completed rounds of Algorithm 2, and the chain's linear SIR after the last.
+    ///
+    /// `None` unless this relay is the leader and the algorithm runs.
     pub fn rounds(&self) -> Option<(u16, f32)> {
         self.node.round().rounds()
     }
@@ -658,8 +667,9 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Sets if the drone flies to setpoints, as [`handle_control`](Self::handle_control) does. Returns true if the
-    /// relay has a guard that did not know this.
+    /// Passes on [`handle_control`](Self::handle_control). `flown` is true while the drone flies to setpoints.
+    ///
+    /// Returns true if the relay has a guard (collision avoidance) that had the other state.
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         self.node.handle_control(self.clock.advance(now), flown)
     }
@@ -672,9 +682,11 @@ impl Relay {
         self.node.clear_lost(self.clock.advance(now), side);
     }
 
-    /// Reports that the other relay with this index is gone. See [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
+    /// Reports that another relay with the same index is gone. See
+    /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
-    /// A [passive](Self::is_passive) relay becomes active, with a larger claim than the other had. Takes constant time.
+    /// If this relay is [passive](Self::is_passive), it becomes active with a larger claim to the index. Takes
+    /// constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }

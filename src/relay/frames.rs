@@ -11,8 +11,9 @@ use crate::wire::frame::{FrameBuf, Opened};
 use crate::wire::message::Message;
 use crate::wire::session::{Checked, Session};
 
-/// Number of heartbeat requests to a silent neighbour for each handshake that requests a reply. The reply shows
-/// whether the neighbour takes another node with this relay's index for this relay.
+/// Number of heartbeat requests to a silent neighbour for each handshake that requests a reply.
+///
+/// The reply shows if the neighbour mistakes another node with the same index for this relay.
 const QUESTIONS: u16 = 4;
 
 /// Handles an intact frame of this relay's network, received at `port`.
@@ -165,7 +166,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules a handshake to node `to`, if one has to accompany `message`.
+/// Schedules a handshake to node `to`, if one has to be sent with `message`.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0

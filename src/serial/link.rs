@@ -64,7 +64,7 @@ pub struct SerialLink<P, D = NoPin> {
     moved_at: Instant,
     /// Number of bytes written by the last poll. They count from the next poll, because their exact time is unknown.
     uncounted: u32,
-    /// Time at which all counted bytes have left the port.
+    /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
     /// True if the last poll stopped reading at its limit, so that the port may have more bytes.
     unread: bool,
@@ -273,7 +273,8 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads that failed for another reason.
     pub other: u32,
-    /// Number of failed writes, and of failed queries if the last byte has left. The bytes are offered again.
+    /// Number of failed writes, and of failed queries whether the last byte has been sent. Failed writes are
+    /// repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,

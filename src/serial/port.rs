@@ -44,13 +44,13 @@ pub trait SerialPort {
     /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault>;
 
-    /// Accepts bytes from the front of `bytes` (never empty), and returns their number. 0 if there is no room.
+    /// Accepts bytes from the front of `bytes` (never empty), and returns their number; 0 if it is full.
     ///
     /// # Errors
     /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault>;
 
-    /// Returns true if the last bit of all accepted bytes has left; `None` if the port does not know.
+    /// Returns true if the last bit of all accepted bytes has been sent; `None` if the port does not know.
     ///
     /// # Errors
     /// [`Fault`] if the query fails; it is treated as `None`.

@@ -84,7 +84,7 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
-/// Trigger of a UART's interrupt: a closure, or a type of its own for a port whose type must be named.
+/// Trigger of a UART's interrupt. It is a closure, or a type of the firmware if the port's type has to be named.
 pub trait Pend {
     /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);
@@ -167,9 +167,10 @@ impl fmt::Debug for InterruptEnd<'_> {
 }
 
 impl InterruptEnd<'_> {
-    /// Queues a received byte or a fault.
+    /// Queues a received byte or a fault for the main loop.
     ///
-    /// Without room it is lost and counted, and the main loop reads one [`Fault::Overrun`] in its place.
+    /// If the queue is full, the byte is lost and counted, and the main loop reads one [`Fault::Overrun`] in its
+    /// place.
     pub fn received(&mut self, item: Result<u8, Fault>) {
         if self.gap && self.received.put(encode(Err(Fault::Overrun))) {
             self.gap = false;

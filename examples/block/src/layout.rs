@@ -27,7 +27,7 @@ pub(super) struct Layout {
     /// Altitude (m) and transmit power (W) of every relay that has no values of its own.
     pub(super) common: [F32; 2],
     pub(super) own: [F32; 2],
-    /// Interferer's power (W), x and y (m). All are 0 if there is a field, or if the relays must find the interferer.
+    /// Interferer's power (W), x and y (m). All are 0 if the block has an interference field, or no known interferer.
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
     /// Carrier frequency (Hz), excess losses with and without line of sight, line-of-sight weight (0 to 1).

@@ -10,7 +10,7 @@ use uav_relay::{
 
 use super::BAUD;
 
-/// Default silence of a neighbour until it is probed, ms. It applies if the block's value is 0.
+/// Default silence of a neighbour, ms, after which a heartbeat is requested. It applies if the block's value is 0.
 const DEFAULT_PROBE_AFTER_MS: u64 = 5_000;
 
 /// Checked content of a configuration block.
@@ -38,7 +38,8 @@ pub struct Config {
 }
 
 impl Config {
-    /// Returns the relay's settings by this configuration. The caller adds the signing key and the guard.
+    /// Returns the relay's settings by this configuration. The caller adds the signing key and the guard (collision
+    /// avoidance).
     pub fn settings(&self, wiring: Wiring) -> Settings {
         let common = self.mission.config().common;
         let preset = match wiring {

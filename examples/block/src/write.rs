@@ -10,8 +10,8 @@ use super::{Block, CHECKED, ChannelNumbers, Config, LEN_FIELD, MAGIC, Secret, VE
 /// Returns the configuration block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of the
 /// mission's channel.
 ///
-/// A block can not hold the grid search of adjust, which is read back as the fine search, or more than `MAX_POINTS`
-/// field points, which are rejected when read back.
+/// Two things are lost in a block. The grid search of the method adjust is read back as the fine search. A field of
+/// more than `MAX_POINTS` points is rejected when it is read back.
 pub fn write(
     config: &Config,
     numbers: &ChannelNumbers,

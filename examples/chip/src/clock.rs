@@ -107,21 +107,29 @@ const FAST: Pll = Pll {
     pllq: 7,
 };
 
-/// Bits of the register RCC_CR: internal oscillator (HSI) on, HSI ready, PLL on, PLL ready.
+/// Bit HSION of the register RCC_CR: internal oscillator on.
 const HSI_ON: u32 = 1;
+/// Bit HSIRDY of the register RCC_CR: internal oscillator ready.
 const HSI_READY: u32 = 1 << 1;
+/// Bit PLLON of the register RCC_CR: PLL on.
 const PLL_ON: u32 = 1 << 24;
+/// Bit PLLRDY of the register RCC_CR: PLL ready.
 const PLL_READY: u32 = 1 << 25;
 
 /// Mask of the fields of RCC_PLLCFGR that are set: PLLM, PLLN, PLLP, PLLSRC and PLLQ.
 const PLL_FIELDS: u32 = 0x3F | 0x1FF << 6 | 0b11 << 16 | PLL_FROM_CRYSTAL | 0xF << 24;
+/// Bit PLLSRC of RCC_PLLCFGR: the crystal oscillator is the PLL's input.
 const PLL_FROM_CRYSTAL: u32 = 1 << 22;
 
-/// Bits of the register RCC_CFGR: clock switch (SW), its status (SWS), and all prescalers.
+/// Mask of the field SW of RCC_CFGR: selection of the system clock.
 const SWITCH: u32 = 0b11;
+/// Value of the field SW of RCC_CFGR: PLL.
 const SWITCH_PLL: u32 = 0b10;
+/// Mask of the field SWS of RCC_CFGR: system clock in use.
 const SWITCHED: u32 = 0b11 << 2;
+/// Value of the field SWS of RCC_CFGR: PLL.
 const SWITCHED_PLL: u32 = 0b10 << 2;
+/// Mask of the prescalers of core and buses in RCC_CFGR.
 const PRESCALERS: u32 = 0xF << 4 | 0b111 << 10 | 0b111 << 13;
 /// Prescaler bits of RCC_CFGR: bus APB1 at a quarter of the core's clock, APB2 at half.
 const APB_BY_4_AND_2: u32 = 0b101 << 10 | 0b100 << 13;
@@ -129,18 +137,24 @@ const APB_BY_4_AND_2: u32 = 0b101 << 10 | 0b100 << 13;
 /// Bit PWREN of RCC_APB1ENR: clock of the power controller.
 const POWER_ON: u32 = 1 << 28;
 
-/// Bits of PWR_CR: voltage scale 1 (one bit on the STM32F405, two on the STM32F446) and over-drive. The register
-/// PWR_CSR has their states at the same positions.
+/// Voltage scale 1 in PWR_CR of the STM32F405, where the scale has one bit.
 const SCALE_1: u32 = 1 << 14;
+/// Voltage scale 1 in PWR_CR of the STM32F446, where the scale has two bits.
 const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
+/// Bit of PWR_CSR that is set once the voltage scale is reached.
 const SCALE_READY: u32 = 1 << 14;
+/// Bit of PWR_CR that enables the over-drive, and of PWR_CSR once it is ready.
 const OVER_DRIVE: u32 = 1 << 16;
+/// Bit of PWR_CR that switches to the over-drive, and of PWR_CSR once it is in use.
 const OVER_DRIVE_SWITCH: u32 = 1 << 17;
 
-/// Bits of FLASH_ACR: the field of wait states, its value at full speed, prefetch and caches.
+/// Mask of the flash wait states in the register FLASH_ACR.
 const LATENCY: u32 = 0xF;
+/// Number of flash wait states at full speed.
 const WAIT_STATES: u32 = 5;
+/// Bit of FLASH_ACR that enables the flash prefetch.
 const PREFETCH: u32 = 1 << 8;
+/// Bits of FLASH_ACR that enable the instruction cache and the data cache.
 const CACHES: u32 = 0b11 << 9;
 
 /// Chip ID of an STM32F405 of revision A, whose flash prefetch is defective (ES0182).
@@ -316,7 +330,7 @@ mod tests {
         }
     }
 
-    /// Starts the clocks under every combination of faults. The mock panics at a write that the reference manuals
+    /// Checks the clocks under every combination of faults. The mock panics at a write that the reference manuals
     /// forbid.
     #[test]
     fn the_clocks_are_correct_under_all_combinations_of_faults() {

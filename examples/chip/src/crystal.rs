@@ -7,7 +7,7 @@ use crate::registers::{Register, Registers};
 /// Crystal or external clock of a board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Crystal {
-    /// Frequency, Hz: a multiple of 2 MHz.
+    /// Frequency of the crystal or external clock, Hz: a multiple of 2 MHz.
     pub hz: u32,
     /// True for an external clock at the pin OSC_IN, false for a crystal.
     pub bypass: bool,
@@ -16,9 +16,11 @@ pub struct Crystal {
 /// Frequency of the chip's internal oscillator (HSI), Hz: within 8 % over all temperatures.
 pub const HSI_HZ: u32 = 16_000_000;
 
-/// Bits of the register RCC_CR: crystal oscillator (HSE) on, HSE ready, external clock in its place.
+/// Bit HSEON of the register RCC_CR: crystal oscillator on.
 const HSE_ON: u32 = 1 << 16;
+/// Bit HSERDY of the register RCC_CR: crystal oscillator ready.
 const HSE_READY: u32 = 1 << 17;
+/// Bit HSEBYP of the register RCC_CR: external clock in place of a crystal.
 const HSE_BYPASS: u32 = 1 << 18;
 
 /// Maximum number of reads of RCC_CR while a crystal starts. They take some 100 ms at 16 MHz; a crystal usually takes

@@ -8,9 +8,9 @@ const FORGET: u32 = 1 << 24;
 /// The cause of the last reset.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Reset {
-    /// Power-up.
+    /// Reset by switching the power on.
     Power,
-    /// Supply voltage too low.
+    /// Reset because the supply voltage was too low.
     Brownout,
     /// Reset pin: a button, or a debug probe.
     Pin,
@@ -65,7 +65,7 @@ mod tests {
     use crate::mock::MockRegisters;
     use crate::registers::{Register, Registers as _};
 
-    /// Reads the values that RCC_CSR has after each kind of reset, by the reference manuals.
+    /// Checks the reset cause for each kind of reset. RCC_CSR has the values that the reference manuals state.
     #[test]
     fn the_reset_cause_is_read_once() {
         for (status, cause) in [

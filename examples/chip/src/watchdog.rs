@@ -28,9 +28,11 @@ pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
     }
 }
 
-/// Values of the watchdog's key register: start, unlock its settings, feed.
+/// Value of the watchdog's key register that starts it.
 const START: u32 = 0xCCCC;
+/// Value of the watchdog's key register that unlocks its settings.
 const UNLOCK: u32 = 0x5555;
+/// Value of the watchdog's key register that feeds it.
 const FEED: u32 = 0xAAAA;
 
 /// Maximum number of status reads until the watchdog's settings take effect. That takes five LSI periods, at most 0.3

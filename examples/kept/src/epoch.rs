@@ -17,11 +17,13 @@ pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
 /// Payload of a journal record that stores an epoch, words.
 pub const WORDS: usize = 1;
 
-/// Key of the journal of epochs. It is the same for every configuration block, because no block may lower the epoch.
+/// Key of the journal of epochs, numbers that rise at every start. It is the same for every configuration block,
+/// because no block may lower the epoch.
 pub const KEY: u32 = 0;
 
-/// Returns the epoch of this start, at least `floor`, and true if it was stored. `None` once the last epoch,
-/// 4294967294, has been used.
+/// Returns the epoch of this start (a number that rises at every start), and true if it was stored.
+///
+/// It is at least `floor`. `None` once the last epoch, 4294967294, has been used.
 pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> {
     log.tidy();
     let [newest] = log.newest::<WORDS>().unwrap_or([0]);

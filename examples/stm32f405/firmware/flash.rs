@@ -74,7 +74,7 @@ impl Flash for Sectors {
 }
 
 impl Sector {
-    /// Returns the sector's length in words. Of the small sectors only those of 16 KiB are in use.
+    /// Returns the length of this flash sector in words: 16 KiB or 128 KiB. Sectors of 64 KiB are not in use.
     const fn len(self) -> usize {
         let bytes = if self.0 < LARGE { 16 * KIB } else { 128 * KIB };
         bytes as usize / 4
@@ -96,7 +96,7 @@ impl Sector {
         number.to_le_bytes()[0]
     }
 
-    /// Erases the sector. This stops the CPU; the modules of the journals state for how long.
+    /// Erases the flash sector. The CPU stops meanwhile, for a time that the modules of the journals state.
     #[inline(never)]
     fn erase(self) {
         let flash = unlocked();

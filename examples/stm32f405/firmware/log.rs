@@ -249,7 +249,7 @@ pub(crate) fn refused(error: ConfigError) {
     }
 }
 
-/// Logs the signing epoch; `is_stored` is true if it was stored.
+/// Logs the signing epoch, a number that rises at every start; `is_stored` is true if it was stored.
 #[cfg(feature = "auth")]
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {

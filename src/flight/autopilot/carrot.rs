@@ -23,22 +23,26 @@ const END_PER_S: f32 = 0.5;
 /// Minimum speed of the moving target near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
-/// Rate at which an autopilot reduces its lag behind a moving target, 1/s.
+/// Gain of an autopilot's position control, 1/s. A drone d metres behind flies 1.25 d m/s faster than the target.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// Fraction of the speed limit that the moving target uses. The rest is for a drone that accelerates and overshoots.
+/// Fraction of the speed limit at which the moving target flies. The rest is a margin for a drone that overshoots its
+/// speed.
 const CARROT_PART: f32 = 0.96;
 
-/// Rate at which the moving target approaches its maximum speed, 1/s. The approach is smooth, since an accelerating
-/// drone goes on accelerating for a moment.
+/// Ratio of the target's acceleration, near its maximum speed, to the speed that it still lacks, 1/s.
+///
+/// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum fraction of the speed for a moving target whose drone lags behind. So the target never stops for good.
+/// Minimum speed of a target whose drone lags behind, as a fraction of the speed limit. The target never stops for
+/// good.
 const LEAST_PART: f32 = 0.1;
 
-/// Deceleration of the moving target's velocity across the direction of a new setpoint. It is a multiple of the
-/// acceleration. That velocity is gone within [`Pace::stopping_time`]. A drone would overshoot a target that turns at
-/// once, and come back.
+/// Ratio of the target's deceleration across the direction of a new setpoint to its acceleration.
+///
+/// The target does not turn at once, because the drone would overshoot it and come back. Its velocity in other
+/// directions is gone within [`Pace::stopping_time`].
 const TURN_PART: f32 = 2.0;
 
 /// Remaining distance at which the moving target counts as stopped, m. The drone, which lags behind, then has up to
@@ -51,11 +55,11 @@ const BEHIND_MS: u64 = 1_200;
 /// Half-life of the moving target's speed near the setpoint, ms: ln 2 / k with k = 0.5 /s.
 const HALVES_MS: u64 = 1_387;
 
-/// Maximum number of half-lives in [`Pace::stopping_time`]. They suffice from 20 m, the distance at the maximum
-/// acceleration.
+/// Maximum number of half-lives that [`Pace::stopping_time`] counts. They suffice from 20 m, the longest remaining
+/// distance, to [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
-/// Maximum time by which an earlier position of the moving target is extrapolated back.
+/// Maximum time before its last step for which an earlier position of the target is computed.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
 /// Maximum time step of the moving target. After a longer gap it continues from its position.
@@ -91,7 +95,7 @@ impl Pace {
         pace
     }
 
-    /// Returns the target's maximum speed, m/s, at the distance `left_m`, m, before it stops.
+    /// Returns the maximum speed, m/s, of a target that has to stop after `left_m` metres.
     fn speed_before_m_s(self, left_m: f32) -> f32 {
         let a = self.acceleration_m_s2;
         // Here the two parts meet, both at the speed a / k.
@@ -288,18 +292,19 @@ fn length(a: [f32; 3]) -> f32 {
     libm::sqrtf(dot(a, a))
 }
 
-/// Interval between targets while the target moves. The next constant is the interval while it stands: a PX4 leaves
-/// its mode after a second without a target.
+/// Interval at which a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
+/// Interval at which a standing target is sent again. A PX4 leaves its mode after a second without one.
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
 /// repetition makes it wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Number of consecutive reports of another target before an event is raised. An ArduCopter reports its target twice
-/// a second. The target must also have been sent for the time in the next constant.
+/// Number of consecutive reports of another target after which the target counts as refused. An ArduCopter reports
+/// its target twice a second.
 const REFUSED_AFTER: u8 = 6;
+/// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
 /// Tolerance between the target that an ArduCopter reports and a standing target, 1e-7 degrees. For a moving target
@@ -342,7 +347,7 @@ impl Target {
         }
     }
 
-    /// Restarts the schedule after a change of the setpoint, whose position has not been sent yet.
+    /// Restarts the schedule of transmissions after a change of the setpoint. The new target is sent at once.
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
         self.times_sent = 0;
@@ -511,8 +516,8 @@ mod tests {
         }
     }
 
-    /// Withdraws the setpoint at every moment of a flight: the deceleration is within its limit. The setpoint is
-    /// never overshot.
+    /// Checks that a target stops gently when the setpoint is withdrawn, at every moment of a flight. It never stops
+    /// beyond the setpoint.
     #[test]
     fn a_withdrawn_carrot_stops_gently_anywhere() {
         let to = Placement::on_line(60.0, 20.0);
@@ -550,8 +555,8 @@ mod tests {
         );
     }
 
-    /// Sets a new setpoint in every other direction: the velocity does not jump. The old direction is left within 3
-    /// s.
+    /// Checks that the velocity does not jump when a new setpoint is in another direction. The old direction is left
+    /// within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

@@ -20,15 +20,17 @@ use crate::side::Side;
 /// Number of the MAVLink command that clears lost relays, MAV_CMD_USER_1.
 pub(super) const CLEAR_LOST: u16 = 31_010;
 
-/// Value of `MAV_RESULT` for an accepted command; the next constant is for a denied one.
+/// Value of `MAV_RESULT` for an accepted command.
 const ACCEPTED: u8 = 0;
+/// Value of `MAV_RESULT` for a denied command.
 const DENIED: u8 = 2;
 
 /// Lost relays on one side of this relay, upstream or downstream.
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
-    /// True if more relays are lost than a command can name.
+    /// True if more relays are lost on this side than one command can name. They then can not be cleared by a
+    /// command.
     is_full: bool,
 }
 
@@ -41,7 +43,8 @@ pub(super) struct Clearance {
     accepted: Option<(Address, RelayNumbers)>,
     /// Pending answer to a command: its addressee, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays the operator has cleared, until the relay is told.
+    /// Side whose lost relays the operator has cleared. The relay has not been told yet; `None` if there is nothing
+    /// to tell.
     cleared: Option<Side>,
 }
 
@@ -99,7 +102,7 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true until both the answer to the last command and the cleared side have been taken.
+    /// Returns true while the answer to the last command, or the side to clear, has not been taken.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }

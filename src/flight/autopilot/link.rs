@@ -38,24 +38,25 @@ const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Delay of a due target after which a PX4 may be in its failsafe.
+/// Lateness of a target from which on a PX4 may have entered its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
-/// Time for which positions must be received regularly before a blind link recovers. The next constants: the longer
-/// time if the link was blind a short time ago, and that short time.
+/// Time for which positions must be received regularly before [`State::Blind`] ends.
 const RECOVERY: Duration = Duration::from_millis(1_000);
+/// Time used instead of [`RECOVERY`] if the position was also lost less than [`SHORT_TIME`] before.
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
+/// Time between two losses of the drone's position within which the second one needs [`LONG_RECOVERY`].
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
 /// Time within which an ArduCopter reports its fence after a mode change caused by a breach.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason not to engage the drone must last before it is reported. The next constant is the minimum
-/// time since the last report.
+/// Time for which a reason not to engage the drone must last before it is reported.
 const SETTLED: Duration = Duration::from_millis(1_000);
+/// Minimum time between two reports of reasons not to engage the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which a reason of the guard to hold the drone must last before it is reported.
+/// Time for which the guard must hold the drone back before the reason is reported. The guard keeps drones apart.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
@@ -86,25 +87,26 @@ pub struct Autopilot {
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
-    /// Time at which the drone's position was last lost. The next field is the time since which positions are
-    /// received again.
+    /// Time at which the drone's position was last lost.
     blind_at: Option<Instant>,
+    /// Time since which positions are received again, after the drone's position was lost.
     located_at: Option<Instant>,
-    /// Time for which positions must be received regularly to end the state [`State::Blind`].
+    /// Time for which positions must be received regularly before the present state [`State::Blind`] ends.
     recovery: Duration,
     /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason for which the drone cannot be engaged, and its start. The next field is the last reported reason, and
-    /// its time.
+    /// Reason for which the drone cannot be engaged, and its start. `None` if the drone can be engaged.
     wait: (Option<WaitReason>, Instant),
+    /// Last reported reason for which the drone cannot be engaged, and the time of the report.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the relay is ready to be engaged.
     ready: bool,
-    /// Reasons of the guard to hold the drone, as last reported to the operator: upstream, downstream.
+    /// Reasons why the guard (collision avoidance) holds the drone back, as last reported to the operator. The first
+    /// is because of the upstream neighbour, the second because of the downstream one.
     hold: [Option<HoldReason>; 2],
-    /// Newest reasons of the guard to hold the drone, and the time since which they are unchanged.
+    /// Newest reasons why the guard (collision avoidance) holds the drone back, with their start.
     newest_hold: ([Option<HoldReason>; 2], Instant),
-    /// True from a new view until its positions are agreed.
+    /// True from a new view (agreed set of relays) until the positions of its relays are agreed.
     is_new_view: bool,
     report: Report,
     position: Option<Position>,
@@ -118,7 +120,8 @@ pub struct Autopilot {
 }
 
 impl Autopilot {
-    /// Creates the link to the autopilot of a drone that flies along `axis` within `pace`.
+    /// Creates the link to the autopilot of a drone. The drone flies along the line `axis` from Tx to Rx, within the
+    /// speed and acceleration of `pace`.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
         Self {
             loaded: [axis.sites(); UPLOAD as usize],
@@ -157,9 +160,10 @@ impl Autopilot {
         }
     }
 
-    /// Sets a number that differs at each start of the companion, such as the relay's seed. Without it, answers
-    /// buffered in a cable since before a restart may be taken for answers to this link, and so may a choice of the
-    /// mode made before.
+    /// Sets a number that differs at each start of the companion, such as the relay's seed.
+    ///
+    /// It marks this link's questions. Without it, an answer to an earlier start, buffered in a cable, may count as
+    /// an answer to this link, and a mode that the pilot chose before the restart as a new choice.
     pub const fn set_seed(&mut self, seed: u32) {
         self.vehicle.echo.seed(seed);
     }
@@ -331,9 +335,10 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Reports the guard's reasons to hold the relay back to the operator, upstream and downstream. They are sent while the drone
-    /// is engaged or in [`State::Standby`]. A change is reported once it has lasted for 3 s, because reasons come and go while an
-    /// agreement spreads. Equal lines are at least 10 s apart.
+    /// Reports to the operator why the guard (collision avoidance) holds the relay back, for each side.
+    ///
+    /// Reasons are sent while the drone is engaged or in [`State::Standby`], once they have lasted for 3 s, because
+    /// they come and go while an agreement spreads. Equal lines are at least 10 s apart.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
         if self.newest_hold.0 != reasons {
@@ -361,9 +366,10 @@ impl Autopilot {
         self.report.queue_text(text)
     }
 
-    /// Processes an event of the relay. Events that matter in flight are sent to the operator as a text. A new view
-    /// is one line, on an engaged drone. Reasons that keep a drone from its place are reported by
-    /// [`handle_hold`](Self::handle_hold) and as reasons not to engage it.
+    /// Processes an event of the relay, and sends events that matter in flight to the operator as text.
+    ///
+    /// A new view (agreed set of relays) is reported once its positions are agreed, if the drone is engaged and not
+    /// held back. The reason to hold a drone back is reported by [`handle_hold`](Self::handle_hold).
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {
@@ -540,7 +546,7 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the reason not to engage the drone is reported; `None` if nothing is due.
+    /// Returns the time at which the reason not to engage the drone is reported; `None` without a report.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -702,8 +708,9 @@ impl Autopilot {
         Some(Position { at, ..position })
     }
 
-    /// Returns the position of a drone that is too far from its line, and its distance; else `None`. Such a drone has
-    /// no position in the mission's coordinates. `None`, too, without a position for 3 s. Constant work.
+    /// Returns the position of a drone that is too far from its line, and its distance from the line. Such a drone
+    /// has no position in the mission's coordinates. `None` for a drone near the line, and without a position for 3
+    /// s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
         let at = self.off_line_detector.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)

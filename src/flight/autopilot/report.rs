@@ -22,8 +22,9 @@ const SPACING: Duration = Duration::from_millis(10_000);
 /// Maximum number of different lines of text sent within [`SPACING`].
 const RECENT: usize = 16;
 
-/// Capacity of the queue of the link's own lines. The next constant is that of the queue of the firmware's lines.
+/// Capacity of the queue of the link's own lines of text to the operator.
 const LINES: usize = 6;
+/// Capacity of the queue of the firmware's lines of text to the operator.
 const TEXTS: usize = 3;
 
 /// Interval at which the numbers (SIR and position) are sent to the operator.
@@ -38,9 +39,9 @@ pub(super) enum Topic {
     Control,
     /// Reason for which the pilot cannot engage the drone.
     Wait,
-    /// Reason for which the guard holds the drone, concerning its upstream neighbour.
+    /// Reason why the guard (collision avoidance) holds the drone back because of its upstream neighbour.
     Upstream,
-    /// Reason for which the guard holds the drone, concerning its downstream neighbour.
+    /// Reason why the guard (collision avoidance) holds the drone back because of its downstream neighbour.
     Downstream,
     /// Event of the relay, such as a lost neighbour.
     Relay,
@@ -79,8 +80,9 @@ impl Line {
         }
     }
 
-    /// Returns the line for the guard's new reason to hold the drone because of its neighbour on `side`. `None` is
-    /// the end of a reason.
+    /// Returns the text for the guard's (collision avoidance) reason to hold the drone back on `side`.
+    ///
+    /// `None` says that the reason has ended.
     pub(super) const fn hold(side: Side, reason: Option<HoldReason>) -> Self {
         let (topic, whom) = match side {
             Side::Upstream => (Topic::Upstream, " the previous drone"),
@@ -99,7 +101,7 @@ impl Line {
         Self::warning(topic, [what, whom])
     }
 
-    /// Returns the line for an event of the relay; `None` for events that operators do not read.
+    /// Returns the text for the operator about an event of the relay; `None` for events without a text.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
             Event::Infeasible => "relay: no target SIR can be met",
@@ -138,7 +140,7 @@ pub(super) struct Report {
     /// Last line sent on each topic.
     newest_sent: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
-    /// Number of values already sent in the current round.
+    /// Number of values (SIR and position) already sent in the present second.
     sent: usize,
     next_values_at: Option<Instant>,
 }
@@ -168,7 +170,8 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent.
+    /// Returns true if a line with this hash may be sent at `now`: not within 10 s after an equal line. Marks it as
+    /// sent.
     fn passes(&mut self, now: Instant, hash: u32) -> bool {
         self.recent.retain(|(_, until)| *until > now);
         self.recent.iter().all(|(of, _)| *of != hash)
@@ -297,8 +300,9 @@ pub enum AutopilotEvent {
     Waits(WaitReason),
     /// Readiness: the pilot may now engage the drone by choosing the companion's mode.
     Ready,
-    /// Refused target: for 3 s the autopilot has reported another target than it was sent. The position is outside its own fence,
-    /// or another companion controls it.
+    /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
+    ///
+    /// The sent position is outside the autopilot's own fence, or another companion sends targets to it.
     Refused,
     /// Report of the autopilot that it is outside of its fence.
     FenceBreached,
@@ -315,7 +319,7 @@ pub enum AutopilotEvent {
         /// Sender of the command.
         from: Address,
     },
-    /// Denied command of the operator to clear lost relays: it does not name exactly those of one side.
+    /// Denied command of the operator to clear lost relays. It does not name exactly the lost relays of one side.
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: RelayNumbers,

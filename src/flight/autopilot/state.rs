@@ -19,7 +19,7 @@
 //! mode first, and receives that as the reason. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
 //! and no message of a neighbour.
 
-/// Control state of the drone: what the link to its autopilot does.
+/// Control state of the drone: if the relay controls the drone, and which targets the autopilot gets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum State {
     /// No autopilot is received on the link.

@@ -15,8 +15,9 @@ const WINDOW: Duration = Duration::from_millis(4_000);
 const ANSWER: Duration = Duration::from_millis(400);
 
 /// Number of [`WINDOW`]s without a message after which requests for it end. A message without which the drone cannot
-/// fly is requested every 16 windows instead: the next constant.
+/// fly is requested every [`SELDOM`] windows instead.
 const MAX_SILENT_WINDOWS: u8 = 4;
+/// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.
 const SELDOM: u8 = 16;
 
 /// Number of unanswered requests after which the autopilot seems not to receive the link's frames.
@@ -29,8 +30,8 @@ const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// False for a message that the link can do without. These are the fence, and the target, which only an ArduCopter reports and
-    /// only while it flies to one.
+    /// True for a message without which the drone cannot be controlled. False for the fence's state and the target,
+    /// which not every autopilot sends.
     is_vital: bool,
 }
 
@@ -126,7 +127,7 @@ impl Streams {
         }
     }
 
-    /// Schedules requests for messages that arrived less than half as often as requested.
+    /// Schedules requests for messages that were received less than half as often as requested.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         let passed = now.since(self.since);
         if passed < WINDOW {

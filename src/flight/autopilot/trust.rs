@@ -35,7 +35,7 @@ pub enum Mistrust {
 impl Mistrust {
     const ALL: [Self; 4] = [Self::NoKey, Self::Unsigned, Self::OtherKey, Self::Old];
 
-    /// Returns the bit that stands for this kind of mismatch.
+    /// Returns the bit of this kind of signature mismatch, for sets of kinds.
     const fn bit(self) -> u8 {
         1 << self as u8
     }
@@ -58,10 +58,11 @@ pub(super) struct Trust {
     #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
-    /// Kind of signature mismatch of the last heartbeats, and their number in a row.
+    /// Kind of signature mismatch in the last heartbeats, and the number of consecutive heartbeats with it.
     row: Option<(Mistrust, u8)>,
-    /// Bits of the mismatches to be reported. The next field has the bits of all kinds found so far.
+    /// Kinds of signature mismatch that have to be reported, as bits.
     due: u8,
+    /// Kinds of signature mismatch found since the start, as bits. Each kind is reported once.
     found: u8,
 }
 

@@ -17,8 +17,8 @@ pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 /// Age of a position of the drone from which on it is not used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// Silence of the link that may have caused a failsafe of a PX4. A PX4 enters its failsafe after a second without a target, and a
-/// target is sent every 0.2 s.
+/// Silence of the autopilot from which on a PX4 may have entered its failsafe. It does so after a second without a
+/// target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
 /// Maximum time between the measurement of a position and its message.
@@ -27,16 +27,19 @@ const MEASURED: Duration = Duration::from_millis(300);
 /// MAVLink component number of an autopilot.
 pub(super) const AUTOPILOT: u8 = 1;
 
-/// Flag of `MAV_MODE_FLAG`: the custom mode is valid. The next constant: the vehicle is armed.
+/// Flag of `MAV_MODE_FLAG`: the custom mode is valid.
 const CUSTOM_MODE: u8 = 1;
+/// Flag of `MAV_MODE_FLAG`: the vehicle is armed.
 const ARMED: u8 = 128;
 
-/// Value of `MAV_LANDED_STATE` for a vehicle in the air; the next constant is for a landing one.
+/// Value of `MAV_LANDED_STATE` for a vehicle in the air.
 const IN_AIR: u8 = 2;
+/// Value of `MAV_LANDED_STATE` for a landing vehicle.
 const LANDING: u8 = 4;
 
-/// Value of `MAV_STATE` for a PX4 outside of a failsafe; the next constant is for one in a failsafe.
+/// Value of `MAV_STATE` for a PX4 outside of a failsafe.
 const ACTIVE: u8 = 4;
+/// Value of `MAV_STATE` for a PX4 in a failsafe.
 const CRITICAL: u8 = 5;
 
 /// Measured position and velocity of the drone, and the time of the measurement.
@@ -336,7 +339,7 @@ impl Vehicle {
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the time at which the next known value becomes too old without a new message.
+    /// Returns the time at which the next known value becomes too old, if no message renews it.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -384,9 +387,10 @@ const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
 /// Maximum age of a TIMESYNC question whose answer counts.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// Number of low bits of a TIMESYNC question that hold the link's tag. The higher bits hold µs, for 200 days. The
-/// autopilot only returns them. The next constant is the tag without a seed.
+/// Number of low bits of a TIMESYNC question that hold the link's tag. The higher bits hold the link's time in µs,
+/// enough for 200 days. The autopilot returns all bits unchanged.
 const SHIFT: u32 = 20;
+/// Tag in the TIMESYNC questions of a link without a seed.
 const TAG: u32 = 0xA_52A5;
 
 /// Measurement of the link's delay by echoes (TIMESYNC): an upper bound of a message's age.
@@ -480,16 +484,18 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the window over which the minimum delay of messages is taken. The minimum covers the last one to two
-/// halves.
+/// Half of the window over which the minimum delay of messages is taken. Each half is replaced in turn, so that the
+/// minimum covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of the window for the minimum delay. A gap and the burst after it then do
-/// not change that delay.
+/// Minimum number of messages in each half of the window for the minimum delay.
+///
+/// So a gap, and the late messages that arrive at once after it, do not increase the minimum.
 const LEAST: u8 = 8;
 
-/// Assumed maximum drift between the clocks of relay and autopilot: one part in 2^10. With more drift the minimum
-/// delay lags behind by the drift of two halves.
+/// Assumed maximum drift between the clocks of relay and autopilot, as an exponent: one part in 2^10.
+///
+/// With more drift, messages seem late by the drift within the window for the minimum delay.
 const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's, by the message with the minimum delay.
@@ -505,7 +511,7 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum difference between the clocks, µs: in the previous half of the window, and the present one.
+    /// Minimum difference of the relay's clock and the autopilot's, µs, in the last and this half window.
     least: [i64; 2],
     since: Instant,
     messages: u8,
@@ -554,8 +560,9 @@ impl RemoteClock {
     }
 }
 
-/// Returns `micros` in milliseconds, which wrap after 49 days as the autopilot's do. The division has two steps with
-/// instructions of the target: a 64-bit division takes a kilobyte of flash.
+/// Converts `micros`, µs, to milliseconds, which wrap after 49 days as the autopilot's do.
+///
+/// It uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
@@ -673,8 +680,9 @@ mod clock_tests {
         Instant::from_millis(ms)
     }
 
-    /// Returns the apparent age of each message of a flight, ms. `said` returns the autopilot's clock at a time,
-    /// `delay` the link's delay.
+    /// Returns the apparent age of each message of a simulated flight, ms.
+    ///
+    /// `clock_ms` returns the autopilot's clock at a time, and `delay` the link's delay at a time.
     fn ages(clock_ms: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();

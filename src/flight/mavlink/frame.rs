@@ -118,8 +118,9 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that the parser knows: those read or written, and those whose payload may contain frames. The latter are
-/// skipped as a whole.
+/// Messages that the parser knows: messages of this crate, and those whose payload may contain frames.
+///
+/// The parser skips the latter as a whole, so that it does not find a frame inside.
 const TABLE: [Known; 26] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::GLOBAL_POSITION_INT, 104, 28),

@@ -229,7 +229,7 @@ pub struct Received {
     pub from: Address,
     /// Decoded message; `None` for a kind that this crate skips, or that only companions send.
     pub message: Option<Incoming>,
-    /// Message id of MAVLink.
+    /// MAVLink id of the received message.
     pub id: u32,
     /// True if the frame has a signature, which the parser does not check.
     pub is_signed: bool,
@@ -324,7 +324,7 @@ impl Parser {
         self.counters
     }
 
-    /// Discards the first `length` received bytes, and those up to the next possible start of a frame.
+    /// Discards the first `length` received bytes, and more bytes up to the next possible start of a frame.
     fn drop_front(&mut self, length: usize) {
         let rest = self.bytes.get(length..).unwrap_or_default();
         let skipped = rest.iter().take_while(|byte| **byte != MAGIC).count();

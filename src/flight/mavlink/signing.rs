@@ -41,8 +41,9 @@ const BEGIN_S: u64 = 1_420_070_400;
 /// Number of senders whose timestamps are remembered. An autopilot forwards frames that others have signed.
 const SENDERS: usize = 8;
 
-/// Sender of signed frames, and the minimum timestamp of its next one. A new sender replaces the one with the oldest
-/// last frame, whose last minute could then be replayed.
+/// Sender of signed frames, and the minimum timestamp of its next frame, against replays. With [`SENDERS`] known
+/// senders, a new one replaces the sender with the oldest last frame. Frames of that sender that are at most a minute
+/// old could then be replayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
@@ -83,9 +84,10 @@ pub enum Flaw {
 pub struct Signing {
     key: [u8; 32],
     link: u8,
-    /// Timestamp that belongs to the time `at`. The field `sent` is the timestamp of the last sent frame.
+    /// Present timestamp for signatures. It belongs to the time `at`.
     stamp: u64,
     at: Instant,
+    /// Timestamp of the last sent frame.
     sent: u64,
     senders: [Sender; SENDERS],
 }

@@ -29,8 +29,8 @@ pub struct Storage<F> {
     pub block: u32,
     /// Two flash sectors that store the epoch, a number that rises at every start.
     pub epochs: [Range<u32>; 2],
-    /// Two flash sectors that store the relay's votes on the chain's membership. One is erased in flight when both
-    /// are full; an erase of a smaller sector takes less time.
+    /// Two flash sectors that store the relay's votes on the chain's membership. One sector is erased in flight when
+    /// both are full. Small sectors are better, because their erasure takes less time.
     pub views: [Range<u32>; 2],
 }
 

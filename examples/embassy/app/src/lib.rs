@@ -81,7 +81,7 @@ impl<const IN: usize> Buffers<IN> {
     }
 }
 
-/// Longest time between two feedings of the watchdog while the relay makes progress.
+/// Longest time between two feedings of the watchdog, while the relay's timers are not late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
 /// Calls `feed` every [`TURN`] for ever, for a drone that does not join the chain. The watchdog then does not restart
@@ -93,7 +93,7 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     }
 }
 
-/// Feeds the watchdog every [`TURN`] while the relay's timers are not late, by [`watchdog::may_feed`].
+/// Feeds the watchdog every [`TURN`], unless the relay's timers are late: see [`watchdog::may_feed`].
 ///
 /// It runs in the task of ports and timers, so a hanging turn of that task, a panic or a fault ends the feeding.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {

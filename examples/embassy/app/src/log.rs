@@ -35,7 +35,7 @@ pub(crate) fn unsigned() {
     warn!("no key: frames are not signed, and anybody in range can forge them");
 }
 
-/// Logs the signing epoch; `is_stored` is true if it was stored.
+/// Logs the signing epoch, a number that rises at every start; `is_stored` is true if it was stored.
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
         info!("frames are signed, epoch {}", epoch);

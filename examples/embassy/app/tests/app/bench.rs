@@ -241,12 +241,12 @@ fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)
 }
 
 impl Bench {
-    /// Creates the bench with relay 2 as the wired neighbour, on its first epoch.
+    /// Creates the bench with relay 2 as the wired neighbour, at its first start.
     pub(crate) fn new() -> Self {
         Self::wired(Wiring::Pair, 2)
     }
 
-    /// Creates the bench with relays 2 and 3 on one radio channel, on their first epochs.
+    /// Creates the bench with relays 2 and 3 on one radio channel, at their first start.
     pub(crate) fn radio() -> Self {
         Self::wired(Wiring::Shared, 3)
     }

@@ -39,8 +39,9 @@ fn neighbours_accept_the_epoch_of_every_start() {
     assert_eq!(bench.signature_rejections(), 0);
 }
 
-/// Restarts a relay with an older epoch, or with the same epoch and seed. Its neighbour rejects it, because it may be
-/// a replay. (The same epoch with another seed is a duplicate index, which the library's tests cover.)
+/// Checks that a relay restarted with an older epoch, or with the same epoch and seed, is rejected.
+///
+/// Its frames may be replayed ones. (The library's tests cover the same epoch with another seed, a duplicate index.)
 #[test]
 fn frames_with_a_forgotten_epoch_are_rejected() {
     for (epoch, seed) in [(1, 2), (2, 1)] {
@@ -69,7 +70,7 @@ fn a_block_may_raise_the_epoch_and_never_lowers_it() {
     }
 }
 
-/// Starts a board more often than a flash sector has room for epochs, with sectors of two lengths.
+/// Checks that the epoch rises at every start, also when a flash sector is full. Sectors of two lengths are tested.
 #[test]
 fn the_epoch_rises_through_full_sectors() {
     let flash = Ram::blank();

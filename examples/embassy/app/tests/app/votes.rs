@@ -14,12 +14,13 @@ fn newest(flash: &Ram) -> Option<ViewRecord> {
     log.newest::<WORDS>().and_then(|kept| unpack_record(&kept))
 }
 
-/// Returns the view that a record promises: 4 bytes from offset 10 of `ViewRecord::to_bytes`.
+/// Returns the number of the view (agreed set of members) that a record of votes promises. It is in 4 bytes from
+/// offset 10 of `ViewRecord::to_bytes`.
 fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
 
-/// Reboots a relay three times; the other two fly on and readmit it. Its stored promise never falls.
+/// Checks that a relay's stored promise never falls over three reboots. The other two relays fly on and readmit it.
 #[test]
 fn no_promise_is_forgotten_over_reboots() {
     let flash = Ram::blank();
