@@ -411,8 +411,8 @@ mod tests {
         }
     }
 
-    /// A claim that names another claim number than this relay's was sent before its last start. Such a claim is
-    /// answered and has no other effect.
+    /// Checks that a claim to the index from before this relay's last start is only answered. Such a claim names
+    /// another claim number than the relay's, and has no other effect.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
@@ -483,8 +483,8 @@ mod tests {
         }
     }
 
-    /// Checks that only a relay that had a position before it received the other one raises its claim. 40 s later the
-    /// other one counts as received for the first time again.
+    /// Checks that a relay raises its claim only if it had a position before it received its duplicate. The duplicate
+    /// has the same index; 40 s later it counts as received for the first time again.
     #[test]
     fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();

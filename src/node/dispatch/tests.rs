@@ -307,7 +307,7 @@ fn an_offer_of_an_unselected_node_is_answered_once() {
     );
 }
 
-/// An offer that arrives too late only triggers a hello; an offer that answers that hello is accepted.
+/// Checks that an offer that arrives too late only triggers a hello. An offer that answers that hello is accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {

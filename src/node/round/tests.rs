@@ -127,7 +127,8 @@ fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
     assert_eq!(line.rounds[0].circulation.next_timeout(), None);
 }
 
-/// A relay that still searches must not forward the token, which reports the position that it finds.
+/// Checks that a relay that still searches for its position does not forward the token. The token of Algorithm 2
+/// reports the position that the relay finds.
 #[test]
 #[cfg(feature = "adjust")]
 fn a_relay_that_still_searches_hands_on_no_token() {

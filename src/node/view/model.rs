@@ -59,7 +59,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Searches more events than the usual test; takes some minutes.
+/// Checks more events than the usual model check; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {
@@ -70,7 +70,8 @@ fn chains_of_three_and_four_in_more_states() {
     all_holds(4, (2, 3, 1), false);
 }
 
-/// Shows that the model check finds faults: if all relays present vote, two views are in force at once.
+/// Checks that the model check finds a fault of the quorum rule. If the votes of all present relays count, two views
+/// are in force at once.
 #[test]
 fn the_check_finds_the_fault_of_counting_all_votes() {
     for relays in [3, 4] {
@@ -83,7 +84,7 @@ fn the_check_finds_the_fault_of_counting_all_votes() {
     }
 }
 
-/// Shows that relays must store their votes: a relay that loses them breaks its promises.
+/// Checks that the model check finds a missing record: a relay without its votes breaks its promises.
 #[test]
 fn the_check_finds_the_fault_of_a_lost_record() {
     let check = Check {

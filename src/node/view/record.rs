@@ -287,7 +287,7 @@ mod tests {
         assert_eq!(ViewRecord::from_bytes(&[0; ViewRecord::LENGTH]), None);
     }
 
-    /// Tries every byte with every other value: a record that is accepted encodes to the same bytes.
+    /// Checks that each accepted record encodes to the same bytes. Every byte is tried with every other value.
     #[test]
     fn impossible_votes_are_not_read() {
         let mut taken = 0;

@@ -191,8 +191,8 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// A proposal of the same view with another mission is another proposal. Its leader has restarted meanwhile and has
-/// received another mission.
+/// Checks that a proposal of the same view with another mission counts as another proposal. Its leader has restarted
+/// meanwhile and has received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -303,7 +303,8 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Regression test: relays near the leader that did not know the newest view were refused for good.
+/// Checks that a refusal names the agreed view. Otherwise relays near the leader that do not know the newest view are
+/// refused for good.
 #[test]
 fn a_refusal_names_the_agreed_view() {
     let view = View {

@@ -259,7 +259,8 @@ fn the_next_proposal_spreads_the_agreed_view() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// A relay that votes before one that knows the newer view votes in the older view. Its vote does not count.
+/// Checks that the vote of a relay that does not know the newest view does not count. It votes before a relay that
+/// knows that view, and thus in the older view.
 #[test]
 fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);
@@ -300,8 +301,8 @@ fn only_members_may_be_relied_on() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// A refused proposal needs no room in the list of votes. The list holds a limited number of proposals without a
-/// known decision.
+/// Checks that a refused proposal needs no room in the list of votes. The list holds a limited number of proposals
+/// without a known decision.
 #[test]
 fn votes_are_kept_until_their_result_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -340,7 +341,7 @@ fn votes_are_kept_until_their_result_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Shows that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
+/// Checks that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
 /// view, forgets it, and votes in the initial view.
 #[test]
 fn a_relay_without_its_record_may_decide_a_second_view() {
