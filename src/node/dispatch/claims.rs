@@ -47,8 +47,8 @@ impl Node {
         }
     }
 
-    /// Handles a node's claim to its index. An original is repeated to its sender, an echo is compared with this
-    /// relay's own claim. Returns false if signed frames replace claims.
+    /// Handles a node's claim to its index (chain position). A claim is sent back to its sender. A claim that comes
+    /// back (echo) is compared with this relay's own. Returns false if signed frames replace claims.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;

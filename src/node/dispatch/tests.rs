@@ -100,7 +100,7 @@ pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
 
 const LENGTH: usize = Upload::LENGTH;
 
-/// Identifier of the first view that relay 1 proposes.
+/// Identifier of the first view (agreed set of members) that relay 1 proposes.
 const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
 
 fn proposal(mission_id: MissionId) -> Message {

@@ -29,6 +29,8 @@ pub(super) const PLACES_AT_ONCE: u16 = 600;
 /// True if the feature `altitude` is on; `ADJUST` is the same for `adjust`. Without a feature the code of its method
 /// is unreachable.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
+
+/// True if the feature `adjust` (Algorithm 2) is on. Without it the code of Algorithm 2 is unreachable.
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
 /// Current pass along the chain, with its data.

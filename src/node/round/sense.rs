@@ -331,6 +331,7 @@ pub(super) struct SensorState {
     pub(super) estimate: NumberedEstimate,
     /// Interference that the ground transmitter and the ground receiver have reported to this relay.
     pub(super) transmitter: Average,
+    /// Interference that the ground receiver has reported to this relay.
     pub(super) receiver: Average,
     /// True while this relay excludes its own measurements, because they do not fit the other measurements.
     pub(super) off: bool,

@@ -146,6 +146,7 @@ impl Computation {
 pub(crate) struct TurnPass {
     /// Action of this pass: look, move or stop. `sir` is the chain's SIR before the pass, linear.
     pub(crate) turn: AdjustStep,
+    /// SIR of the chain before this pass of Algorithm 2, linear.
     pub(crate) sir: f32,
     /// Relay before this one; `None` for Tx.
     before: Option<HopEnd>,

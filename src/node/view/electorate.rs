@@ -50,6 +50,7 @@ pub(super) const VOTES: usize = 8;
 pub(crate) struct Electorate {
     /// Newest view that is known to be agreed on. `member` is true if this relay is a member of it.
     pub(super) agreed: View,
+    /// True if this relay is a member of the newest agreed view, `agreed`.
     pub(super) member: bool,
     pub(super) promised: ViewId,
     /// View that this relay has accepted last, while it is not known to be agreed on.

@@ -176,6 +176,7 @@ pub(super) struct Chain {
     pub(super) air: Vec<Frame>,
     /// List of all views that were ever decided on; `agreed` lists all that were ever agreed on.
     pub(super) decided: Vec<DecidedView>,
+    /// List of all views that were ever agreed on.
     pub(super) agreed: Vec<SizedView>,
     pub(super) cuts: u8,
     pub(super) proposals: u8,
