@@ -25,15 +25,16 @@ const MIN_REQUESTS: u16 = 16;
 /// this factor longer.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between heartbeat requests to a silent neighbour. Sixteen or more fit before `dead_after`,
-/// unless a chain of `all` relays would then fill its shared channel.
+/// Returns the interval between heartbeat requests to a silent neighbour. It is the round trip through a chain of
+/// `all` relays, which share one channel, or less: sixteen or more requests fit before `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
 
-/// Returns the interval between heartbeat requests while many relays have no agreement yet. They share one channel.
+/// Returns the interval between heartbeat requests while many relays have no agreement yet.
 ///
-/// Three or more questions fit before `dead_after`.
+/// The relays share one channel, so the interval is longer than usual: three or more requests fit before
+/// `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }

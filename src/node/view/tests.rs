@@ -57,14 +57,14 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Removes the next relay, so that this relay decides an outstanding view proposal.
+    /// Ends the chain at this relay, so that it decides an outstanding view proposal.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
         self.view.decide(&context)
     }
 
-    /// Lets the relay lead: no relay precedes it, and its request timer expires.
+    /// Makes this relay the leader: no relay precedes it, and its request timer expires.
     pub(super) fn leads(&mut self) -> Effects {
         self.view.request.start(self.now);
         self.now = self.view.request.next_timeout().unwrap();

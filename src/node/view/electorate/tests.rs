@@ -49,7 +49,8 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the decision on a proposal that visits `nodes`; the last `accept` of them receive it.
+    /// Returns the decision on a proposal that visits `nodes` in order. The last `accept` of these nodes receive the
+    /// decision.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -79,8 +80,8 @@ const fn granted(id: ViewId, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks all parts of chains of up to seven relays: a part decides on a view if it is a quorum. That is more than
-/// half of the relays, or half with the initial leader.
+/// Checks for all parts of chains of up to seven relays that a part decides only if it is a quorum. A quorum is more
+/// than half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_or_half_with_the_initial_leader_decide() {
     for relays in 1..=7_u16 {
