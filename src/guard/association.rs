@@ -459,8 +459,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once `is_beyond` returns true for `near_m`. `near_m` then becomes this relay's
-    /// limit, so that it stays the separation away from the lost relay.
+    /// Ends [`is_near`](Self::is_near) once `is_beyond` returns true for `near_m`. This relay is then the separation
+    /// away from the lost relay, and `near_m` becomes the limit of its x.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {

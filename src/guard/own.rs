@@ -202,9 +202,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for five reminders although it should, as to `side`. Either the
-    /// agreed position is farther toward `side`; or it has another lateral offset or altitude, and this side forbids
-    /// that move (`clear` is false).
+    /// Returns true if the setpoint is held up at `side`: it has not moved for five reminders. The agreed position is
+    /// farther toward `side`; or it has another lateral offset or altitude, and this side forbids that move (`clear`
+    /// is false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;

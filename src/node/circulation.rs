@@ -302,7 +302,7 @@ pub(crate) struct LateMessages(u8);
 impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
-    /// Counts a message with an old number. Returns true if there are too many, and starts again from zero.
+    /// Counts a message with an old number. Returns true if there were too many in a row, and resets the count.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;

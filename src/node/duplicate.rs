@@ -116,7 +116,7 @@ pub(crate) struct IndexClaims {
     /// Contact with another node of this index: time of its last frame, and a flag. The flag is true if this relay
     /// already had a position when it received the first frame.
     contest: Option<(Instant, bool)>,
-    /// Times at which two nodes with one index were last observed: with this relay's, a neighbour's index.
+    /// Times at which a duplicate was last observed: of this relay's index, and of a neighbour's index.
     observed: [Option<Instant>; 2],
     /// Time when this relay last received a frame that it had sent itself.
     echoed: Option<Instant>,

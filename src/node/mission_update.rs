@@ -54,7 +54,7 @@ struct Offering {
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` before any.
     heard: Option<Instant>,
-    /// True if an offer of a mission to the neighbour is pending.
+    /// True if a mission offer to the neighbour is pending.
     is_due: bool,
     /// Time at which the offer to the neighbour is repeated; `None` if it is not.
     at: Option<Instant>,
@@ -491,7 +491,7 @@ impl Uploads {
     }
 }
 
-/// Returns the altitudes of a mission, m: its band, extended to the relays' common altitude.
+/// Returns the range of altitudes of a mission, m, extended to the relays' common altitude.
 fn altitudes_of(config: &MissionConfig) -> Band {
     let common_m = config.common.altitude_m;
     Band {

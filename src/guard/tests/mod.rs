@@ -503,7 +503,7 @@ fn a_restart_is_distinguished_from_late_messages() {
     );
 }
 
-/// Checks that a relay on the wrong side of its downstream neighbour lets the upstream one not move. It requests a
+/// Checks that a relay out of order with its downstream neighbour lets no upstream neighbour move. It requests a
 /// halt, in a message whose x does not count.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {

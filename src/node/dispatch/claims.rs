@@ -84,7 +84,8 @@ impl Node {
 
     /// Returns the destination of a due claim to this relay's index, and marks the claim as sent.
     ///
-    /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
+    /// Claims go to the two neighbours in turn. On a shared channel without neighbours the destination is this
+    /// relay's own number.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;

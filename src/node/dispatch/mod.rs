@@ -337,8 +337,8 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` comes too early: it leaves out relays on their way in. Its sender
-    /// was linked a moment ago, and the proposal has visited fewer relays than the last one.
+    /// Returns true if a view proposal from `side` comes too early: it leaves out relays soon to be linked. Its
+    /// sender was linked a moment ago, and the proposal has visited fewer relays than the last one.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place

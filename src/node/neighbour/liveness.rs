@@ -105,7 +105,7 @@ pub(crate) struct Silence {
 }
 
 impl Liveness {
-    /// State before the relay starts: all zeros.
+    /// State of a neighbour's liveness before the relay starts: all zeros.
     pub(super) const NONE: Self = Self {
         longest: 0,
         ..Self::new(Instant::ZERO)

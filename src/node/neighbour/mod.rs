@@ -26,7 +26,7 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// State of both sides before the relay starts.
+    /// State of the neighbours on both sides before the relay starts.
     pub(crate) const NONE: Self = Self {
         upstream: Neighbour::NONE,
         downstream: Neighbour::NONE,

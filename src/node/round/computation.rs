@@ -32,7 +32,7 @@ pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
 /// True if the feature `adjust` (Algorithm 2) is on. Without it the code of Algorithm 2 is unreachable.
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
-/// Current pass along the chain, with its data.
+/// Current pass (message along the chain) at this relay: its kind and its data.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(SweepPass),

@@ -40,7 +40,7 @@ pub enum Phase {
     NoQuorum,
 }
 
-/// Next action of the relay after a message or a portion of work.
+/// Action that a relay takes next, after a message or a portion of work.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
     Nothing,

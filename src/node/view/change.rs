@@ -28,7 +28,7 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum number by which one message may advance the latest known view.
+/// Maximum number of views by which one message may advance the latest known view.
 const MAX_ADVANCE: u32 = 4096;
 
 /// State of the view change (agreement on the chain's members) at one relay.

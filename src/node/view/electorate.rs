@@ -151,8 +151,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view proposal `proposal`. If the list is full, its earlier half is kept: once relays
-    /// have accepted a view, later proposals that reach them decide on that view again.
+    /// Records the vote on the view proposal `proposal`. If the list is full, the older half of the votes is kept and
+    /// a newer one is dropped: later proposals decide again on a view that relays have accepted.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };

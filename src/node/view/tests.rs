@@ -454,10 +454,10 @@ fn a_forwarded_proposal_without_a_next_relay_is_abandoned() {
     assert!(relay.handle(&later).event.is_some());
 }
 
-/// Regression test: a relay forwards a view proposal to one node only.
+/// Checks that a relay forwards a view proposal to one node only.
 ///
-/// When only relay 1 had lost relay 2, views of different members had the same identifier: one of relays 1 to 3, one
-/// of 1 and 4.
+/// Otherwise, if only relay 1 has lost relay 2, two views have the same identifier: one with relays 1 to 3 as
+/// members, one with relays 1 and 4.
 #[test]
 fn a_proposal_is_forwarded_to_only_one_node() {
     let mut relay = Relay::new(1);
