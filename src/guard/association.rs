@@ -256,8 +256,9 @@ impl Association {
         self.open_sent = opens;
     }
 
-    /// Stores the halt request of any message of the neighbour, or ends it if the message has none. Only a message
-    /// with a valid position (`is_placed`) ends it, because a rebooted neighbour does not know its earlier request.
+    /// Stores a halt request that a message of the neighbour contains, or ends it if it contains none. Only a message
+    /// with a valid position (`is_placed`) ends a request, because a rebooted neighbour does not know its earlier
+    /// one.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -351,7 +352,7 @@ impl KeepOut {
         });
     }
 
-    /// Handles a message from `node`: removes lost relays at that node, or farther away, as obstacles.
+    /// Handles a message from `node`: lost relays there, or farther away on `side`, are no obstacles now.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -531,7 +532,7 @@ pub struct Fence {
 impl Fence {
     /// Flag: the sender has arrived at its lateral offset and altitude.
     pub const ARRIVED: u8 = 1;
-    /// Flag of the follower (downstream): it agrees to `apart_m`, the step of the newest fence.
+    /// Flag of the follower (downstream): it agrees to the distance `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
     /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
     /// beyond it, needs that to change its lateral offset or altitude.

@@ -140,7 +140,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the position nearest to `place` that is no farther outside the geofence than `before`.
+    /// Returns the position nearest to `place` that is no farther outside the geofence than `before`. If `before` is
+    /// inside, the result is inside as well.
     pub(super) fn clamp_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.geofence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {

@@ -105,7 +105,7 @@ impl FenceFollower {
     }
 
     /// Handles a notice that the neighbour upstream does not follow setpoints any more. This relay comes no nearer to
-    /// it. If the order of the two along x was right, this side sets no other limit.
+    /// it. If the two were in the right order along x, the neighbour sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);

@@ -231,9 +231,10 @@ impl Guard {
         self.own.config.geofence = fence;
     }
 
-    /// Handles a message of node `from`, a neighbour at `side`.
+    /// Handles a fence message of node `from`, a neighbour at `side`.
     ///
-    /// A message out of range is counted, one of an earlier association or of another node is ignored.
+    /// A message out of range is counted and ignored. One of an earlier association (session) or of another node is
+    /// ignored.
     pub fn handle_fence(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);

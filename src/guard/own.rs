@@ -42,10 +42,11 @@ pub(super) struct ReachableInterval {
     /// Interval that contains the x of all setpoints since the time `recent_since`, m.
     recent_span: Span,
     recent_since: Instant,
-    /// Interval of the x of earlier setpoints, which may still have had an effect at the last report.
+    /// Interval that contains the x of earlier setpoints, m. At the last position report the relay may still have
+    /// flown to one of them.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report shows the effect of the first setpoint.
+    /// True once a position report is recent enough to show the effect of the first setpoint.
     known: bool,
 }
 

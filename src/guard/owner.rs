@@ -102,7 +102,7 @@ impl FenceOwner {
     }
 
     /// Handles a notice that the neighbour downstream does not follow setpoints any more. This relay comes no nearer
-    /// to it. If the order of the two along x was right, this side sets no other limit.
+    /// to it. If the two were in the right order along x, the neighbour sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -247,7 +247,7 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the largest x allowed to this relay, m, at which it is still `apart` from the neighbour, m.
+    /// Returns the largest x, m, at which this relay keeps the distance `apart` from the neighbour, m.
     #[inline(never)] // called from several places
     pub(super) fn max_x(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
@@ -279,7 +279,7 @@ impl FenceOwner {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the neighbour has received the newest fence plane and reported that it is beyond it.
+    /// Returns true if the neighbour is known to be beyond the newest fence plane, which it has received.
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }

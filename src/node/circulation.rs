@@ -72,7 +72,7 @@ pub(crate) enum Reply {
 pub(crate) struct Path {
     /// Duration of one hop: transmission and handling of one frame.
     pub(crate) hop_time: Duration,
-    /// Number of hops.
+    /// Number of hops on the path.
     pub(crate) hops: u16,
     /// True if the relays on the path compute before they forward the message.
     pub(crate) slow: bool,

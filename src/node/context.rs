@@ -198,9 +198,9 @@ pub(crate) struct Effects {
     pub(crate) ignored: Option<Ignored>,
     /// True if a message was retransmitted.
     pub(crate) resent: bool,
-    /// True if this relay has started a pass or a view proposal.
-    pub(crate) began: bool,
     /// True if this relay has started a pass (message along the chain) or a view proposal.
+    pub(crate) began: bool,
+    /// True if a new view (agreed set of members) is needed.
     pub(crate) view_needed: bool,
     /// Neighbour that has replied to a message, and the time of that message: it was alive then or later.
     pub(crate) alive: Option<(Peer, Instant)>,
@@ -345,7 +345,7 @@ pub(crate) fn tenths(span: Duration) -> u16 {
     u16::try_from(micros.div_ceil(3_125)).unwrap_or(u16::MAX)
 }
 
-/// Returns the earlier of two times; `None` is later than any.
+/// Returns the earlier of two times; `None` counts as later than any time.
 pub(crate) fn earliest(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
     [a, b].into_iter().flatten().min()
 }

@@ -79,10 +79,12 @@ pub(crate) const RAISED: u32 = 1 << 31;
 /// Wait before the first unprompted claim to this relay's index. Each further interval is twice the previous one.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start until unprompted claims begin. A hundred relays take about as long to agree.
+/// Time from the start until this relay sends claims to its index unprompted. A hundred relays take about as long to
+/// agree.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum interval between the first unprompted claims. Later ones follow every `dead_after`.
+/// Maximum interval between the first unprompted claims to this relay's index. Later claims follow every
+/// `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
 /// Number of repeated claims that answer an active node's claim to the same index. They are [`least_interval`] apart.
@@ -446,8 +448,8 @@ mod tests {
         }
     }
 
-    /// Checks the rows of the state table for claims. It tries every order of the claim numbers, and every lease,
-    /// epoch and state of the other node.
+    /// Checks which of two nodes with one index becomes passive, for all rows of the state table. It tries every
+    /// order of the claim numbers, and every lease, epoch and state of the other node.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();

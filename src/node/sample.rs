@@ -18,7 +18,7 @@ const FIELD: bool = cfg!(feature = "field");
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
-    /// Interference power at the setpoint of a relay, to correct a known field of interference.
+    /// Interference power at a relay's setpoint, for a mission with a known field of interference.
     Interference {
         /// Received power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,

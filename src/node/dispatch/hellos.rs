@@ -133,7 +133,7 @@ impl Node {
         }
     }
 
-    /// Returns the number of relays on `side` in this connected part of the chain, as counted last.
+    /// Returns the number of relays on `side` that are connected to this relay, as counted last.
     pub(super) fn relays_on(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;

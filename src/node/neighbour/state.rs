@@ -78,7 +78,7 @@ pub(crate) struct Neighbour {
     unselected_at: Option<Instant>,
     /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
-    /// Number of consecutive reports of each node on this side that it does not receive this relay.
+    /// Number of consecutive reports that this relay is not received, for each node on this side.
     pub(super) not_received: ConsecutiveCounts,
     /// Nodes that were reported to the firmware as found since another node was linked or lost. Bit 0 is the nearest
     /// node.
@@ -698,7 +698,7 @@ impl Neighbour {
 }
 
 impl Neighbour {
-    /// Records the number of the neighbour's heartbeat request, which a heartbeat will answer; 0 is none.
+    /// Records the number of the neighbour's heartbeat request, 0 for none; a heartbeat will answer it.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.heartbeat.reply = number;

@@ -235,7 +235,7 @@ impl Round {
         self.computation.load(profile);
     }
 
-    /// Discards the agreed position until the next agreement.
+    /// Discards the agreed position; there is none until the next agreement.
     pub(crate) const fn discard_agreed_place(&mut self) {
         self.computation.discard_agreed_place();
     }

@@ -31,8 +31,8 @@ use crate::wire::message::Heard;
 /// Maximum interval between passes that collect measurements, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// Number of passes with measurements that leave the estimate unchanged before a longer interval. The interval
-/// between these passes then doubles.
+/// Number of sensing passes without a change of the estimate, after which their interval doubles. A sensing pass is a
+/// message along the chain that collects measurements.
 const PATIENCE: u8 = 4;
 
 /// Number of passes that collect measurements per `Listen::every` in the search for a faulty relay.

@@ -178,14 +178,14 @@ pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
     /// Checksum of the received sweep, see [`fingerprint`].
     pub(crate) fingerprint: u32,
-    /// True if the relays use the lateral offsets and altitudes of the joint method.
-    pub(crate) chosen: bool,
     /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
+    pub(crate) chosen: bool,
+    /// True if a later relay of this sweep has an altitude or power that differs from the common profile.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// True if a later relay of this sweep has an altitude or power that differs from the common profile.
+    /// Farthest x that the previous relay can take for each target SIR (its reaches), m.
     from: PerTarget,
-    /// Farthest x that this relay can take for each target (its reaches), m.
+    /// Farthest x that this relay can take for each target SIR (its reaches), m.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,

@@ -221,8 +221,8 @@ pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     poll.earlier_lease_left.max(lease_left).min(most)
 }
 
-/// Returns the decision on the view proposal `proposal`; `None` without a quorum. It has reached `relays` of the
-/// mission's `all` relays, with the votes `poll`.
+/// Returns the decision on the view proposal `proposal`; `None` without a quorum. The proposal has reached `relays`
+/// of the mission's `all` relays, and collected the votes `poll`.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,

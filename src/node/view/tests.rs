@@ -511,7 +511,7 @@ fn a_leader_proposes_later_views_one_at_a_time() {
     }
 }
 
-/// Checks that a relay alone for hours does not use up a view number every five seconds.
+/// Checks that a relay that is alone for hours does not use up a view number every five seconds.
 #[test]
 fn a_refused_lone_leader_proposes_only_with_a_quorum() {
     let mut relay = Relay::second();
