@@ -93,7 +93,7 @@ impl Association {
         self.node == 0 || self.is_absent()
     }
 
-    /// Stores the neighbour's x, `x_m`, from a message. It expires after 15 reminders without another one.
+    /// Stores the neighbour's x from a message, `x_m`. It expires after 15 reminders without another message.
     pub(super) const fn record_x(&mut self, x_m: f32) {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
@@ -520,7 +520,7 @@ pub struct Fence {
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
-    /// setpoints: those of its reported position.
+    /// setpoints, they are those of its reported position.
     pub across: CrossSection,
     /// Distance along x that the owner (upstream) requests to keep from the fence plane, m, 0 to 1e5. If it is less
     /// than the separation, the follower must not change its lateral offset or altitude.
@@ -543,8 +543,8 @@ impl Fence {
     /// number of the fence are not valid.
     pub const LEFT: u8 = 16;
     /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond it, is
-    /// on the wrong side of a neighbour along x, or does not know. The request is repeated every second, and valid in
-    /// any association.
+    /// on the wrong side of a neighbour along x, or does not know its order. The request is repeated every second,
+    /// and is valid in any association (session).
     pub const HALTS: u8 = 32;
     /// Flag: the position in this message does not let the neighbour move; it only shows the order along x. The
     /// follower sets it while its order with its own neighbour downstream is not confirmed. With

@@ -224,7 +224,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if this relay is known to be beyond its neighbour upstream, or none there is flown.
+    /// Returns true if this relay is known to be beyond its neighbour upstream, or has no flown one.
     ///
     /// A neighbour announces a fence plane once it has found this relay beyond it. False while a lost relay may be on
     /// the wrong side.

@@ -202,7 +202,8 @@ pub(crate) struct Effects {
     pub(crate) began: bool,
     /// True if a new view (agreed set of members) is needed.
     pub(crate) view_needed: bool,
-    /// Neighbour that has replied to a message, and the time of that message: it was alive then or later.
+    /// Sign of life: neighbour that has replied to a message, and the time of that message. The neighbour was alive
+    /// at that time or later.
     pub(crate) alive: Option<(Peer, Instant)>,
     /// Origin of the view proposal that was received or made.
     pub(crate) proposed_by: Option<Proposer>,

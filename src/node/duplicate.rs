@@ -311,9 +311,9 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts the claims that are sent at intervals without a request. Links without a key need them, and so does the
-    /// answer to another node. On a shared channel no others are needed, because any frame of the other node is
-    /// received directly.
+    /// Starts the claims to this relay's index that are sent unprompted, at intervals. Links without a key need them,
+    /// and so does the defence against another node. A shared channel needs no others, because any frame of the other
+    /// node is received directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();

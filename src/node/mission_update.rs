@@ -37,9 +37,9 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
-/// Number that this relay's hellos bear, with the times of its first and last use.
+/// Number that this relay's hellos contain, with the times of its first and last use.
 ///
-/// A mission offer that answers a hello contains the number of that hello. The number 0 means none.
+/// A mission offer that answers a hello repeats its number. The number 0 means none.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -428,8 +428,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Adopts the sites of the stored mission as those of the active one. Returns true if they differ, so that
-    /// positions are void.
+    /// Adopts the sites of Tx and Rx of the stored mission as those of the active one. Returns true if the sites have
+    /// changed, so that all positions are void.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();

@@ -312,7 +312,7 @@ impl Pair {
     }
 }
 
-/// Checks rule 8: neither of two neighbours moves before it has received a message of the other.
+/// Checks rule 8: no relay moves before it has received a message of its neighbour.
 #[test]
 fn no_relay_moves_before_its_neighbour_is_received() {
     let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);

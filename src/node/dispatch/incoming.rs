@@ -203,8 +203,8 @@ impl Node {
         self.apply(now, effects);
     }
 
-    /// Records that the neighbour at `side` was alive at time `at` or later. Its reply to a message of that time
-    /// shows it.
+    /// Records that the neighbour at `side` was alive at time `at` or later. It has replied to a message that was
+    /// sent at that time.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {

@@ -171,7 +171,7 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles the statement of the neighbour at `side` that it, or a relay beyond it, refuses a mission.
+    /// Handles the report of the neighbour at `side` that it, or a relay beyond it, has refused a mission.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {

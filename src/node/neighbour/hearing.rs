@@ -110,7 +110,8 @@ impl Hearing {
     }
 }
 
-/// Hellos due to the nearest nodes on one side, and those of them that request an answer. Bit 0 is the nearest node.
+/// Pending hellos to the nearest nodes on one side, as bit masks: all, and those that want an answer. Bit 0 is the
+/// nearest node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     due: u8,

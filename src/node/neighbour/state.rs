@@ -38,9 +38,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// A node is selected that, by its last report, has selected this relay, too.
+    /// Linked: this relay has selected a node, which has selected this relay by its last report.
     Linked,
-    /// A node is selected that has not selected this relay, or does so no longer.
+    /// Pairing: this relay has selected a node that has not, or no longer, selected this relay.
     Pairing {
         since: Instant,
     },
@@ -205,7 +205,7 @@ impl Neighbour {
         back
     }
 
-    /// Returns true if a node is selected and has selected this relay, too, as far as it has reported.
+    /// Returns true if this relay and a node have selected each other, by the last report of that node.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }

@@ -104,7 +104,7 @@ impl Round {
         }
     }
 
-    /// Handles expired timers. Work: at most one portion of a computation.
+    /// Handles expired timers of the agreement on positions. Work: at most one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);

@@ -611,8 +611,8 @@ impl ViewRequest {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer; returns true if a view request is due. It is due, too, if nothing was received
-    /// since the start (`fresh`).
+    /// Handles the expired timer; returns true if a view request is due. It is due while a request is pending, or if
+    /// nothing was received since the start (`fresh`).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {
