@@ -48,9 +48,9 @@ pub(super) struct Association {
     foreign_messages: u8,
     /// True if a message to the neighbour is pending.
     pub(super) due: bool,
-    /// True while the neighbour requests an open chain: all relays the separation apart along x.
+    /// True while the neighbour requests an open chain: all relays the minimum separation apart along x.
     pub(super) open_requested: bool,
-    /// True while the messages to the neighbour request an open chain.
+    /// True while the messages to the neighbour request an open chain: all relays the separation apart.
     open_sent: bool,
     /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without one.
     halt_reminders_left: u8,
@@ -93,14 +93,15 @@ impl Association {
         self.node == 0 || self.is_absent()
     }
 
-    /// Stores the neighbour's x, `x_m`, from a message. It expires after 15 reminders without another one.
+    /// Stores the neighbour's x from a message, `x_m`. It expires after 15 reminders without another message.
     pub(super) const fn record_x(&mut self, x_m: f32) {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns how far this relay is past the neighbour's last x in the right direction, m.
+    /// Returns the distance along x by which this relay is on the right side of its neighbour, m.
     ///
-    /// Negative if the relay is on the wrong side of the neighbour, which is at `side`; NaN if a position is unknown.
+    /// The neighbour is at `side`; its last received x counts. Negative on the wrong side; NaN if a position is
+    /// unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -146,8 +147,8 @@ impl Association {
         self.left_number = 0;
     }
 
-    /// Returns true if a message states that the neighbour has left this association. The echoed number is not used again, so a
-    /// repetition of the message belongs to an earlier association.
+    /// Returns true if `fence` states that the neighbour has left this association (session). A repetition of that
+    /// message does not count again, because the next association has another number.
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
@@ -223,7 +224,8 @@ impl Association {
         known
     }
 
-    /// Returns a message of this association. Number, x and step of its fence are 0, for the caller to fill in.
+    /// Returns a fence message of this association (session). Its number, x and distance are 0, for the caller to
+    /// fill in.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own_number,
@@ -254,8 +256,9 @@ impl Association {
         self.open_sent = opens;
     }
 
-    /// Stores the halt request of any message of the neighbour, or ends it if the message has none. Only a message
-    /// with a valid position (`is_placed`) ends it, because a rebooted neighbour does not know its earlier request.
+    /// Stores a halt request that a message of the neighbour contains, or ends it if it contains none. Only a message
+    /// with a valid position (`is_placed`) ends a request, because a rebooted neighbour does not know its earlier
+    /// one.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -338,8 +341,8 @@ impl KeepOut {
         self.lost.map(|(_, limit_m)| limit_m)
     }
 
-    /// Adds the lost relay `node` with the limit `limit_m` of this relay's x, m. Of two lost relays the nearer node
-    /// is kept, and the tighter limit; `side` determines both.
+    /// Adds a lost relay: its number is `node`, and it limits this relay's x to `limit_m`, m. If there was one
+    /// before, the nearer node and the tighter limit are kept. The lost relays are at `side`.
     #[inline(never)] // called from both sides
     pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32) {
         let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
@@ -349,7 +352,7 @@ impl KeepOut {
         });
     }
 
-    /// Removes the lost relays at or beyond `node`, because `node` has sent a message.
+    /// Handles a message from `node`: lost relays there, or farther away on `side`, are no obstacles now.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -377,7 +380,8 @@ impl KeepOut {
         self.unflown = None;
     }
 
-    /// Returns the obstacles for a changed line: without the unflown drone, whose new x is unknown.
+    /// Returns the obstacles after a change of the line from Tx to Rx. A drone that does not follow setpoints is left
+    /// out, because its x along the new line is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
@@ -430,10 +434,10 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Sets the limit of this relay's x for relays that were lost before its first setpoint to `x_m`.
+    /// Limits this relay's x to `x_m` because of relays that were lost before its first setpoint.
     ///
-    /// These relays were never heard and may hover anywhere beyond the first setpoint, which is at `x_m`. At `near_m`
-    /// this relay is the separation away from them.
+    /// They were never heard and may hover anywhere beyond the first setpoint, which is at `x_m`. At `near_m` this
+    /// relay is the separation away from them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -456,8 +460,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once `is_beyond` returns true for `near_m`. `near_m` then becomes this relay's
-    /// limit, so that it stays the separation away from the lost relay.
+    /// Ends [`is_near`](Self::is_near) once `is_beyond` returns true for `near_m`. This relay is then the separation
+    /// away from the lost relay, and `near_m` becomes the limit of its x.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -504,10 +508,10 @@ impl KeepOut {
 pub struct Fence {
     /// Number that the sender gave to its association (session) with this neighbour, never 0.
     pub association: u16,
-    /// Number of the destination's association that the sender received last, 0 for none.
+    /// Echo of the association number that the destination sent last, 0 for none.
     pub echo: u16,
-    /// Number of the fence. From its owner upstream: 0 before the first fence. From the follower downstream: newest
-    /// number received.
+    /// Number of the fence plane. Its owner, the relay upstream, counts from 0 before the first plane. The follower,
+    /// the relay downstream, repeats the newest number received.
     pub number: u16,
     /// x of the fence if its owner (upstream) sends it, else the lowest x that the follower may reach.
     ///
@@ -516,7 +520,7 @@ pub struct Fence {
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
-    /// setpoints: those of its reported position.
+    /// setpoints, they are those of its reported position.
     pub across: CrossSection,
     /// Distance along x that the owner (upstream) requests to keep from the fence plane, m, 0 to 1e5. If it is less
     /// than the separation, the follower must not change its lateral offset or altitude.
@@ -528,7 +532,7 @@ pub struct Fence {
 impl Fence {
     /// Flag: the sender has arrived at its lateral offset and altitude.
     pub const ARRIVED: u8 = 1;
-    /// Flag of the follower (downstream): it agrees to `apart_m`, the step of the newest fence.
+    /// Flag of the follower (downstream): it agrees to the distance `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
     /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
     /// beyond it, needs that to change its lateral offset or altitude.
@@ -539,12 +543,12 @@ impl Fence {
     /// number of the fence are not valid.
     pub const LEFT: u8 = 16;
     /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond it, is
-    /// on the wrong side of a neighbour along x, or does not know. The request is repeated every second, and valid in
-    /// any association.
+    /// on the wrong side of a neighbour along x, or does not know its order. The request is repeated every second,
+    /// and is valid in any association (session).
     pub const HALTS: u8 = 32;
-    /// Flag: the position only shows the order along x, and allows the neighbour no move. From the follower: its own
-    /// order with its neighbour downstream is not confirmed. With [`LEFT`](Self::LEFT): the sender does not follow
-    /// setpoints, and `x_m` is its last reported x.
+    /// Flag: the position in this message does not let the neighbour move; it only shows the order along x. The
+    /// follower sets it while its order with its own neighbour downstream is not confirmed. With
+    /// [`LEFT`](Self::LEFT): the sender does not follow setpoints, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
     pub(super) const fn without_position(association: u16, echo: u16) -> Self {
@@ -579,18 +583,20 @@ impl Fence {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
-    /// The order of the two relays along x has not been confirmed by messages yet.
+    /// Hold reason: messages have not confirmed yet that the two relays are in the right order along x.
     Unheard,
-    /// The neighbour is on the wrong side of this relay along the line, or too close to tell. Neither moves.
+    /// Hold reason: the neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
     Order,
-    /// The agreed positions are closer along x than lateral offsets and altitudes of the two relays allow.
+    /// Hold reason: the two agreed positions are too close along x. Lateral offsets and altitudes do not keep the
+    /// relays the separation apart.
     Close,
-    /// A lost relay may still hover between this relay and its agreed position.
+    /// Hold reason: a lost relay may still hover between this relay and its agreed position.
     Lost,
-    /// The neighbour's drone is not flown to setpoints, and blocks the path or has not made room.
+    /// Hold reason: the neighbour's drone is not flown to setpoints, and is in the way or makes no room.
     NotFlown,
-    /// The setpoint has not moved for at least five seconds, because the neighbour has not made room.
+    /// Hold reason: the setpoint has not moved for at least five seconds. The neighbour has not made room.
     Pending,
-    /// Another relay is, or may be, on the wrong side of a neighbour. All relays therefore hold their positions.
+    /// Hold reason: another relay is, or may be, on the wrong side of a neighbour. All relays therefore hold their
+    /// positions.
     Halted,
 }

@@ -97,7 +97,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the configuration with a geofence enlarged for relays that leave the line without a quorum.
+    /// Returns the configuration with a larger geofence, for relays that leave the line. They do so while there is no
+    /// quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.geofence;
@@ -139,7 +140,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the position nearest to `place` that is no farther outside the geofence than `before`.
+    /// Returns the position nearest to `place` that is no farther outside the geofence than `before`. If `before` is
+    /// inside, the result is inside as well.
     pub(super) fn clamp_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.geofence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
@@ -166,10 +168,10 @@ impl GuardConfig {
             && (place.altitude_m - box_place.altitude_m).abs() <= near
     }
 
-    /// Returns the goal of node `node` along x, m, while the chain is open; `x_m` is its agreed x.
+    /// Returns the x to which relay `node` should fly while the chain is open, m; `x_m` is its agreed x.
     ///
-    /// In an open chain the order is kept, and the goals are the separation apart if the mission's relays fit into
-    /// the geofence so.
+    /// In an open chain the order is kept, and these x are the separation apart, if all relays of the mission then
+    /// fit into the geofence.
     #[inline(never)] // called from several places
     pub(super) fn open_chain_x(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.geofence.least_x_m;

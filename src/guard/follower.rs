@@ -7,7 +7,7 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Limit of a wrapping difference of fence numbers: a received fence is newer if it is below.
+/// Limit to compare wrapping fence numbers: a fence is newer if its number minus the last is below it.
 const AHEAD: u16 = 0x8000;
 
 /// State of the fence plane toward Tx: the neighbour upstream places it, this relay stays beyond it.
@@ -19,13 +19,14 @@ pub(super) struct FenceFollower {
     number: u16,
     /// x of the newest fence plane that the neighbour has announced, m.
     fence_m: f32,
-    /// Distance along x that the neighbour requests to keep from this relay, m; infinite before its first.
+    /// Distance along x that the neighbour upstream requests to keep from this relay, m. It is infinite before its
+    /// first request.
     requested_m: f32,
-    /// Distance along x to the neighbour that this relay has agreed to, m; infinite before any.
+    /// Distance along x to the neighbour upstream that this relay has agreed to, m; infinite before any.
     agreed_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
-    /// Neighbour's position across the line.
+    /// Lateral offset and altitude of the setpoint of the neighbour upstream.
     across: CrossSection,
     /// True once this relay is known to be beyond a fence plane that the neighbour has announced.
     clear: bool,
@@ -104,7 +105,7 @@ impl FenceFollower {
     }
 
     /// Handles a notice that the neighbour upstream does not follow setpoints any more. This relay comes no nearer to
-    /// it. If the order of the two along x was right, this side sets no other limit.
+    /// it. If the two were in the right order along x, the neighbour sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -202,9 +203,9 @@ impl FenceFollower {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the neighbour requests, unless that is too small. With `downstream_m`, the
-    /// distance on the other side, it must add up to the separation, so that this relay's two neighbours are that far
-    /// apart.
+    /// Agrees to the distance along x that the neighbour upstream requests, unless that is too small. Together with
+    /// `downstream_m`, the distance to the neighbour downstream, it must be at least the separation: this relay's two
+    /// neighbours are then that far apart.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -213,7 +214,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the distance along x that the neighbour upstream is sure to keep, m. The limits on the downstream side
+    /// Returns the distance along x that the neighbour upstream keeps at least, m. The limits on the downstream side
     /// use it.
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
@@ -223,10 +224,10 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if no flown neighbour is upstream, or if the neighbour has announced a fence plane.
+    /// Returns true if this relay is known to be beyond its neighbour upstream, or has no flown one.
     ///
-    /// A neighbour announces a fence once it has found this relay beyond it. False while a lost relay may be on the
-    /// wrong side.
+    /// A neighbour announces a fence plane once it has found this relay beyond it. False while a lost relay may be on
+    /// the wrong side.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.has_fence())
@@ -245,8 +246,8 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Updates the state after a position report. A message is due once this relay is beyond the newest fence plane,
-    /// because the neighbour waits for that. `low_m` is the lowest x of this relay and those beyond it, m.
+    /// Updates after a position report if this relay is beyond the newest fence plane. A message is due then, because
+    /// the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;

@@ -231,9 +231,10 @@ impl Guard {
         self.own.config.geofence = fence;
     }
 
-    /// Handles a message of node `from`, a neighbour at `side`.
+    /// Handles a fence message of node `from`, a neighbour at `side`.
     ///
-    /// A message out of range is counted, one of an earlier association or of another node is ignored.
+    /// A message out of range is counted and ignored. One of an earlier association (session) or of another node is
+    /// ignored.
     pub fn handle_fence(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);
@@ -252,8 +253,8 @@ impl Guard {
 
     /// Sets the neighbour at `side`, `None` at the end of the chain; no effect if it is the current one.
     ///
-    /// The previous neighbour may still hover: this relay keeps clear of it until [`forget`](Self::forget), or until it, or a
-    /// node between, is linked and has sent a message.
+    /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget), or until
+    /// that neighbour, or a node between the two, is linked and has sent a message.
     pub fn link(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -269,8 +270,8 @@ impl Guard {
 
     /// Removes the obstacles of lost relays at `side`, which have landed or were removed.
     ///
-    /// `others` states that the chain has more relays at that side. This relay then keeps clear of them, as of a
-    /// neighbour that it has not heard after a start, until it has heard one of them.
+    /// `others` states that the chain has more relays at that side. If none of them has been heard, this relay keeps
+    /// clear of everything beyond its present x until it hears one of them.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         let (is_heard, limit_m, keep_out) = match side {
@@ -357,9 +358,9 @@ impl Guard {
             .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Decides if this relay needs an open chain: all relays the separation apart along x. Requests of one neighbour
-    /// for that are forwarded to the other one. `clear` is true if this relay may change its lateral offset and
-    /// altitude.
+    /// Decides if this relay needs an open chain: all relays the separation apart along x. A request of one neighbour
+    /// for an open chain is forwarded to the neighbour on the opposite side. `clear` is true if this relay may change
+    /// its lateral offset and altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let is_blocked = !clear && !own.has_agreed_cross_section();

@@ -39,13 +39,14 @@ pub(super) struct ReachableInterval {
     pub(super) high_m: f32,
     /// Time of the last change of the setpoint's x.
     changed_at: Instant,
-    /// Interval that contains the x of all setpoints since the time `recent_since`.
+    /// Interval that contains the x of all setpoints since the time `recent_since`, m.
     recent_span: Span,
     recent_since: Instant,
-    /// Interval of the x of earlier setpoints, which may still have had an effect at the last report.
+    /// Interval that contains the x of earlier setpoints, m. At the last position report the relay may still have
+    /// flown to one of them.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report shows the effect of the first setpoint.
+    /// True once a position report is recent enough to show the effect of the first setpoint.
     known: bool,
 }
 
@@ -184,8 +185,8 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the position at which the relay's next path starts. This is `setpoint`. On the way to it, its x is
-    /// limited to the reported one, because the relay may stop there.
+    /// Returns the position from which the relay's next path starts: `setpoint` once the relay is there. Before, the
+    /// relay may stop on its way, so x is limited to the reported one and its error.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -202,9 +203,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint is short of the agreed position and has not moved for five reminders. The agreed
-    /// position is then farther toward `side`. Or it has another lateral offset or altitude, and `clear` is false:
-    /// this side forbids that move.
+    /// Returns true if the setpoint is held up at `side`: it has not moved for five reminders. The agreed position is
+    /// farther toward `side`; or it has another lateral offset or altitude, and this side forbids that move (`clear`
+    /// is false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -269,7 +270,7 @@ impl Own {
         }
     }
 
-    /// Returns true if lateral offset and altitude of `is` and `to_be` agree within the hover error.
+    /// Returns true if two positions agree in lateral offset and altitude, within the hover error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
@@ -294,7 +295,8 @@ impl Own {
         self.goal_of(self.node, self.target_m())
     }
 
-    /// Returns the current goal of `node` along x, m: `target_m`, or its place in an open chain.
+    /// Returns the x to which `node` should fly now, m: `target_m`, or its x in an open chain. In an open chain all
+    /// relays are the separation apart.
     pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
         if self.open {
             self.config.open_chain_x(node, target_m)

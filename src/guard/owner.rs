@@ -18,14 +18,15 @@ pub(super) struct FenceOwner {
     fence_m: f32,
     /// Distance along x that this relay requests to keep from the fence plane, m; infinite before any.
     requested_m: f32,
-    /// Distance along x to which the neighbour has agreed, m. A larger one that this relay requests replaces it at
-    /// once. Infinite stands for the separation.
+    /// Distance along x to the neighbour that is in force, m. The neighbour has agreed to it, or this relay has
+    /// requested a larger one since. Infinite stands for the separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
     /// Agreed x of the neighbour downstream, m.
     target_m: f32,
-    /// Lateral offset and altitude of the neighbour's setpoint. `arrived` is true once it has arrived there.
+    /// Lateral offset and altitude of the setpoint of the neighbour downstream. `arrived` is true once the neighbour
+    /// has arrived there.
     across: CrossSection,
     arrived: bool,
     /// True if the neighbour has received the newest fence plane.
@@ -101,7 +102,7 @@ impl FenceOwner {
     }
 
     /// Handles a notice that the neighbour downstream does not follow setpoints any more. This relay comes no nearer
-    /// to it. If the order of the two along x was right, this side sets no other limit.
+    /// to it. If the two were in the right order along x, the neighbour sets no other limit.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -125,8 +126,8 @@ impl FenceOwner {
                 || self.has_reply() && self.is_beyond(own))
     }
 
-    /// Returns true if the neighbour downstream has reported that it is not beyond this relay. It may have done so with or without
-    /// an association.
+    /// Returns true if the neighbour downstream has reported an x on the wrong side of this relay. The report counts
+    /// with or without an association (session). Also true while a lost relay may be on the wrong side.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
             true
@@ -154,8 +155,8 @@ impl FenceOwner {
         self.follower_low_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream is lower only by the
-    /// errors of the reports.
+    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream can be lower only
+    /// because of the errors of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.follower_low_m < low_m - 2.0 * own.config.rounding();
@@ -167,14 +168,15 @@ impl FenceOwner {
     }
 
     /// Returns the distance along x that this relay keeps from the neighbour downstream, m. `kept_m` is the distance
-    /// agreed with the neighbour upstream; the two distances add up to at least the separation.
+    /// agreed with the neighbour upstream; the sum of both is at least the separation.
     pub(super) fn step(&self, own: &Own, kept_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
-    /// Returns the distance along x to the relay downstream that is certain, m. It is 0 near a lost relay, and until
-    /// the neighbour is beyond the first fence plane. `kept_m` is the distance agreed with the neighbour upstream.
+    /// Returns the least possible distance along x to the neighbour downstream, m. It is 0 near a lost relay, and
+    /// until the neighbour is beyond the first fence plane. `kept_m` is the distance agreed with the neighbour
+    /// upstream.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -184,8 +186,8 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the distance along x is below the separation. Lateral offset and altitude then must not
-    /// change, because they may separate the two relays.
+    /// Returns true if the distance along x to the neighbour downstream is below the separation. Lateral offset and
+    /// altitude then must not change, because they may separate the two relays.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
@@ -245,7 +247,7 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the largest allowed x, m, that keeps the distance `apart` from the neighbour, m.
+    /// Returns the largest x, m, at which this relay keeps the distance `apart` from the neighbour, m.
     #[inline(never)] // called from several places
     pub(super) fn max_x(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
@@ -277,13 +279,13 @@ impl FenceOwner {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the neighbour has received the newest fence plane and reported that it is beyond it.
+    /// Returns true if the neighbour is known to be beyond the newest fence plane, which it has received.
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the distance along x that the agreed positions need, m. It is below the separation only if both relays
-    /// have arrived at their lateral offsets and altitudes and the agreed positions are that close.
+    /// Returns the smallest distance along x that the agreed positions need, m. It is below the separation only if
+    /// the agreed positions are that close, and both relays have arrived at their lateral offsets and altitudes.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -299,9 +301,9 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the best x of the fence plane now, m, the step to request, m, and true if the x is final. `None` if
-    /// the neighbour is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays
-    /// upstream, m.
+    /// Returns the next fence plane: its x, m, the distance to keep from it, m, and true if x is final. `None` if the
+    /// neighbour is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays upstream,
+    /// m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -325,8 +327,8 @@ impl FenceOwner {
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
-    /// Schedules a message if the best position of the fence plane has changed. A final one is sent at once. While
-    /// this relay moves, another one waits for the next reminder.
+    /// Schedules a message if the best position of the fence plane has changed. A final position is sent at once.
+    /// While this relay moves, a position that is not final waits for the next reminder.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
         if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
             let stays = last || own.reachable.has_arrived();
@@ -339,8 +341,8 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
-    /// Returns the pending message to the neighbour downstream. The fence plane moves only here and if `moves` is
-    /// true, so an unsent fence uses no number.
+    /// Returns the pending message to the neighbour downstream. If `moves` is true, it announces the best fence
+    /// plane. The plane moves in no other place, so that only sent planes get a number.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

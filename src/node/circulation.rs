@@ -30,15 +30,15 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays on the way compute. The frames are then twice as long, and each relay
-/// may take thirty work portions.
+/// Factor on the wait for a reply if the relays on the way compute first. Frames are then twice as long, and each
+/// relay may take thirty portions of work.
 const SLOW: u32 = 4;
 
-/// Maximum exponent n of the wait between retransmissions, 2 << n hop times: at most eight hop times.
+/// Maximum of n in the wait between retransmissions, 2 << n hop times: at most eight hop times.
 const LOG_MOST: u32 = 2;
 
-/// Wait before the first retransmission on a lossy channel, in hop times. In this time the neighbour has also replied
-/// to a duplicate.
+/// Wait before the first retransmission on a lossy channel, in hop times. It is long enough for the neighbour's
+/// reply, also after a duplicate.
 const SOON: u32 = 4;
 
 /// Number of messages after a loss for which the channel counts as lossy.
@@ -72,7 +72,7 @@ pub(crate) enum Reply {
 pub(crate) struct Path {
     /// Duration of one hop: transmission and handling of one frame.
     pub(crate) hop_time: Duration,
-    /// Number of hops.
+    /// Number of hops on the path.
     pub(crate) hops: u16,
     /// True if the relays on the path compute before they forward the message.
     pub(crate) slow: bool,
@@ -185,8 +185,8 @@ impl Circulation {
         self.stop(Stage::Idle);
     }
 
-    /// Cancels the message: it counts as completed without a result, and its times are forgotten. A later message
-    /// then cannot be taken for a sign of life that answers it.
+    /// Cancels the message: it counts as completed without a result, and its times are forgotten. A later
+    /// message is therefore not taken for its answer, which would prove that a neighbour is alive.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -302,7 +302,7 @@ pub(crate) struct LateMessages(u8);
 impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
-    /// Counts a message with an old number. Returns true if there are too many, and starts again from zero.
+    /// Counts a message with an old number. Returns true if there were too many in a row, and resets the count.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;

@@ -45,8 +45,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank, counted from the leader with 1, and the number of relays. Both are those of the
-    /// loaded mission, before any view change.
+    /// Returns this relay's rank, 1 for the leader, and the number of relays in the loaded mission. View changes do
+    /// not alter them.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -55,7 +55,8 @@ impl Member {
         (place, self.all)
     }
 
-    /// Returns the digest that messages of a pass bear: of the active mission and the accepted view.
+    /// Returns the digest that each message of a pass along the chain contains. It identifies the active mission and
+    /// the accepted view (agreed set of members).
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
     }
@@ -160,9 +161,9 @@ impl<'a> Context<'a> {
 pub(crate) struct OtherLeases {
     /// Longest remaining time for which members of this relay's view may rely on this relay.
     pub(crate) lease_left: Duration,
-    /// Last accepted view. `earlier_lease_left` is the longest remaining lease of earlier views; `None` if a member may not have
-    /// accepted `view`.
+    /// Last accepted view (agreed set of members).
     pub(crate) view: ViewId,
+    /// Longest remaining lease of views before `view`; `None` if a member may not have accepted `view`.
     pub(crate) earlier_lease_left: Option<Duration>,
 }
 
@@ -197,15 +198,16 @@ pub(crate) struct Effects {
     pub(crate) ignored: Option<Ignored>,
     /// True if a message was retransmitted.
     pub(crate) resent: bool,
-    /// True if this relay has started a pass or a view proposal.
+    /// True if this relay has started a pass (message along the chain) or a view proposal.
     pub(crate) began: bool,
     /// True if a new view (agreed set of members) is needed.
     pub(crate) view_needed: bool,
-    /// Neighbour that has replied to a message, and the time of that message: it was alive then or later.
+    /// Sign of life: neighbour that has replied to a message, and the time of that message. The neighbour was alive
+    /// at that time or later.
     pub(crate) alive: Option<(Peer, Instant)>,
     /// Origin of the view proposal that was received or made.
     pub(crate) proposed_by: Option<Proposer>,
-    /// True if a view proposal is outstanding: no pass continues before its decision.
+    /// True if a view proposal is outstanding: no pass along the chain continues before its decision.
     pub(crate) view_proposed: bool,
     pub(crate) event: Option<LayerEvent>,
     /// Changes of the interference estimate and of the faulty receivers.
@@ -330,7 +332,8 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the longest round trip of the first pass through `all` relays with half of the frames lost.
+/// Returns the longest time in which the first message passes `all` relays and its result comes back. Half of the
+/// frames are assumed to be lost.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }
@@ -343,7 +346,7 @@ pub(crate) fn tenths(span: Duration) -> u16 {
     u16::try_from(micros.div_ceil(3_125)).unwrap_or(u16::MAX)
 }
 
-/// Returns the earlier of two times; `None` is later than any.
+/// Returns the earlier of two times; `None` counts as later than any time.
 pub(crate) fn earliest(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
     [a, b].into_iter().flatten().min()
 }

@@ -73,28 +73,30 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number, to win against a later node.
+/// Bit of the claim number that a relay with a position sets, to win the index against a later node.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Wait before the first unprompted claim to this relay's index. Each further interval is twice the previous one.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start until unprompted claims begin. A hundred relays take about as long to agree.
+/// Time from the start until this relay sends claims to its index unprompted. A hundred relays take about as long to
+/// agree.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum interval between the first unprompted claims. Later ones follow every `dead_after`.
+/// Maximum interval between the first unprompted claims to this relay's index. Later claims follow every
+/// `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims, [`least_interval`] apart, that answer an active node's claim to the same index.
+/// Number of repeated claims that answer an active node's claim to the same index. They are [`least_interval`] apart.
 const DEFENCES: u8 = 32;
 
-/// Number of claims after a frame from another node with this index that is no claim.
+/// Number of claims that answer another node's frame with this index, if that frame is no claim.
 ///
 /// With a key it is the number of claims after this relay has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
 
-/// Returns the minimum interval between claims to this relay's index. Claims of two relays and their echoes do not
-/// fill the channel then.
+/// Returns the minimum interval between claims to this relay's index. It is long enough that claims of two relays and
+/// the echoes of these claims do not fill the channel.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
@@ -113,17 +115,18 @@ pub(crate) struct IndexClaims {
     rival: u32,
     /// Claim number of the other node with this index, as received last; 0 before any.
     last_rival: u32,
-    /// Time of the last frame of another node with this index. The flag is true if this relay had a position when it
-    /// received the first one.
+    /// Contact with another node of this index: time of its last frame, and a flag. The flag is true if this relay
+    /// already had a position when it received the first frame.
     contest: Option<(Instant, bool)>,
-    /// Last times at which a duplicate of the own index, and of a neighbour's index, was observed.
+    /// Times at which a duplicate was last observed: of this relay's index, and of a neighbour's index.
     observed: [Option<Instant>; 2],
     /// Time when this relay last received a frame that it had sent itself.
     echoed: Option<Instant>,
     /// Time when a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next unprompted claim to this index. `interval` is the time from there to the one after it.
+    /// Time of the next claim to this relay's index that no other claim has prompted.
     next_claim: Option<Instant>,
+    /// Time from the next unprompted claim to the one after it.
     interval: Duration,
     /// Number of claims still to send because another active node uses this index.
     defences: u8,
@@ -203,7 +206,7 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Returns true if this relay has held a position since before it first received the other node.
+    /// Returns true if this relay has had a position since before it first received the duplicate node.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -308,8 +311,9 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts the unprompted claims: those on links without a key, and those that answer another node. A shared
-    /// channel needs no others, because any frame of the other node is received directly.
+    /// Starts the claims to this relay's index that are sent unprompted, at intervals. Links without a key need them,
+    /// and so does the defence against another node. A shared channel needs no others, because any frame of the other
+    /// node is received directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -411,8 +415,8 @@ mod tests {
         }
     }
 
-    /// A claim that names another claim number than this relay's was sent before its last start. Such a claim is
-    /// answered and has no other effect.
+    /// Checks that a claim to the index from before this relay's last start is only answered. Such a claim names
+    /// another claim number than the relay's, and has no other effect.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
@@ -444,8 +448,8 @@ mod tests {
         }
     }
 
-    /// Checks the rows of the state table for claims. It tries every order of the claim numbers, and every lease,
-    /// epoch and state of the other node.
+    /// Checks which of two nodes with one index becomes passive, for all rows of the state table. It tries every
+    /// order of the claim numbers, and every lease, epoch and state of the other node.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();
@@ -483,8 +487,8 @@ mod tests {
         }
     }
 
-    /// Checks that only a relay that had a position before it received the other one raises its claim. 40 s later the
-    /// other one counts as received for the first time again.
+    /// Checks that a relay raises its claim only if it had a position before it received its duplicate. The duplicate
+    /// has the same index; 40 s later it counts as received for the first time again.
     #[test]
     fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();

@@ -61,7 +61,7 @@ pub(crate) struct Lease {
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which its positions may be used.
     accepted: (ViewId, Instant),
-    /// Latest possible expiry of a lease granted before the accepted view; `None` if unknown.
+    /// Latest possible expiry of the leases granted before the accepted view; `None` if it is unknown.
     older_leases_end: Option<Instant>,
     /// True once all relays of the view are known to have accepted it, or to have taken part in a renewal.
     is_whole: bool,
@@ -95,8 +95,8 @@ impl Lease {
         }
     }
 
-    /// Extends the time for which other members may rely on this relay by the longest possible lease. They may hold
-    /// such a lease of a view before this relay's restart.
+    /// Extends the time for which other members may rely on this relay by the longest possible lease. A lease of a
+    /// view from before this relay's restart may still run at these members.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }
@@ -132,9 +132,10 @@ impl Lease {
 
     /// Accepts `view`, which follows `base` and whose positions must not be used before `rest`.
     ///
-    /// Members of `base` that have not accepted the new view hold a lease for no longer than they rely on this relay, if it was a
-    /// member of `base`: without it no renewal completes. The age of an outstanding renewal counts as a round trip only if the
-    /// view loses no relay (`lost`) and this relay was a member of `base`; otherwise it measures an outage.
+    /// A member of `base` that has not accepted `view` may still hold a lease. If this relay was a member of `base`,
+    /// that lease ends when others may no longer rely on this relay, because no renewal completes without it. The age
+    /// of an outstanding renewal counts as a round trip only if this relay was a member of `base` and no relay is
+    /// `lost`; else it measures an outage.
     pub(crate) fn accept_view(
         &mut self,
         now: Instant,
@@ -184,7 +185,7 @@ impl Lease {
         }
     }
 
-    /// Handles a lease renewal or its reply. It is of this relay's view, from the neighbour that may send it.
+    /// Handles a lease renewal or its reply, of this relay's view and from the neighbour that may send it.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         match message {
             Message::Pulse(pulse) => self.on_pulse(context, *pulse),
@@ -219,9 +220,9 @@ impl Lease {
         effects
     }
 
-    /// Extends the lease after all members took part in the renewal `pulse`, unless it has expired already. If
-    /// `next`, the span of the next renewal, is more than twice as long, the first spans were too short: the lease
-    /// would expire before its renewal.
+    /// Extends the lease after all members took part in the renewal `pulse`, unless it has expired already. `next` is
+    /// the span of the next renewal. If it is more than twice as long, the first lease is not granted: it would
+    /// expire before its renewal.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -376,8 +377,9 @@ mod tests {
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
 
-    /// Returns the span of the lease that the leader announces, in tenths of a second. A renewal of view 1 is
-    /// unfinished since 40 s, and the leader has just accepted a view that follows view `base` and loses no relay.
+    /// Returns the span of the lease that the leader announces after a view change, in tenths of a second. A renewal
+    /// of view 1 is unfinished since 40 s, and the leader has just accepted a view that follows view `base` and loses
+    /// no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

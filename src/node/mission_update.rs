@@ -37,9 +37,9 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
-/// Number that this relay's hellos bear, with the times of its first and last use.
+/// Number that this relay's hellos contain, with the times of its first and last use.
 ///
-/// An offer that answers a hello repeats its number. The number 0 means none.
+/// A mission offer that answers a hello repeats its number. The number 0 means none.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -50,11 +50,11 @@ struct Asked {
 /// State of the mission offers to the neighbour, and to the ground station, on one side.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Number in the neighbour's last hello, which an answering offer repeats; 0 before any.
+    /// Number of the neighbour's last hello, 0 before any. An offer that answers the hello repeats it.
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` before any.
     heard: Option<Instant>,
-    /// True if an offer of a mission to the neighbour is pending.
+    /// True if a mission offer to the neighbour is pending.
     is_due: bool,
     /// Time at which the offer to the neighbour is repeated; `None` if it is not.
     at: Option<Instant>,
@@ -113,10 +113,11 @@ struct Uploads {
     upload: Option<Upload>,
     /// Sites of Tx and Rx of the active mission if it has its own; positions are then along their line.
     sites: Option<Sites>,
-    /// Distance from Tx to Rx of the mission loaded before flight, m. `loaded_band` is its range of altitudes.
+    /// Distance from Tx to Rx of the mission loaded before flight, m.
     loaded_m: f32,
+    /// Range of altitudes of the mission loaded before flight, m.
     loaded_band: Band,
-    /// Identifier of the last mission that this relay, or one beyond a neighbour, has refused.
+    /// Identifier of the last refused mission. This relay has refused it, or one beyond a neighbour.
     refused: Option<MissionId>,
     /// Number that this relay's hellos bear now, and the previous one. A mission offer must contain one of them.
     asked: [Asked; 2],
@@ -277,8 +278,8 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules a hello to the ground station at `side` if it `reports` is true. With `asks`, the number of the
-    /// station's hello, schedules the stored upload.
+    /// Schedules answers to the ground station at `side`: a hello if `reports` is true. If `asks` is the number of a
+    /// hello of the station, the stored upload is scheduled, too.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -304,7 +305,8 @@ impl MissionUpdate {
         refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
-    /// Records that a neighbour refuses a mission. Returns true if that is new and concerns the stored mission.
+    /// Records that a neighbour refuses a mission. Returns true if this is the first refusal, and concerns the stored
+    /// mission.
     pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
@@ -388,8 +390,8 @@ impl MissionUpdate {
         self.upload().copied().filter(|_| older)
     }
 
-    /// Checks that this relay can use `upload`: base, line and geofence. Relays in a field of interference accept
-    /// none, even if the digest of the base matches.
+    /// Checks that this relay can use `upload`: its base mission, line and geofence must fit. A relay whose
+    /// interference is a field (a known distribution along x) accepts none, even if the digest of the base matches.
     fn fits(&self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         let config = upload.config();
         let loaded = self.uploads().ok_or(UploadError::Base)?;
@@ -426,8 +428,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Adopts the sites of the stored mission as those of the active one. Returns true if they differ, so that
-    /// positions are void.
+    /// Adopts the sites of Tx and Rx of the stored mission as those of the active one. Returns true if the sites have
+    /// changed, so that all positions are void.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
@@ -449,8 +451,8 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks a mission with `config` against the configured geofence; the error names the limit exceeded.
     ///
-    /// The length of a mission with sites of its own (`sited`) is not limited. All relays must decide alike, so an altitude limit
-    /// that was extended to this relay's own altitude is replaced by that of the loaded mission.
+    /// The length of a mission with sites of its own (`sited`) is not limited. If the geofence was extended to this
+    /// relay's own altitude, the loaded mission's limit is used instead: all relays must decide alike.
     fn encloses(
         &self,
         member: &Member,
@@ -489,7 +491,7 @@ impl Uploads {
     }
 }
 
-/// Returns the altitudes of a mission, m: its band, extended to the relays' common altitude.
+/// Returns the range of altitudes of a mission, m, extended to the relays' common altitude.
 fn altitudes_of(config: &MissionConfig) -> Band {
     let common_m = config.common.altitude_m;
     Band {

@@ -10,14 +10,15 @@ use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
 
-/// True with the feature `field`. Without it `Settings::measure` is rejected, and the code is unreachable.
+/// True with the feature `field` (known field of interference). Without it `Settings::measure` is rejected, and the
+/// code is unreachable.
 const FIELD: bool = cfg!(feature = "field");
 
 /// Measurement of a relay or of a ground station, which the firmware passes to the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
-    /// Interference power at the setpoint of a relay, in a field of interference.
+    /// Interference power at a relay's setpoint, for a mission with a known field of interference.
     Interference {
         /// Received power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
@@ -59,7 +60,7 @@ impl Sample {
     }
 }
 
-/// Meter of the interference at the setpoint, from samples in a field of interference.
+/// Meter of the interference at the setpoint: averages the samples that the firmware passes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {
     estimator: Option<(Estimator, u32)>,
@@ -79,7 +80,7 @@ impl Meter {
         }
     }
 
-    /// Adds a sample; `at` is the setpoint of relay 1, `None` at other relays. Returns true if it was accepted.
+    /// Adds a sample; returns true if it was accepted. `at` is the setpoint of relay 1, `None` at other relays.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,

@@ -109,7 +109,7 @@ impl Steering {
         is_news
     }
 
-    /// Starts again along another line from Tx to Rx, at time `now`, or after a start if `None`.
+    /// Starts again along another line from Tx to Rx at `now`, which is `None` after a start of the relay.
     pub(crate) fn switch_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
             guard.leave_line(now);
@@ -130,8 +130,8 @@ impl Steering {
         }
     }
 
-    /// Removes the setpoint limits that lost relays at `side` cause. `others` states that the view has more relays
-    /// there.
+    /// Removes the limits of the setpoint because of lost relays at `side`, which are gone. `others` states that the
+    /// view has more relays at that side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);

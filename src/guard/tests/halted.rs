@@ -70,7 +70,7 @@ fn a_start_outside_the_geofence_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Two relays closer along x than the errors of their reports are in order only if they may pass. They may pass each
+/// Checks that two relays within the errors of their reports are in order only if they may pass. They may pass each
 /// other if lateral offset and altitude keep them the separation apart.
 #[test]
 fn relays_within_the_error_are_in_order_if_they_may_pass() {
@@ -109,8 +109,8 @@ fn relays_within_the_error_are_in_order_if_they_may_pass() {
     }
 }
 
-/// Two neighbours halt the relay between them if they are in the wrong order. Each may be on the right side of that
-/// relay within the errors of the reports.
+/// Checks that two neighbours in the wrong order along x halt the relay between them. Each of the two may seem to be
+/// on the right side of that relay, within the errors of the reports.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -135,7 +135,8 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     }
 }
 
-/// A relay on its way that receives a halt stops where it was last reported. It continues when the halt ends or expires.
+/// Checks that a relay on its way that receives a halt request stops where it was last reported. It continues when
+/// the halt ends or expires.
 #[test]
 fn a_relay_that_halts_on_its_way_stops_there() {
     for forgotten in [false, true] {
@@ -174,8 +175,8 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// A relay that halts on its way into the geofence stops outside, where it is. The nearest position inside may be a
-/// neighbour's.
+/// Checks that a relay that halts on its way into the geofence stops outside, where it is. The nearest position
+/// inside may be occupied by a neighbour.
 #[test]
 fn a_relay_that_halts_outside_the_geofence_stops_there() {
     let mut one = One {
@@ -211,8 +212,8 @@ fn a_relay_that_halts_outside_the_geofence_stops_there() {
     assert_eq!(one.guard.setpoint(), Some(high));
 }
 
-/// A halt request outlasts a reboot of the neighbour that sent it. The rebooted neighbour does not know its earlier
-/// request, so its first messages do not withdraw it.
+/// Checks that a halt request outlasts a reboot of the neighbour that sent it. The rebooted neighbour does not know
+/// its earlier request, so its first messages do not withdraw it.
 #[test]
 fn a_halt_outlasts_a_reboot_of_its_requester() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -249,7 +250,7 @@ fn a_halt_outlasts_a_reboot_of_its_requester() {
     }
 }
 
-/// A relay that is flown again on the wrong side of a known neighbour requests a halt at once.
+/// Checks that a relay that is flown again, on the wrong side of a neighbour, requests a halt at once.
 #[test]
 fn a_relay_flown_again_out_of_order_requests_a_halt() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -275,7 +276,7 @@ fn a_relay_flown_again_out_of_order_requests_a_halt() {
     }
 }
 
-/// A relay that does not follow setpoints, or has just started, also forwards a halt request.
+/// Checks that a halt request is forwarded by a relay without setpoints, or one that has just started.
 #[test]
 fn a_halt_passes_a_relay_that_is_not_flown() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -302,7 +303,7 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     assert_eq!(before.setpoint().to_bits(), 55.0_f32.to_bits());
 }
 
-/// A relay in manual control reports if it is on the wrong side of a flown neighbour.
+/// Checks that a relay in manual control reports that it is on the wrong side of a flown neighbour.
 #[test]
 fn an_unflown_relay_reports_that_it_is_out_of_order() {
     let mut one = One {
@@ -326,8 +327,8 @@ fn an_unflown_relay_reports_that_it_is_out_of_order() {
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
-/// A relay that started beside a silent one first moves away along x, then changes its altitude. It keeps the
-/// separation along x until an operator clears the silent one, and reports the reason meanwhile.
+/// Checks that a relay that starts beside a silent relay moves away along x before it changes altitude. It keeps the
+/// separation along x until an operator reports the silent relay as gone, and reports why it waits.
 #[test]
 fn a_relay_moves_away_from_a_silent_one_before_across() {
     let mut one = One {
@@ -361,8 +362,8 @@ fn a_relay_moves_away_from_a_silent_one_before_across() {
     assert_eq!(one.guard.setpoint(), Some(at(102.0)));
 }
 
-/// A relay on the wrong side of a neighbour that becomes silent stays where it is. The chain halts until an operator
-/// clears the silent neighbour.
+/// Checks that a relay stays where it is if a neighbour on its wrong side becomes silent. The chain halts until an
+/// operator reports the silent neighbour as gone.
 #[test]
 fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -391,7 +392,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     }
 }
 
-/// A relay beside one without setpoints does not halt the chain if their positions are in order.
+/// Checks that a relay beside one in manual flight does not halt the chain if the two are in order.
 #[test]
 fn a_reported_position_in_manual_flight_avoids_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
@@ -419,8 +420,8 @@ fn a_reported_position_in_manual_flight_avoids_a_halt() {
     }
 }
 
-/// A fence plane from before a reboot does not show its owner on the wrong side. A message with a fence number
-/// contains the x of the fence plane, which may be far from the position of its owner.
+/// Checks that a fence message from before a reboot is not taken for the position of its sender. A message with a
+/// fence number contains the x of the fence plane, which may be far from the sender.
 #[test]
 fn an_old_fence_gives_no_position_of_its_owner() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -443,8 +444,8 @@ fn an_old_fence_gives_no_position_of_its_owner() {
     }
 }
 
-/// Relay 3 is 2.5 m short of relay 2 along x, within the errors of their reports. Relay 2 sends that lower x
-/// upstream.
+/// Checks that relay 2 reports the lowest x of itself and of relay 3 to the relay upstream. Relay 3 is 2.5 m short of
+/// relay 2 along x, within the errors of their reports.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {
@@ -492,9 +493,9 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Relay 1 starts beside relay 2 after relay 3 has gone beyond the first fence plane of relay 2. Relays 1 and 2 are
-/// in order only by the error of the reports. Each next fence plane is then the separation beyond relay 1, too (rule
-/// 7).
+/// Checks the fence planes of relay 2 if relay 1 starts beside it, after relay 3 has cleared one. Relays 1 and 2 are
+/// in order only within the error of the reports. Each next fence plane then is the separation beyond relay 1, too
+/// (rule 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

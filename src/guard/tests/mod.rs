@@ -140,9 +140,8 @@ fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Rule 1: the follower stays beyond the fence that it has received.
-///
-/// It does so even if the neighbour on the other side started too close.
+/// Checks rule 1: a relay stays beyond the fence plane of its upstream neighbour. It does so even if the neighbour on
+/// the other side started too close.
 #[test]
 fn a_relay_between_two_fences_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
@@ -166,7 +165,7 @@ fn a_relay_between_two_fences_keeps_its_promise() {
     );
 }
 
-/// Rule 9: a relay keeps clear of a lost neighbour.
+/// Checks rule 9: a relay keeps clear of a lost neighbour.
 #[test]
 fn a_lost_relay_is_kept_clear_of() {
     let mut one = One::new([None, Some(2)], 100.0, 400.0);
@@ -194,7 +193,7 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// A relay keeps clear of relays beyond a removed neighbour until it hears one of them.
+/// Checks that a relay keeps clear of relays beyond a removed neighbour until it hears one of them.
 #[test]
 fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
@@ -272,7 +271,7 @@ fn a_relay_that_turns_stays_within_its_earlier_setpoints() {
     assert_eq!(after(21_000, &[], 95.0), (95.0, 95.0));
 }
 
-/// Setpoints of the owner and of the follower, m along x, compared exactly.
+/// Setpoints of two neighbouring relays, m along x: that of relay 1, then that of relay 2. They are compared exactly.
 #[derive(PartialEq, Debug)]
 struct Both(f32, f32);
 
@@ -300,7 +299,7 @@ impl Pair {
         self.owner.receive(Side::Downstream, 2, fence);
     }
 
-    /// Exchanges all messages until nothing changes.
+    /// Exchanges all messages between the two guards until nothing changes.
     fn talk(&mut self) {
         for _ in 0..8 {
             self.ask();
@@ -313,7 +312,7 @@ impl Pair {
     }
 }
 
-/// Rule 8: neither of two neighbours moves before it has received a message of the other.
+/// Checks rule 8: no relay moves before it has received a message of its neighbour.
 #[test]
 fn no_relay_moves_before_its_neighbour_is_received() {
     let mut pair = Pair::new([100.0, 200.0], [300.0, 150.0]);
@@ -332,7 +331,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Rules 3, 4 and 6: the owner requests a fence toward Rx, and advances as the follower clears it.
+/// Checks rules 3, 4 and 6: toward Rx, relay 1 advances only as far as relay 2 has moved ahead.
 #[test]
 fn the_owner_follows_the_follower() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
@@ -356,7 +355,7 @@ fn the_owner_follows_the_follower() {
     );
 }
 
-/// Rules 1 and 5: toward Tx the owner moves first, the fence follows it, and the follower the fence.
+/// Checks rules 1 and 5: toward Tx relay 1 moves first, then its fence plane, and then relay 2.
 #[test]
 fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -370,7 +369,7 @@ fn the_follower_follows_the_owner() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Rule 3: messages with an older fence, or late ones, do not count.
+/// Checks rule 3: late messages, and messages with an older fence plane, have no effect.
 #[test]
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -403,7 +402,8 @@ fn late_messages_grant_nothing() {
     );
 }
 
-/// A report that is older than the setpoint, or too early for its effect, does not free any space.
+/// Checks that an old position report frees no space for a neighbour. It is older than the setpoint, or too early to
+/// show its effect.
 #[test]
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -422,7 +422,7 @@ fn an_old_report_frees_nothing() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Rule 7: two relays that start too close first move apart along x.
+/// Checks rule 7: two relays that start too close to each other first move apart along x.
 #[test]
 fn a_start_too_close_is_opened_before_anything_else() {
     let mut pair = Pair::new([100.0, 500.0], [104.0, 600.0]);
@@ -462,8 +462,8 @@ fn relays_in_the_wrong_order_stay() {
     );
 }
 
-/// A restarted owner does not know the fence that it announced. The follower keeps that fence until it has exchanged
-/// messages with the restarted owner, and ignores old messages afterwards.
+/// Checks that a restarted relay is recognised, and its late old messages are ignored. The restarted relay does not
+/// know the fence plane that it announced. Its neighbour keeps to that plane until the two have exchanged messages.
 #[test]
 fn a_restart_is_distinguished_from_late_messages() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -503,8 +503,8 @@ fn a_restart_is_distinguished_from_late_messages() {
     );
 }
 
-/// A relay on the wrong side of its neighbour downstream gives the one upstream no valid position. It requests a
-/// halt, with an x that does not count.
+/// Checks that a relay out of order with its downstream neighbour lets no upstream neighbour move. It requests a
+/// halt, in a message whose x does not count.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);

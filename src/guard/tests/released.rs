@@ -70,7 +70,7 @@ impl Row {
     }
 }
 
-/// Rule 15: the neighbours of a drone in manual control come no nearer to it.
+/// Checks rule 15: the neighbours of a drone in manual control come no nearer to it.
 #[test]
 fn no_relay_comes_nearer_to_one_in_manual_flight() {
     let mut row = Row::new();
@@ -110,7 +110,7 @@ fn no_relay_comes_nearer_to_one_in_manual_flight() {
     assert_eq!(row.setpoint(0), Some(180.0));
 }
 
-/// Rule 15: neighbours do not fly through a drone in manual control that hovers in their way.
+/// Checks rule 15: neighbours do not fly through a drone in manual control that is in their way.
 #[test]
 fn no_relay_flies_through_a_drone_in_manual_flight() {
     for (y_m, expected_m) in [(0.0, 80.0), (6.0, 80.0), (20.0, 20.0)] {
@@ -151,9 +151,8 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// A relay beside a drone in manual control moves to the side, up or down only away from it.
-///
-/// Beside means within the separation along x.
+/// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. Beside means
+/// within the separation along x.
 #[test]
 fn no_relay_moves_across_toward_a_drone_beside_it() {
     for (y_m, moves) in [(-30.0, true), (30.0, false)] {
@@ -174,7 +173,8 @@ fn no_relay_moves_across_toward_a_drone_beside_it() {
     }
 }
 
-/// A neighbour that sent its position without an association, and then became silent, is lost.
+/// Checks that a neighbour counts as lost if it falls silent after it sent only its position. It had just started,
+/// and had no association (session) yet.
 #[test]
 fn a_relay_that_fell_silent_after_its_start_is_lost() {
     let mut row = Row::new();
@@ -214,8 +214,9 @@ fn a_late_position_of_a_drone_flown_again_is_no_obstacle() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// The companion of the neighbour restarted, and its pilot has not engaged setpoint control again. The limit of the
-/// neighbour's old association still holds, and the hold reason names the unflown neighbour.
+/// Checks that the hold reason names a neighbour that restarted and is not flown to setpoints again. The companion of
+/// the neighbour restarted, and its pilot has not engaged setpoint control. The limit of the neighbour's old
+/// association still holds.
 #[test]
 fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     let mut row = Row::new();
@@ -233,8 +234,8 @@ fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// A neighbour that follows setpoints but is silent makes no room. This is reported after five reminders, and not
-/// while the relay moves.
+/// Checks that a relay reports a silent flown neighbour that makes no room. It does so after five reminders, and not
+/// while the relay itself moves.
 #[test]
 fn a_relay_that_stands_for_long_reports_pending() {
     let mut row = Row::new();
@@ -282,8 +283,8 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// The leave notice is repeated until the neighbour has started a new association. That holds even if the pilot has
-/// given the drone back.
+/// Checks that a leave notice is repeated until the neighbour has started a new association (session). That holds
+/// even if the pilot has given the drone back.
 #[test]
 fn lost_messages_are_repeated() {
     let mut row = Row::new();
@@ -308,8 +309,8 @@ fn lost_messages_are_repeated() {
     assert!(row.all.iter().all(|one| one.guard.has_arrived()));
 }
 
-/// Late messages from before the pilot took over do not make the drone count as flown. After it is flown again, late
-/// leave notices do not make it count as released.
+/// Checks that late messages change nothing after a pilot has taken a drone over or given it back. Old fence messages
+/// do not make the drone count as flown, old leave notices not as released.
 #[test]
 fn late_messages_do_not_change_who_is_flown() {
     let mut row = Row::new();
@@ -345,7 +346,7 @@ fn late_messages_do_not_change_who_is_flown() {
     assert_eq!(row.setpoint(0), Some(200.0 - APART));
 }
 
-/// Two neighbouring relays are flown by hand and then by setpoints again. Both associate with each other again.
+/// Checks that two neighbours that are flown by hand and then by setpoints again associate anew.
 #[test]
 fn two_neighbours_are_released_and_flown_again() {
     let mut row = Row::new();

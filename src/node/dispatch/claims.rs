@@ -47,8 +47,8 @@ impl Node {
         }
     }
 
-    /// Handles a node's claim to its index. An original is repeated to its sender, an echo is compared with this
-    /// relay's own claim. Returns false if signed frames replace claims.
+    /// Handles a node's claim to its index (chain position). A claim is sent back to its sender. A claim that comes
+    /// back (echo) is compared with this relay's own. Returns false if signed frames replace claims.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -84,7 +84,8 @@ impl Node {
 
     /// Returns the destination of a due claim to this relay's index, and marks the claim as sent.
     ///
-    /// The neighbours alternate. On a shared channel without neighbours it is this relay's own number.
+    /// Claims go to the two neighbours in turn. On a shared channel without neighbours the destination is this
+    /// relay's own number.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;

@@ -98,10 +98,10 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay could be inserted between `other` (at `side`) and its neighbour.
+    /// Returns true if this relay could be inserted between node `other` (at `side`) and its neighbour.
     ///
-    /// For that, this relay and the neighbour of `other` receive each other, or a nearer linked neighbour of this
-    /// relay is inserted, too.
+    /// This relay and the neighbour of `other` must receive each other, or a nearer linked neighbour of this relay is
+    /// inserted with it.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -121,7 +121,8 @@ impl Node {
         fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this relay. `far` is the opposite side.
+    /// Returns the number of relays that a neighbour reaches through this relay, including this one. `far` is the
+    /// side that faces away from that neighbour.
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.
@@ -132,7 +133,7 @@ impl Node {
         }
     }
 
-    /// Returns the number of relays on `side` in this connected part of the chain, as counted last.
+    /// Returns the number of relays on `side` that are connected to this relay, as counted last.
     pub(super) fn relays_on(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;
@@ -261,7 +262,7 @@ impl Node {
         }
     }
 
-    /// Handles the neighbour's report whether it uses this relay as its neighbour (`mutual`).
+    /// Handles the neighbour's report if it has selected this relay as its own neighbour (`mutual`).
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

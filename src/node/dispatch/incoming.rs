@@ -77,9 +77,10 @@ impl Node {
         true
     }
 
-    /// Returns true if `message` from a neighbour is of the current mission and, where it matters, view.
+    /// Returns true if `message` belongs to the current mission, and to the current view if it needs one.
     ///
-    /// Other messages are counted and answered by a hello. A pass of another view also triggers a request for a new view.
+    /// Any other message is counted and answered by a hello. A pass of another view also triggers a request for a new
+    /// view.
     fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.digest() else {
             return true;
@@ -202,8 +203,8 @@ impl Node {
         self.apply(now, effects);
     }
 
-    /// Records that the neighbour at `side` was alive at time `at` or later. Its reply to a message of that time
-    /// shows it.
+    /// Records that the neighbour at `side` was alive at time `at` or later. It has replied to a message that was
+    /// sent at that time.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {
@@ -232,7 +233,7 @@ impl Node {
         }
     }
 
-    /// Handles a handshake of node `from` at `side` that does not show that the node receives this relay.
+    /// Handles a handshake of node `from` at `side` that leaves open if the node receives this relay.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {

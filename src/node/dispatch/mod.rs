@@ -337,8 +337,8 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` leaves out relays that are about to be linked. Its sender was
-    /// linked a moment ago.
+    /// Returns true if a view proposal from `side` comes too early: it leaves out relays soon to be linked. Its
+    /// sender was linked a moment ago, and the proposal has visited fewer relays than the last one.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
@@ -356,15 +356,16 @@ impl Layers {
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True once a lease expiry has been reported since the last view. `no_quorum_reported` is the same for a missing
-    /// quorum.
+    /// True once the expiry of a lease has been reported since the last view.
     pub(super) lapse_reported: bool,
+    /// True once a missing quorum has been reported since the last view.
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time for which a part of the chain without a quorum first keeps its links, in `dead_after`. `LATER_RETENTION` is the same for
-/// every later time.
+/// Time for which a part of the chain without a quorum first keeps its links, in `dead_after`.
 const FIRST_RETENTION: u32 = 3;
+
+/// Time for which a part of the chain without a quorum later keeps its links, in `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
 /// Timer after which a part of the chain without a quorum drops its links and searches again.

@@ -95,8 +95,8 @@ impl Node {
 
     /// Handles an offer of a mission from node `from` at `side`, whose loaded mission is this relay's.
     ///
-    /// An offer that answers a recent hello is answered only if this relay then has a mission as new, or refuses the
-    /// offered one. Any other answer would trigger the same offer again.
+    /// This relay answers an offer in time only if it then has that mission or a newer one, or refuses it. Any other
+    /// answer would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -171,7 +171,7 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles the statement of the neighbour at `side` that it, or a relay beyond it, refuses a mission.
+    /// Handles the report of the neighbour at `side` that it, or a relay beyond it, has refused a mission.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {
@@ -187,8 +187,8 @@ impl Node {
         }
     }
 
-    /// Compares the mission that the neighbour `from` at `side` holds with this relay's newest one. Schedules an
-    /// offer if it is older, and a hello, which requests an offer, if it is newer.
+    /// Compares the mission that the neighbour `from` at `side` holds with this relay's newest one. If the
+    /// neighbour's is older, schedules an offer; if it is newer, a hello that requests an offer.
     pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;
@@ -214,8 +214,8 @@ impl Node {
         }
     }
 
-    /// Returns the pending offer to the neighbour at `side`. If no recent hello can be answered, it is a hello that
-    /// requests one.
+    /// Returns the pending offer to the neighbour at `side`. An offer must answer a recent hello; if there is none, a
+    /// hello that requests one is returned instead.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

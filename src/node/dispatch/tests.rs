@@ -100,7 +100,7 @@ pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
 
 const LENGTH: usize = Upload::LENGTH;
 
-/// Identifier of the first view that relay 1 proposes.
+/// Identifier of the first view (agreed set of members) that relay 1 proposes.
 const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
 
 fn proposal(mission_id: MissionId) -> Message {
@@ -307,7 +307,7 @@ fn an_offer_of_an_unselected_node_is_answered_once() {
     );
 }
 
-/// An offer that arrives too late only triggers a hello; an offer that answers that hello is accepted.
+/// Checks that an offer that arrives too late only triggers a hello. An offer that answers that hello is accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {

@@ -116,8 +116,8 @@ impl Node {
             .is_solving(&self.layers.context(now, &self.member))
     }
 
-    /// Restarts the timers for neighbours and for the first pass, after a computation by the joint method. They
-    /// waited for its end.
+    /// Restarts the timers for neighbours and for the first pass, after a computation by the joint method. During the
+    /// computation these timers do not count.
     fn on_solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);

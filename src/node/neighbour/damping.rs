@@ -23,12 +23,13 @@ use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum number of doublings of a flapping link's hold-down, the time for which it is not used. `MAX_HOLD_DOWN` is the
-/// longest hold-down, in units of `dead_after`.
+/// Maximum number of doublings of the time for which a flapping link is not used (hold-down).
 const MAX_DOUBLINGS: u8 = 3;
+
+/// Longest time for which a flapping link is not used (hold-down), in units of `dead_after`.
 const MAX_HOLD_DOWN: u32 = 6;
 
-/// Maximum number of losses of a link that does not count as flapping yet.
+/// Maximum number of losses after which a link does not count as flapping yet.
 const MAX_FORGIVEN: u8 = 2;
 
 /// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
@@ -68,10 +69,10 @@ impl Heard {
 struct Link {
     /// Time at which the link was lost last.
     lost_at: Instant,
-    /// Times of frames since the last loss of the link; `None` before the first one.
+    /// Frames received since the last loss of the link: times of the first and last; `None` without any.
     back: Option<Heard>,
     losses: u8,
-    /// True if `losses` does not include the last loss, because the channel was bad.
+    /// True if the last loss does not count in `losses`, because the channel was bad.
     excused: bool,
     /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
     was_down: bool,
@@ -111,7 +112,7 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link after `losses` earlier losses. The number of losses grows if `counted` is true.
+    /// Records a loss of the link after `losses` earlier losses. The loss itself counts if `counted` is true.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -159,9 +160,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the link to the node `distance` relays away. `counts` is false if many frames are lost on
-    /// the channel: the loss is then added only if the link has flapped before. If another link on this side flaps,
-    /// this link inherits its losses, because both cross the same gap in the chain.
+    /// Records the loss of the link to the node `distance` relays away. `counts` is false if the channel loses many
+    /// frames; the loss then counts only if the link flapped before. The link inherits the losses of a flapping link
+    /// on this side, because both cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -177,8 +178,9 @@ impl Damping {
         }
     }
 
-    /// Records a frame from the node `distance` relays away. `asks` is the start of the search while the side has no
-    /// neighbour: a candidate that has answered the search and is then silent for longer than `gap` counts as lost.
+    /// Records a frame from the node `distance` relays away. While the side has no neighbour, `searching_since` is
+    /// the start of the search. The link to a candidate that has answered the search, and then was silent for longer
+    /// than `gap`, counts as lost.
     pub(super) fn record_hello(
         &mut self,
         distance: u16,
@@ -208,8 +210,8 @@ impl Damping {
         link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered the search for a neighbour since `since`, when it began. The search must
-    /// have begun at least `probe_after` ago.
+    /// Returns true if no node has answered the search for a neighbour, which began at `since`. False until the
+    /// search has lasted for `probe_after`.
     fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
@@ -237,7 +239,7 @@ impl Damping {
     }
 
     /// Returns true if a link on this side flaps slowly, so that its next loss should be noticed early. Such a link
-    /// has been lost more often than is forgiven, and stays up for long each time.
+    /// was lost more than [`MAX_FORGIVEN`] times, and stays up for long each time.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -262,8 +264,8 @@ impl Damping {
         self.candidate = None;
     }
 
-    /// Records that the candidate `distance` relays away is heard now. Returns true if it has been heard without a
-    /// gap for `probe_after`, and for `more` if that is longer.
+    /// Records that the candidate `distance` relays away is heard now. Returns true if it has been heard long enough
+    /// without a gap: for `probe_after`, or for `more` if that is longer.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,

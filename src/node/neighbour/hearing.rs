@@ -16,8 +16,8 @@ pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 impl ConsecutiveCounts {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// Counts an event of the node `distance` relays away, or resets its count if `occurred` is false. Returns true if it
-    /// is exactly the `limit`-th event in a row.
+    /// Counts an event of the node `distance` relays away, or resets its count if `occurred` is false. Returns true
+    /// if the event is exactly number `most` in a row.
     pub(super) fn count(&mut self, distance: u16, occurred: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {
@@ -110,7 +110,8 @@ impl Hearing {
     }
 }
 
-/// Hellos due to the nearest nodes on one side, and those of them that request an answer. Bit 0 is the nearest node.
+/// Pending hellos to the nearest nodes on one side, as bit masks: all, and those that want an answer. Bit 0 is the
+/// nearest node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     due: u8,

@@ -21,19 +21,20 @@ use crate::time::{Duration, Instant};
 /// Minimum number of unanswered heartbeat requests (questions) before a neighbour is lost.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor on the recent maximum of unanswered heartbeat requests. A neighbour is lost only after a run that is that
-/// much longer.
+/// Factor on the longest recent run of unanswered heartbeat requests. A neighbour is lost only after a run that is
+/// this factor longer.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between heartbeat requests to a silent neighbour. Sixteen or more fit before `dead_after`.
-/// The interval is as short as one channel allows for all of a chain of `all` relays.
+/// Returns the interval between heartbeat requests to a silent neighbour. It is the round trip through a chain of
+/// `all` relays, which share one channel, or less: sixteen or more requests fit before `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
 
-/// Returns the interval between heartbeat requests while many relays have no agreement yet. They share one channel.
+/// Returns the interval between heartbeat requests while many relays have no agreement yet.
 ///
-/// Three or more questions fit before `dead_after`.
+/// The relays share one channel, so the interval is longer than usual: three or more requests fit before
+/// `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
@@ -57,7 +58,7 @@ fn third(number: u64) -> u64 {
     u64::from(high / 3) << 32 | u64::from(rest)
 }
 
-/// Returns the round trip through a chain of `all` relays, but at most `most_micros`, µs.
+/// Returns the round trip through a chain of `all` relays, but at most `most_micros`, in microseconds.
 #[inline(never)] // called from both
 fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     let least = waiting(settings) / 64 + 1;
@@ -104,7 +105,7 @@ pub(crate) struct Silence {
 }
 
 impl Liveness {
-    /// State before the relay starts: all zeros.
+    /// State of a neighbour's liveness before the relay starts: all zeros.
     pub(super) const NONE: Self = Self {
         longest: 0,
         ..Self::new(Instant::ZERO)
@@ -122,10 +123,9 @@ impl Liveness {
         }
     }
 
-    /// Starts again with another node, and keeps the longest run of unanswered requests. That includes the run that
-    /// has just ended: if the previous node was not lost after all, the run was too short. If the link `was_down`,
-    /// that run measures an outage and not the channel, and is dropped. If the link `flaps` slowly, the earlier runs
-    /// are dropped, too.
+    /// Starts again with another node as neighbour, and keeps the longest run of unanswered requests. The run that
+    /// has just ended counts: it was too short to prove a loss if the previous node is alive. If the link `was_down`,
+    /// the last run measures an outage and is dropped. If the link `flaps` slowly, all runs are dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS
@@ -201,7 +201,8 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Measures the neighbour's silence from `now` on. Returns true if the neighbour is not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, unless the neighbour is lost. Returns true if it
+    /// is not lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.last_sign = now;
@@ -209,8 +210,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks the neighbour's silence at `now`. The neighbour is not lost before a silence of `dead`; `tick` is the
-    /// time to the next check.
+    /// Checks the neighbour's silence at `now`, and returns the result. The neighbour is not lost before a silence of
+    /// `dead`; `tick` is the time to the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

@@ -26,7 +26,7 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// State of both sides before the relay starts.
+    /// State of the neighbours on both sides before the relay starts.
     pub(crate) const NONE: Self = Self {
         upstream: Neighbour::NONE,
         downstream: Neighbour::NONE,
@@ -87,8 +87,8 @@ impl Neighbours {
         self.downstream.refuse();
     }
 
-    /// Returns the next pending heartbeat as (side, destination, own number, answered number). The own number is that
-    /// of its question, the answered number that of the neighbour's question; 0 for none.
+    /// Returns the next pending heartbeat as (side, destination, number of its question, answered number). The last
+    /// is the number of the neighbour's question that it answers. A number is 0 for none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

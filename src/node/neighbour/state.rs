@@ -38,9 +38,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// A node is selected that, by its last report, has selected this relay, too.
+    /// Linked: this relay has selected a node, which has selected this relay by its last report.
     Linked,
-    /// A node is selected that has not selected this relay, or does so no longer.
+    /// Pairing: this relay has selected a node that has not, or no longer, selected this relay.
     Pairing {
         since: Instant,
     },
@@ -55,15 +55,15 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time before which a returned node does not cause a request for a new view. The node on its other side may be
-    /// about to select it.
+    /// Time until which the return of a node causes no request for a new view. Meanwhile its neighbour on the far
+    /// side may select it, too.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Node whose link was dropped last for want of a quorum, until another is selected; 0 for none.
+    /// Node whose link was dropped because of a missing quorum, until another is selected; 0 for none.
     dropped: u16,
-    /// Farther node that was replaced by the selected node; 0 for none.
+    /// Node farther away that the selected node has replaced as neighbour; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
@@ -71,20 +71,21 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
-    /// Neighbour that each node on this side has selected toward this relay, nearest node first. 0 for none.
+    /// Node that each node on this side has selected as its neighbour toward this relay; 0 for none. The nearest node
+    /// is first.
     pub(super) selection: [u16; CANDIDATES as usize],
     /// Time of the last frame from a node on this side that is not selected.
     unselected_at: Option<Instant>,
-    /// Nodes that were heard recently.
+    /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
-    /// Number of consecutive reports of each node on this side that it does not receive this relay.
+    /// Number of consecutive reports that this relay is not received, for each node on this side.
     pub(super) not_received: ConsecutiveCounts,
     /// Nodes that were reported to the firmware as found since another node was linked or lost. Bit 0 is the nearest
     /// node.
     reported_found: u8,
     /// Limiter of reports about nodes on this side that have another mission.
     pub(super) mismatches: ReportLimiter,
-    /// Consecutive handshakes with each node's index that were signed with another key.
+    /// Numbers of consecutive handshakes in each node's name that were signed with another key.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
@@ -174,7 +175,8 @@ impl Neighbour {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true shortly after a node was selected again, while this causes no request for a new view.
+    /// Returns true for a short time after a lost node was selected again. It then causes no request for a new view
+    /// yet.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
@@ -203,7 +205,7 @@ impl Neighbour {
         back
     }
 
-    /// Returns true if a node is selected and has selected this relay, too, as far as it has reported.
+    /// Returns true if this relay and a node have selected each other, by the last report of that node.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }
@@ -230,8 +232,8 @@ impl Neighbour {
         self.reported_found != before
     }
 
-    /// Measures the silence of a neighbour in the same view from `now` on. Returns true if there is such a neighbour
-    /// and it is not lost.
+    /// Restarts the measurement of the silence of a neighbour in the same view at `now`. Returns true if there is
+    /// such a neighbour and it is not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -252,8 +254,8 @@ impl Neighbour {
     }
 
     /// Handles the timer of this side; returns true if the neighbour is lost from now on. It is not lost before a
-    /// silence of `dead`. `can_search` is true if other nodes can be heard here. `interval` replaces the usual interval
-    /// between questions.
+    /// silence of `dead`. `can_search` is true if other nodes can be received here. `interval` replaces the usual
+    /// interval between heartbeat requests.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -325,9 +327,8 @@ impl Neighbour {
 
     /// Returns the silence of a node after which the link to it counts as down.
     ///
-    /// Without a neighbour, and with no node heard recently, hellos are sent every `dead_after` only. A few lost
-    /// frames then make a silence that is several times as long, so the link counts as down after the longest silence
-    /// of any neighbour.
+    /// Without a neighbour, and with no node received recently, hellos are sent only every `dead_after`. A few lost
+    /// frames then cause a silence that is several times as long, so the result is the maximum duration of a lease.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
         if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
             longest_lease(settings)
@@ -349,8 +350,8 @@ impl Neighbour {
         self.unselected_at = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour, else `None`. It then sends hellos to all
-    /// candidates.
+    /// Returns the start of the search while this side has no neighbour, else `None`. During the search this side
+    /// sends hellos to all candidates.
     pub(super) const fn searching_since(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -383,8 +384,8 @@ impl Neighbour {
         }
     }
 
-    /// Decides if the node of a hello is selected as the neighbour from now on; returns true if so. The candidate
-    /// hears this relay, and has selected this relay or none.
+    /// Decides if the candidate, which has sent a hello, is selected as the neighbour; returns true if so. The
+    /// candidate receives this relay, and has selected this relay or none.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
@@ -453,8 +454,9 @@ impl Neighbour {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
-    /// Distance of the node, in relays along the chain. `downstream` is true if the node is toward Rx.
+    /// Distance of the node, in relays along the chain.
     pub(crate) distance: u16,
+    /// True if the candidate is toward Rx, false if it is toward Tx.
     pub(crate) downstream: bool,
     /// True if the candidate has selected this relay as its neighbour.
     pub(crate) pairs: bool,
@@ -462,12 +464,13 @@ pub(crate) struct Candidate {
     pub(crate) nearer: bool,
     /// True if the candidate has reported that it can be inserted between this relay and its neighbour.
     pub(crate) ready: bool,
-    /// True if the candidate connects more relays than the selected node.
+    /// True if the chain through the candidate has more relays than the one through the selected node.
     pub(crate) longer: bool,
 }
 
 impl Candidate {
-    /// Returns the number of nodes between the candidate and the nearest node, which is lost.
+    /// Returns the number of nodes between the candidate and the next node, which is lost. The wait before a
+    /// selection grows with it, because one of these nodes may still be heard.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -491,7 +494,8 @@ impl Neighbour {
         self.node == self.agreed.node()
     }
 
-    /// Records the origin of a view proposal. `Itself` means that this relay proposed and has no predecessor.
+    /// Records the origin of a view proposal: the neighbour on this side, or `Itself`. `Itself` means that this relay
+    /// proposed, and that no relay precedes it.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
@@ -506,13 +510,13 @@ impl Neighbour {
         self.agreed.agree(0);
     }
 
-    /// Records that a view proposal was refused. There is no further request until the neighbour changes.
+    /// Records that a view proposal was refused. No new view is requested until the neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that a view proposal was granted. It was forwarded to the neighbour on this side, or the chain `ends`
-    /// here.
+    /// Records that a view proposal was granted. If the chain `ends` here, this side then has no neighbour in the
+    /// view; else the proposal was forwarded to it.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
@@ -694,7 +698,7 @@ impl Neighbour {
 }
 
 impl Neighbour {
-    /// Records the number of the neighbour's heartbeat request, which a heartbeat will answer; 0 is none.
+    /// Records the number of the neighbour's heartbeat request, 0 for none; a heartbeat will answer it.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.heartbeat.reply = number;
@@ -706,8 +710,8 @@ impl Neighbour {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat as (destination, own number, answered number). The own number is that of its
-    /// question, the answered number that of the neighbour's question; 0 for none.
+    /// Returns the pending heartbeat as (destination, number of its question, answered number). The last is the
+    /// number of the neighbour's question that it answers. A number is 0 for none.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {

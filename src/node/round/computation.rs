@@ -22,16 +22,17 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 
-/// Maximum number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. The rest of a grid
-/// row, up to 24 more, may be added.
+/// Maximum number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. A call also completes
+/// the row of the search grid, up to 24 positions more.
 pub(super) const PLACES_AT_ONCE: u16 = 600;
 
-/// True if the feature `altitude` is on; `ADJUST` is the same for `adjust`. Without a feature the code of its method
-/// is unreachable.
+/// True if the feature `altitude` (joint method) is on. Without it the code of the joint method is unreachable.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
+
+/// True if the feature `adjust` (Algorithm 2) is on. Without it the code of Algorithm 2 is unreachable.
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
-/// Current pass along the chain, with its data.
+/// Current pass (message along the chain) at this relay: its kind and its data.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(SweepPass),
@@ -43,11 +44,12 @@ pub(super) enum PassKind {
 /// Position that the joint method has computed for this relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
-    /// Cross-section of the position: lateral offset and altitude.
+    /// Lateral offset and altitude of the position.
     pub(super) cross_section: CrossSection,
-    /// Largest x of this relay that leaves the relays after it their separation, m.
+    /// Largest x that this relay may take, m, so that the later relays can still keep the separation.
     pub(super) end_m: f32,
-    /// True if no relay stops short of its farthest x to help the next hop (a plain pass).
+    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of it to help the next
+    /// hop.
     pub(super) plain: bool,
 }
 
@@ -57,25 +59,25 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True after this relay has started a pass along the chain, until the start is reported.
+    /// True from the moment this relay starts a pass along the chain until that start is reported.
     pub(super) began: bool,
     /// Configured altitude and power of this relay.
     pub(super) profile: Profile,
     /// Profiles (altitude and power) of the relays of this view, for the joint method.
     pub(super) seats: Seats,
-    /// Position of this relay by the joint method in this view, once it is computed.
+    /// Position that the joint method has computed for this relay in this view; `None` before.
     pub(super) chosen: Option<JointPlace>,
-    /// Cross-section of the agreed position: lateral offset and altitude.
+    /// Lateral offset and altitude of the agreed position.
     pub(super) cross_section: CrossSection,
-    /// Neighbour toward Rx, as last reported.
+    /// Neighbour toward Rx as the end of the next hop, as last reported.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Meter of the interference at the agreed position, in a field of interference.
+    /// Meter of the interference at the agreed position; used with a known field of interference along x.
     pub(super) meter: Meter,
     /// Measurements of the interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// Upper bound of the target SIR of any chain; known at the leader only.
+    /// Upper bound of the target SIR that any chain could meet; known at the leader only.
     pub(super) bound: Option<f32>,
 }
 
@@ -152,7 +154,7 @@ impl Computation {
         self.state.renew(leads);
     }
 
-    /// Sets the agreed position to `place`, and its cross-section (lateral offset and altitude).
+    /// Sets the agreed position to `place`, and the agreed lateral offset and altitude to `cross_section`.
     #[inline(never)]
     pub(super) fn agree_on(&mut self, place: Placement, cross_section: CrossSection) {
         self.agreed_place = Some(place);
@@ -283,8 +285,8 @@ impl Computation {
         }
     }
 
-    /// Returns this relay's cross-section and power for a sweep. The cross-section is that of the joint method if
-    /// `chosen`, else the configured one.
+    /// Returns the lateral offset, altitude and power of this relay for a sweep of target SIRs. Lateral offset and
+    /// altitude are those of the joint method if `chosen` is true, else the configured ones.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -321,7 +323,7 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 pub(crate) enum LeaderTask {
     /// Idle: not the leader, not started, or finished.
     Idle,
-    /// Prediction of the chain's target SIR from the mission, for the first sweep.
+    /// Prediction of the chain's target SIR from the mission; the first sweep of targets starts there.
     Predicting(Planner),
     /// Computation of the chain by the joint method, which every relay runs.
     Solving(ChainSolver),
@@ -330,7 +332,7 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if no other algorithm follows the search for the target SIR.
         last: bool,
-        /// True for a search at the configured altitudes, because one at the joint method's has failed.
+        /// True for a search at the configured altitudes, after a search at those of the joint method failed.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.
@@ -341,7 +343,7 @@ pub(crate) enum LeaderTask {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
-    /// Completed rounds; the first pass, in which no relay moves, does not count.
+    /// Number of completed rounds. The first pass, in which no relay moves, does not count.
     done: u16,
     turn: AdjustStep,
     /// SIR of the chain's worst hop after the last round, linear.
@@ -367,7 +369,7 @@ impl Rounds {
     }
 
     /// Records the result of a pass of Algorithm 2; returns true if it was the last one. `any` is true if a relay has
-    /// moved, `sir` the chain's SIR, linear.
+    /// moved; `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -403,7 +405,8 @@ impl LeaderTask {
         *self = Self::Solving(chain);
     }
 
-    /// Starts a search for the highest target SIR. See [`Searching`](Self::Searching) for `last` and `given`.
+    /// Starts a search for the highest target SIR. `last` is true if no other algorithm follows; `given` if the
+    /// configured altitudes are used because those of the joint method failed.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -417,12 +420,12 @@ impl LeaderTask {
     }
 }
 
-/// Maximum number of hops that the prediction computes in one call of [`Computation::work`]. Each takes 16 targets.
-/// In a field of interference that is not uniform a call computes a part of one hop.
+/// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs. If the
+/// interference is a field that varies along x, a call computes only a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
 /// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A hop costs twice as
-/// much in a field of interference.
+/// much if the interference is a field (known along x) than with an interferer.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Computation {
@@ -492,7 +495,8 @@ impl Computation {
         )
     }
 
-    /// Starts the search for the highest target SIR. `ladder`, if given, contains the targets of the first sweep.
+    /// Starts the search for the highest target SIR. The first sweep tries the targets in `ladder`, if it is given.
+    /// `last` is true if no other algorithm follows.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,
@@ -502,8 +506,8 @@ impl Computation {
         self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
-    /// Starts the search for the target SIR at the configured lateral offset and altitude. Those of the joint method
-    /// are infeasible.
+    /// Starts the search for the target SIR at the configured lateral offset and altitude. It is used if no target is
+    /// feasible with those of the joint method.
     pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }

@@ -24,13 +24,13 @@ impl Computation {
         Seat::of(context.mission(), self.profile, holds)
     }
 
-    /// Returns true if this relay's altitudes or power differ from the mission's common profile.
+    /// Returns true if this relay's altitudes or power differ from the profile that all relays share.
     pub(super) fn has_own_profile(&self, context: &Context<'_>) -> bool {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Returns true if the leader's next pass has to collect the relays' profiles. Some differ from the common one,
-    /// and not all are known.
+    /// Returns true if the leader's next pass has to collect the relays' profiles (altitude and power). That is so if
+    /// some differ from the common profile, and not all are known.
     pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
@@ -133,10 +133,10 @@ impl Computation {
 /// Known profiles of the relays of the view.
 #[derive(Clone, Debug)]
 pub(super) struct Seats {
-    /// Number of relays whose profiles are known, counted from Tx. `None` before the first pass that collects them.
+    /// Number of relays, from Tx on, whose profiles are known. `None` before the first pass that collects profiles.
     pub(super) known: Option<u16>,
-    /// Altitude that each relay must hold, m, or 0, and its power, W. The power is 0 for a relay with the mission's
-    /// common profile.
+    /// Profile of each relay: the altitude that it must hold, m (0 for none), and its power, W. The power is 0 for a
+    /// relay with the mission's common profile.
     own: [[f32; 2]; MOST_SOLVED],
 }
 
@@ -188,7 +188,7 @@ impl Computation {
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues this relay's computation by the joint method while the relay has nothing else to do.
+    /// Continues this relay's computation by the joint method in advance, while nothing else is to be done.
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -269,8 +269,8 @@ impl Computation {
         });
     }
 
-    /// Starts the search for the target SIR with the lateral offsets and altitudes of the joint method. It starts
-    /// around `target`, if that is above 0.
+    /// Starts the search for the target SIR with the lateral offsets and altitudes of the joint method. The search
+    /// starts around `target`, linear, if that is above 0.
     pub(super) fn search_chosen(
         &mut self,
         context: &Context<'_>,

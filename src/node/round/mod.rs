@@ -104,7 +104,7 @@ impl Round {
         }
     }
 
-    /// Handles expired timers. Work: at most one portion of a computation.
+    /// Handles expired timers of the agreement on positions. Work: at most one portion of a computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
@@ -130,7 +130,7 @@ impl Round {
         }
     }
 
-    /// Calls [`proceed`](Self::proceed), and adds to its effects what sensing has changed since `before`.
+    /// Carries out the action `next`. The effects include changes of the sensing results since `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -221,7 +221,8 @@ impl Round {
         self.work_at = None;
     }
 
-    /// Starts a new view at time `now`. `leads` is true at the leader, `works` at a relay that computes at once.
+    /// Starts a new view at `now`. `leads` is true at the leader; `works` is true if this relay has to compute at
+    /// once.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -234,7 +235,7 @@ impl Round {
         self.computation.load(profile);
     }
 
-    /// Discards the agreed position until the next agreement.
+    /// Discards the agreed position; there is none until the next agreement.
     pub(crate) const fn discard_agreed_place(&mut self) {
         self.computation.discard_agreed_place();
     }

@@ -28,13 +28,14 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
-/// Maximum interval between sensing passes, as a multiple of [`Listen::every`].
+/// Maximum interval between passes that collect measurements, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// Number of sensing passes without a change after which the interval between them doubles.
+/// Number of sensing passes without a change of the estimate, after which their interval doubles. A sensing pass is a
+/// message along the chain that collects measurements.
 const PATIENCE: u8 = 4;
 
-/// Number of sensing passes in each `Listen::every` while the leader searches for a faulty relay.
+/// Number of passes that collect measurements per `Listen::every` in the search for a faulty relay.
 const TRIALS_A_PERIOD: u64 = 8;
 
 /// Number of consecutive measurements without interference after which the receiver may be faulty.
@@ -203,8 +204,8 @@ impl Computation {
         Action::Work
     }
 
-    /// Continues the leader's search for a faulty relay with the result of a pass. Returns true if the pass has no
-    /// other use.
+    /// Continues the leader's search for a faulty relay with the result of a pass. Returns true if the search goes
+    /// on; the pass then does not change the estimate.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -270,8 +271,9 @@ impl Computation {
 
     /// Checks this relay's receiver against the sums of the measurements of all other relays.
     ///
-    /// A relay that is excluded checks if it fits again. A relay whose measurement is absurd excludes itself; a relay
-    /// that measures nothing where the others measure much reports itself. Then its own sums are added.
+    /// An excluded relay checks if its measurements fit again. A relay with an absurd measurement excludes itself. A
+    /// relay that measures nothing where the others expect interference is marked as deaf. Unless it is newly
+    /// excluded, it adds its own sums.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,
@@ -329,18 +331,19 @@ pub(crate) struct Sensing([SensorState; SENSING as usize]);
 pub(super) struct SensorState {
     pub(super) listener: Listener,
     pub(super) estimate: NumberedEstimate,
-    /// Interference that the ground transmitter and the ground receiver have reported to this relay.
+    /// Interference that the ground transmitter has reported to this relay.
     pub(super) transmitter: Average,
+    /// Interference that the ground receiver has reported to this relay.
     pub(super) receiver: Average,
     /// True while this relay excludes its own measurements, because they do not fit the other measurements.
     pub(super) off: bool,
-    /// Node whose measurements the last sensing pass excluded; 0 for none.
+    /// Node whose measurements the last pass that collects measurements left out; 0 for none.
     pub(super) left_out: u16,
     /// Node whose measurements are known to be faulty; 0 for none.
     pub(super) named: u16,
     /// Search for the relay with faulty measurements, at the leader only.
     pub(super) trial: Trial,
-    /// Ground stations (transmitter, receiver) whose measurements do not fit, at the leader only.
+    /// Ground stations (transmitter, receiver) whose measurements do not fit; known at the leader only.
     pub(super) ends: EndsOff,
     /// True if the last measurements were inconsistent, and the faulty relay could not be identified.
     pub(super) contradicted: bool,
@@ -352,15 +355,15 @@ pub(super) struct SensorState {
     pub(super) silent_at: Placement,
     /// True if the relays of the view have received the estimate; at the leader only.
     pub(super) is_distributed: bool,
-    /// Amount of measurements, and expected error, with which the estimate was adopted.
+    /// Amount of measurements, and expected error, at the time when the present estimate was adopted.
     pub(super) known: Knowledge,
     /// Reason why the last collected measurements gave no estimate; `None` if they did.
     pub(super) unfit: Option<Unfit>,
-    /// Interval between sensing passes, as a multiple of `Listen::every`.
+    /// Interval between passes that collect measurements, as a multiple of `Listen::every`.
     pub(super) wait: u32,
-    /// Number of consecutive sensing passes that did not change the estimate.
+    /// Number of consecutive passes with measurements that did not change the estimate.
     pub(super) kept: u8,
-    /// Time of the next sensing pass; `None` while none is scheduled.
+    /// Time of the next pass that collects measurements; `None` while none is scheduled.
     pub(super) at: Option<Instant>,
 }
 
@@ -485,7 +488,8 @@ impl Sensing {
 }
 
 impl SensorState {
-    /// Returns the interference at a ground station from its `average`, with a weight that fades by `now`.
+    /// Returns the interference at a ground station, from its `average`. The weight of the value fades with its age
+    /// at `now`.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {
@@ -533,10 +537,10 @@ impl SensorState {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums of measurements received from the previous relay.
+    /// Sums of the measurements of earlier relays, as received from the previous relay.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the positions in use were agreed on with this estimate of the interference.
+    /// True if the relays hold positions that were agreed on with the present interference estimate.
     pub(super) holds: bool,
 }
 
@@ -552,7 +556,8 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Returns what has changed since `before`. A faulty node of 0 is the transmitter, one of `all` + 1 the receiver.
+    /// Returns what has changed since `before`. In the result, faulty node 0 stands for the ground transmitter, and
+    /// node `all` + 1 for the ground receiver.
     #[inline(never)] // called from several places
     pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
         let off = if self.off != before.off && self.off != 0 {

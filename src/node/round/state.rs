@@ -40,7 +40,7 @@ pub enum Phase {
     NoQuorum,
 }
 
-/// Next action of the relay after a message or a portion of work.
+/// Action that a relay takes next, after a message or a portion of work.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
     Nothing,
@@ -73,7 +73,7 @@ pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Pass of a restarted leader, or one that follows passes which this relay has missed.
+    /// Foreign pass: from a restarted leader, or one after passes that this relay has missed.
     Foreign,
 }
 
@@ -89,12 +89,12 @@ impl Arrival {
     }
 }
 
-/// Maximum number by which a late pass is behind the current one. A pass with another number, except the next one, is
-/// foreign: from a restarted leader, or after missed passes.
+/// Maximum number by which a late pass may be behind the current one. A pass farther behind, or ahead of the next
+/// one, is foreign: its leader has restarted, or this relay has missed passes.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of pass numbers: only the first pass of a leader's start or of a view has a multiple of it. By that a
-/// relay recognises a first pass, which it can join without knowing earlier ones.
+/// Divisor of pass numbers: the first pass of a view, or of a leader's start, has a multiple of it. No other pass
+/// has. A relay thus recognises a first pass, which it can join without knowing earlier ones.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.
@@ -102,8 +102,8 @@ const INCARNATION: u16 = 64;
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass along the chain was started or received in this view. In the loaded view it counts from the
-    /// relay's start.
+    /// True once a pass along the chain was started or received in this view. In the view loaded before flight,
+    /// passes since the relay's start count.
     begun: bool,
     late_messages: LateMessages,
 }
@@ -134,7 +134,7 @@ impl RoundState {
         self.phase = Phase::Waiting;
     }
 
-    /// Sets the phase to `Answered`: a pass along the chain has ended without an agreement.
+    /// Sets the phase to `Answered`: the current pass along the chain has ended without an agreement.
     pub(crate) const fn answer(&mut self) {
         self.phase = Phase::Answered;
     }
@@ -217,7 +217,8 @@ impl RoundState {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Returns true if the result of the current pass has been received since the earlier state `before`.
+    /// Returns true if the result of a pass has arrived since `before`, an earlier state of this relay. That is so if
+    /// the pass is still the current one, and is not awaited any more.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number

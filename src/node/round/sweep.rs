@@ -13,7 +13,7 @@ use crate::settings::Method;
 use crate::wire::message::{Sweep, SweepVerdict};
 
 impl Computation {
-    /// Handles a sweep of target SIRs from the previous relay.
+    /// Handles a sweep from the previous relay: a message that tries several target SIRs along the chain.
     pub(crate) fn on_sweep(&mut self, context: &Context<'_>, sweep: &Sweep) -> Action {
         let behind = Behind {
             relay: sweep.relay,
@@ -102,7 +102,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the known result of a sweep. Agrees on the position for a committed target, else continues the search.
+    /// Handles the known result of a sweep of target SIRs. If a target is committed, agrees on this relay's position
+    /// for it, else continues the search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;
@@ -177,21 +178,21 @@ pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
     /// Checksum of the received sweep, see [`fingerprint`].
     pub(crate) fingerprint: u32,
-    /// True if the relays use the lateral offsets and altitudes of the joint method.
+    /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
     pub(crate) chosen: bool,
-    /// True if a later relay of the pass has an altitude or power of its own.
+    /// True if a later relay of this sweep has an altitude or power that differs from the common profile.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x that the previous relay can take for each target (its reaches), m.
+    /// Farthest x that the previous relay can take for each target SIR (its reaches), m.
     from: PerTarget,
-    /// Farthest x that this relay can take for each target (its reaches), m.
+    /// Farthest x that this relay can take for each target SIR (its reaches), m.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
-    /// Position that this relay takes for the committed target, m along x; `None` without one.
+    /// x that this relay takes for the committed target, m; `None` without a committed target.
     place: Option<f32>,
-    /// Position that the previous relay must take, m along x; `None` for its farthest x (its reach).
+    /// x that the previous relay must take for the committed target, m; `None` for its farthest x.
     required_x_m: Option<f32>,
 }
 
@@ -215,8 +216,8 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep received from the relay `behind`; `None` for Tx or Rx. `from` are the farthest x of that relay
-    /// for each target (its reaches), m.
+    /// Starts a sweep received from the relay `behind`, which is `None` if the previous node is Tx or Rx. `from` are
+    /// the farthest x that the previous node can take for each target (its reaches), m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -228,8 +229,8 @@ impl SweepPass {
         self.required_x_m = None;
     }
 
-    /// Computes a portion of this relay's reaches, and at the last relay the verdict. Returns true when all are
-    /// computed.
+    /// Computes a portion of this relay's farthest x for each target, and at the last relay the verdict. The verdict
+    /// states which target is committed. Returns true when all are computed.
     ///
     /// Work: at most 16 targets; in a field of interference 128 of its points, or one target.
     pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
@@ -247,8 +248,8 @@ impl SweepPass {
         self.done
     }
 
-    /// Accepts a verdict, the result of a sweep, if this relay can meet the committed target. Returns true if the
-    /// verdict was accepted.
+    /// Accepts a verdict, the result of a sweep, if this relay has a position for the committed target. Returns true
+    /// if the verdict was accepted.
     pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
@@ -276,8 +277,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores this relay's position `place` for the committed target. Derives the position of the previous relay.
-    /// Revokes the commitment if that relay has no suitable position.
+    /// Stores this relay's position `place` for the committed target SIR. Derives the position that the previous
+    /// relay must take; if there is no suitable one, the commitment is revoked.
     fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
@@ -337,8 +338,8 @@ impl SweepPass {
     }
 }
 
-/// Returns a checksum of the previous relay's sweep data, to recognise duplicates. It differs if that relay has
-/// restarted with other data.
+/// Returns a checksum of the previous relay's data in a sweep, by which a duplicate is recognised. It differs if the
+/// previous relay has restarted with other data.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {

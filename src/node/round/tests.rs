@@ -20,7 +20,7 @@ use std::vec::Vec;
 
 const RELAYS: u16 = 3;
 
-/// Chain of three relays with one target per sweep, and a clock that advances by 1 ms per step.
+/// Test chain of three relays with one target SIR per sweep. Its clock advances by 1 ms per step.
 struct Line {
     members: [Member; RELAYS as usize],
     rounds: [Round; RELAYS as usize],
@@ -109,7 +109,8 @@ fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Mess
     panic!("it does not end: {all:?}");
 }
 
-/// Checks that a leader that holds its position after a sensing pass schedules no retransmission.
+/// Checks that a leader that holds its position after collecting measurements awaits no reply. It schedules no
+/// retransmission.
 #[test]
 #[cfg(feature = "sensing")]
 fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
@@ -127,7 +128,8 @@ fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
     assert_eq!(line.rounds[0].circulation.next_timeout(), None);
 }
 
-/// A relay that still searches must not forward the token, which reports the position that it finds.
+/// Checks that a relay that still searches for its position does not forward the token. The token of Algorithm 2
+/// reports the position that the relay finds.
 #[test]
 #[cfg(feature = "adjust")]
 fn a_relay_that_still_searches_hands_on_no_token() {

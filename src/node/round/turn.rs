@@ -104,7 +104,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Completes this relay's turn in Algorithm 2; `worst` is the worst SIR beyond the next hop, linear.
+    /// Completes this relay's turn in Algorithm 2. `worst` is the worst SIR of the hops from the next relay to Rx,
+    /// linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,
@@ -144,10 +145,11 @@ impl Computation {
 /// State of Algorithm 2's pass at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Action of this pass: look, move or stop. `sir` is the chain's SIR before the pass, linear.
+    /// Action of this pass of Algorithm 2: look, move or stop.
     pub(crate) turn: AdjustStep,
+    /// SIR of the chain before this pass of Algorithm 2, linear.
     pub(crate) sir: f32,
-    /// Relay before this one; `None` for Tx.
+    /// Relay before this one as the start of its hop; `None` for Tx.
     before: Option<HopEnd>,
     search: Option<LocalSearch>,
     /// True if this relay or a later relay has moved in this pass of Algorithm 2.
@@ -168,8 +170,8 @@ impl TurnPass {
         }
     }
 
-    /// Starts a search for a better position around `at`, within the altitudes `band`, m. Returns false if no relay
-    /// moves in this pass.
+    /// Starts a search for a better position around `at`, within the altitudes `band`, m. Returns false if relays do
+    /// not move in this pass of Algorithm 2.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
@@ -179,7 +181,7 @@ impl TurnPass {
 
     /// Continues the search for a better position, by `budget` evaluations and the rest of a grid row.
     ///
-    /// Ready at the end of the search, with a position if a better one was found.
+    /// The result is ready at the end of the search: the better position, or `None` if there is none.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);

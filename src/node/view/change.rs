@@ -28,13 +28,13 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum number by which one message may advance the latest known view.
+/// Maximum number of views by which one message may advance the latest known view.
 const MAX_ADVANCE: u32 = 4096;
 
 /// State of the view change (agreement on the chain's members) at one relay.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    /// State of the view proposal's message; `Outstanding` while its decision is awaited.
+    /// Circulation of the view proposal along the chain; `Outstanding` while its decision is awaited.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
@@ -47,8 +47,8 @@ pub(crate) struct ViewChange {
 }
 
 impl ViewChange {
-    /// Creates the state of the view change in a chain of `relays` relays. `initial_leader` is the node number of the
-    /// first leader.
+    /// Creates the state of the view change (agreement on members) in a chain of `relays` relays. `initial_leader` is
+    /// the node number of the first leader.
     pub(crate) const fn new(relays: u16, initial_leader: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, initial_leader),
@@ -71,8 +71,8 @@ impl ViewChange {
         self.proposed.is_none() && self.newest == self.electorate.promised()
     }
 
-    /// Restores the votes on views of a relay that was just switched on, and requests a view. `untouched` is true if
-    /// no other layer has started. Returns an error if this relay has started, or has another mission.
+    /// Restores the stored votes on views after a start, and requests a view. `untouched` is true if no other layer
+    /// has started. Returns an error if this relay has already started, or has another mission.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -100,8 +100,8 @@ impl ViewChange {
         self.newest
     }
 
-    /// Records that another relay knows `view`. This advances the latest view by at most [`MAX_ADVANCE`] numbers. One
-    /// message could otherwise use up all view numbers; a relay that was away for long repeats its view often enough.
+    /// Records that another relay knows `view`, but advances the latest view by at most [`MAX_ADVANCE`]. One message
+    /// could otherwise use up all view numbers. A relay that was away for long repeats its view often enough.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
@@ -109,7 +109,8 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members of `view` have accepted it, after an agreement in it. Earlier views are ignored.
+    /// Records that all members of `view` have accepted it: positions were agreed on in that view. Any other view
+    /// than the one that this relay accepted last is ignored.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -209,8 +210,8 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on a view proposal that `place` relays have forwarded. `None` if this relay has promised a later one.
-    /// `received` are the votes so far, `None` at the proposer.
+    /// Votes on a view proposal that `place` relays have forwarded, and returns the effects. `None` if this relay has
+    /// promised a later one. `received` are the votes so far, `None` at the proposer.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -428,8 +429,8 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Handles the timers of retransmissions and view requests. `leads` is true if there is no neighbour toward the
-    /// leader, `fresh` if nothing was received since the start.
+    /// Handles the timers of retransmissions and of view requests. `leads` is true if this relay has no neighbour
+    /// toward the leader, `fresh` if nothing was received since the start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -499,12 +500,12 @@ pub(crate) struct Proposed {
     pub(crate) rank: u16,
     /// Votes on the proposal, including that of this relay.
     pub(super) poll: Poll,
-    /// Node to which the proposal was forwarded; `None` before. With a second one, two views with the same identifier
-    /// would be possible.
+    /// Node to which the proposal was forwarded; `None` before. It is sent to no second node, because two different
+    /// views with the same identifier would then be possible.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decided view follows; before the decision the newest view known to be agreed on.
+    /// View that the decided view follows. Before the decision: newest view that is known to be agreed on.
     pub(crate) base: View,
-    /// Number of relays that the proposal has reached, once decided.
+    /// Number of relays that the proposal has reached; known once the proposal is decided.
     pub(super) reached: u16,
     /// View that the decision accepted; `None` before the decision and without a quorum.
     pub(super) accepted: Option<View>,
@@ -529,12 +530,12 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive view proposals that were refused.
     refusals: u8,
-    /// Earliest time of the next view request if anything changes; `None` except after a refusal.
+    /// Earliest time of the next view request after a refusal, if anything changes; else `None`.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
 
-/// Maximum number of doublings of the wait after consecutive refusals of a view.
+/// Maximum number of times that consecutive refusals of a view double the wait before a new request.
 const DOUBLINGS: u8 = 3;
 
 impl ViewRequest {
@@ -553,7 +554,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, repeatedly until one is accepted. After a refusal, a change shortens the wait.
+    /// Requests a view, and repeats the request until a view is accepted. After a refusal the request waits; a call
+    /// then shortens the wait, because something has changed.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);
@@ -609,8 +611,8 @@ impl ViewRequest {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer; returns true if a view request is due. `fresh` is true if nothing was received
-    /// since the start; then a request is due, too.
+    /// Handles the expired timer; returns true if a view request is due. It is due while a request is pending, or if
+    /// nothing was received since the start (`fresh`).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {
@@ -625,7 +627,7 @@ impl ViewRequest {
         true
     }
 
-    /// Returns the wait until the next view request, doubled each time, up to `probe_after`.
+    /// Returns the wait until the next view request. The wait doubles with each call, up to `probe_after`.
     fn patience(&mut self, settings: &Settings) -> Duration {
         let wait = settings.hop_time.times(8 << self.tries.min(12));
         self.tries = self.tries.saturating_add(1);

@@ -42,21 +42,22 @@ use crate::node::context::{OtherLeases, tenths};
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// Number of view proposals without a known decision that a relay remembers.
+/// Number of view proposals without a known decision for which a relay remembers its vote.
 pub(super) const VOTES: usize = 8;
 
 /// Acceptor state of one relay: its promises and votes on views, as in Paxos.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Electorate {
-    /// Newest view that is known to be agreed on. `member` is true if this relay is a member of it.
+    /// Newest view that is known to be agreed on.
     pub(super) agreed: View,
+    /// True if this relay is a member of the newest agreed view, `agreed`.
     pub(super) member: bool,
     pub(super) promised: ViewId,
     /// View that this relay has accepted last, while it is not known to be agreed on.
     pub(super) accepted: Option<Successor>,
-    /// View proposals that this relay has voted on and that may still become views, latest first.
+    /// View proposals with this relay's vote that may still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
-    /// Leader of the initial view. Of two equal halves of the initial chain, the one with this node decides.
+    /// Leader of the initial view, which breaks a tie: of two equal halves, the one with this node decides.
     pub(super) initial_leader: u16,
 }
 
@@ -87,9 +88,9 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on the view proposal `proposal` and returns the votes including this one. `None` if a later proposal, or
-    /// this one, was promised before. `received` are the votes so far (`None` at the proposer), `other_leases` the
-    /// remaining leases of other relays.
+    /// Votes on the view proposal `proposal`, and returns the votes including this one. `None` if this relay has
+    /// promised `proposal`, or a later one, before. `received` are the votes so far (`None` at the proposer),
+    /// `other_leases` the remaining leases of other relays.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -137,7 +138,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if this relay's vote alone would be no quorum for `proposal` of `node`. Casts no vote.
+    /// Returns true if the vote of `node`, this relay, would alone be no quorum for `proposal`. No vote is cast.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -150,8 +151,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view proposal `proposal`. If the list is full, its earlier half is kept: once relays
-    /// have accepted a view, later proposals that reach them decide on that view again.
+    /// Records the vote on the view proposal `proposal`. If the list is full, the older half of the votes is kept and
+    /// a newer one is dropped: later proposals decide again on a view that relays have accepted.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -179,8 +180,8 @@ impl Electorate {
         self.voted = kept;
     }
 
-    /// Accepts the decision on `proposal`, unless a later one was promised. Returns true if it was accepted. `view` is the decided
-    /// view, which follows `base`, or `None` for a refusal.
+    /// Accepts the decision on `proposal`, unless a later one was promised; returns true if accepted. `view` is the
+    /// decided view, which follows `base`; `None` for a refusal.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -212,16 +213,16 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, tenths of a second, at most `most`. An unknown time counts as
-/// `most`.
+/// Returns the time until positions of the next view may be used, in tenths of a second. It is at most `most`; an
+/// unknown time counts as `most`.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
     poll.earlier_lease_left.max(lease_left).min(most)
 }
 
-/// Returns the decision on the view proposal `proposal`; `None` without a quorum. It has reached `relays` of the
-/// mission's `all` relays, with the votes `poll`.
+/// Returns the decision on the view proposal `proposal`; `None` without a quorum. The proposal has reached `relays`
+/// of the mission's `all` relays, and collected the votes `poll`.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,
@@ -241,7 +242,8 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
-    /// Disables the quorum rule, for the model check. Every decision counts as agreed on, and every relay votes.
+    /// Disables the quorum rule, to test the model check. Every decision then counts as agreed on, and every relay
+    /// votes.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;

@@ -38,7 +38,8 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
-/// Checks every order of events in a chain of `relays` relays. Cuts, proposals and reboots are limited in number.
+/// Checks the view change for every order of events in a chain of `relays` relays. The numbers of cuts, proposals and
+/// reboots are limited.
 ///
 /// `heals` also checks in every state that a healed chain agrees on a view.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
@@ -59,7 +60,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Searches more events than the usual test; takes some minutes.
+/// Checks more events than the usual model check; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {
@@ -70,7 +71,8 @@ fn chains_of_three_and_four_in_more_states() {
     all_holds(4, (2, 3, 1), false);
 }
 
-/// Shows that the model check finds faults: if all relays present vote, two views are in force at once.
+/// Checks that the model check finds a fault of the quorum rule. If the votes of all present relays count, two views
+/// are in force at once.
 #[test]
 fn the_check_finds_the_fault_of_counting_all_votes() {
     for relays in [3, 4] {
@@ -83,7 +85,7 @@ fn the_check_finds_the_fault_of_counting_all_votes() {
     }
 }
 
-/// Shows that relays must store their votes: a relay that loses them breaks its promises.
+/// Checks that the model check finds a missing record: a relay without its votes breaks its promises.
 #[test]
 fn the_check_finds_the_fault_of_a_lost_record() {
     let check = Check {
@@ -127,7 +129,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
-    /// Last accepted view, this relay's rank in it, and its number of members.
+    /// Last accepted view, this relay's rank in it, and the view's number of members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -162,7 +164,7 @@ impl core::hash::Hash for RelayState {
 pub(super) struct DecidedView {
     pub(super) view: SizedView,
     pub(super) follows: ViewId,
-    /// Relays that voted on the proposal, bit 0 for the first relay.
+    /// Relays that voted on the proposal, as a bit mask: bit 0 is the first relay.
     pub(super) members: u8,
 }
 
@@ -173,8 +175,9 @@ pub(super) struct Chain {
     pub(super) parts: Vec<u8>,
     /// Frames in the air, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// List of all views that were ever decided on; `agreed` lists all that were ever agreed on.
+    /// List of all views that were ever decided on.
     pub(super) decided: Vec<DecidedView>,
+    /// List of all views that were ever agreed on.
     pub(super) agreed: Vec<SizedView>,
     pub(super) cuts: u8,
     pub(super) proposals: u8,
@@ -512,7 +515,7 @@ impl Check {
 }
 
 impl Check {
-    /// Returns true if every agreed view follows an agreed view, and no two follow the same one.
+    /// Returns true if the agreed views are one sequence: each follows another, no two follow the same one.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {
             let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
@@ -537,7 +540,7 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if every relay's agreed view was agreed on, and has no more members than its size.
+    /// Returns true if each relay's agreed view is truly agreed on, with no more members than its size.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
             || chain.relays.iter().all(|unit| {
@@ -553,7 +556,7 @@ impl Check {
     }
 }
 
-/// Maximum number of proposals that a healed chain needs.
+/// Maximum number of proposals that a healed chain may need to agree on a view.
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {
@@ -576,7 +579,7 @@ impl Check {
     }
 
     /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. They must
-    /// also be a quorum of all views decided on since.
+    /// also be a quorum of every view decided on since then.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.relays.len()).filter(known);
@@ -593,9 +596,9 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals until the relays in the bit mask `there` are in one view. It is a view of them
-    /// all, and they know it to be agreed on. Links between these relays are restored, all others are cut. Without a
-    /// quorum the number is 0; `None` if [`MAX_PROPOSALS`] are not enough.
+    /// Returns the number of proposals until the relays in the bit mask `there` agree on one view. It is a view of
+    /// all these relays. Links between them are restored, all others are cut. Without a quorum the number is 0;
+    /// `None` if [`MAX_PROPOSALS`] are not enough.
     pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {
@@ -630,7 +633,7 @@ impl Check {
         None
     }
 
-    /// Returns true if every set of relays that is a quorum comes to one view once it is healed.
+    /// Returns true if every set of relays that is a quorum agrees on one view once its links are restored.
     pub(super) fn is_alive(&self, chain: &Chain) -> bool {
         let all = ((1_u16 << chain.relays.len()) - 1) as u8;
         (1..=all).all(|there| {
@@ -641,7 +644,7 @@ impl Check {
     }
 }
 
-/// Safety property that the model check verifies, in words.
+/// Safety property that the model check verifies: each agreed view follows the one before.
 pub(super) const ONE_CHAIN: &str = "agreed views follow each other one by one";
 
 impl Model for Check {

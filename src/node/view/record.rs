@@ -33,9 +33,9 @@ pub struct ViewRecord {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RecordError {
-    /// The record belongs to a relay that was loaded with another mission.
+    /// Record error: the record belongs to a relay that was loaded with another mission.
     Base,
-    /// The relay has already started.
+    /// Record error: the relay has already started, so that its votes cannot be restored.
     Begun,
 }
 
@@ -52,8 +52,8 @@ impl core::fmt::Display for RecordError {
 
 impl core::error::Error for RecordError {}
 
-/// Writer of numbers of one, two or four bytes, least significant byte first. Two functions that are called for every
-/// number need a third of the flash of an iterator over all bytes.
+/// Writer of numbers of one, two or four bytes, least significant byte first. Its two functions need a third of the
+/// flash that an iterator over all bytes would need.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -122,8 +122,8 @@ impl ViewRecord {
         }
     }
 
-    /// Returns the votes on views (acceptor state), if the record fits the mission. Its digest must be `base`, and it
-    /// has `relays` relays. `initial_leader` is the mission's leader.
+    /// Returns the votes on views (acceptor state) in the record, if it is of this mission, else `None`. Its digest
+    /// must then be `base`, and its number of relays `relays`. `initial_leader` is the mission's leader.
     pub(super) fn electorate(
         &self,
         base: u16,
@@ -191,7 +191,7 @@ impl ViewRecord {
     }
 }
 
-/// Returns the encoding for a relay that has accepted no successor of the view `agreed`.
+/// Returns the encoding of no successor: the relay has accepted no view that follows `agreed`.
 const fn nothing_after(agreed: View) -> Successor {
     Successor {
         proposal: ViewId::LOADED,
@@ -240,7 +240,7 @@ mod tests {
         ViewId::from_bits(number << 10 | node)
     }
 
-    /// Returns the state of a relay that has accepted a view and voted on two later proposals.
+    /// Returns the voting state of a relay that has accepted a view and voted on two later proposals.
     fn busy() -> Electorate {
         let mut electorate = Electorate::new(3, 1);
         let first = view(1, 1);
@@ -287,7 +287,7 @@ mod tests {
         assert_eq!(ViewRecord::from_bytes(&[0; ViewRecord::LENGTH]), None);
     }
 
-    /// Tries every byte with every other value: a record that is accepted encodes to the same bytes.
+    /// Checks that each accepted record encodes to the same bytes. Every byte is tried with every other value.
     #[test]
     fn impossible_votes_are_not_read() {
         let mut taken = 0;
@@ -310,7 +310,7 @@ mod tests {
         }
     }
 
-    /// Returns the record of a new relay of three.
+    /// Returns the record of a relay that has just started, in a chain of three.
     fn fresh() -> ViewRecord {
         ViewRecord::new(digest(relay(3).mission()), Electorate::new(3, 1))
     }

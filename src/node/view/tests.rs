@@ -57,14 +57,14 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Removes the next relay, so that this relay decides an outstanding view proposal.
+    /// Ends the chain at this relay, so that it decides an outstanding view proposal.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
         self.view.decide(&context)
     }
 
-    /// Lets the relay lead: no relay precedes it, and its request timer expires.
+    /// Makes this relay the leader: no relay precedes it, and its request timer expires.
     pub(super) fn leads(&mut self) -> Effects {
         self.view.request.start(self.now);
         self.now = self.view.request.next_timeout().unwrap();
@@ -191,8 +191,8 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// A proposal of the same view with another mission is another proposal. Its leader has restarted meanwhile and has
-/// received another mission.
+/// Checks that a proposal of the same view with another mission counts as another proposal. Its leader has restarted
+/// meanwhile and has received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -303,7 +303,8 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Regression test: relays near the leader that did not know the newest view were refused for good.
+/// Checks that a refusal names the agreed view. Otherwise relays near the leader that do not know the newest view are
+/// refused for good.
 #[test]
 fn a_refusal_names_the_agreed_view() {
     let view = View {
@@ -453,10 +454,10 @@ fn a_forwarded_proposal_without_a_next_relay_is_abandoned() {
     assert!(relay.handle(&later).event.is_some());
 }
 
-/// Regression test: a relay forwards a view proposal to one node only.
+/// Checks that a relay forwards a view proposal to one node only.
 ///
-/// When only relay 1 had lost relay 2, views of different members had the same identifier: one of relays 1 to 3, one
-/// of 1 and 4.
+/// Otherwise, if only relay 1 has lost relay 2, two views have the same identifier: one with relays 1 to 3 as
+/// members, one with relays 1 and 4.
 #[test]
 fn a_proposal_is_forwarded_to_only_one_node() {
     let mut relay = Relay::new(1);
@@ -510,7 +511,7 @@ fn a_leader_proposes_later_views_one_at_a_time() {
     }
 }
 
-/// Checks that a relay alone for hours does not use up a view number every five seconds.
+/// Checks that a relay that is alone for hours does not use up a view number every five seconds.
 #[test]
 fn a_refused_lone_leader_proposes_only_with_a_quorum() {
     let mut relay = Relay::second();

@@ -49,7 +49,8 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the decision on a proposal that visits `nodes`; the last `accept` of them receive it.
+    /// Returns the decision on a proposal that visits `nodes` in order. The last `accept` of these nodes receive the
+    /// decision.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -79,8 +80,8 @@ const fn granted(id: ViewId, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks all parts of chains of up to seven relays: a part decides on a view if it is a quorum. That is more than
-/// half of the relays, or half with the initial leader.
+/// Checks for all parts of chains of up to seven relays that a part decides only if it is a quorum. A quorum is more
+/// than half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_or_half_with_the_initial_leader_decide() {
     for relays in 1..=7_u16 {
@@ -259,7 +260,8 @@ fn the_next_proposal_spreads_the_agreed_view() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// A relay that votes before one that knows the newer view votes in the older view. Its vote does not count.
+/// Checks that the vote of a relay that does not know the newest view does not count. It votes before a relay that
+/// knows that view, and thus in the older view.
 #[test]
 fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);
@@ -300,8 +302,8 @@ fn only_members_may_be_relied_on() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// A refused proposal needs no room in the list of votes. The list holds a limited number of proposals without a
-/// known decision.
+/// Checks that a refused proposal needs no room in the list of votes. The list holds a limited number of proposals
+/// without a known decision.
 #[test]
 fn votes_are_kept_until_their_result_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -340,7 +342,7 @@ fn votes_are_kept_until_their_result_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Shows that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
+/// Checks that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
 /// view, forgets it, and votes in the initial view.
 #[test]
 fn a_relay_without_its_record_may_decide_a_second_view() {
