@@ -46,12 +46,12 @@ fn first(text: &str) -> String {
 
 /// Prints the mistake `line` to standard error, and returns exit status 2.
 pub fn refuse(line: &str) -> ExitCode {
-    complain(line);
+    print_line(line);
     ExitCode::from(2)
 }
 
 /// Writes one line to standard error. Unlike `eprintln!` it does not panic on a closed stream.
-pub fn complain(line: &str) {
+pub fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 

@@ -86,7 +86,7 @@ fn main() -> std::process::ExitCode {
     match relay::fly(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Refusal { line, is_final }) => {
-            uav_relay_linux::command::complain(&line);
+            uav_relay_linux::command::print_line(&line);
             if is_final {
                 // Status 2, as for wrong options: the systemd unit does not restart the program.
                 ExitCode::from(2)

@@ -66,7 +66,7 @@ fn main() -> std::process::ExitCode {
     match station::stand(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(uploading::Fault { line, status }) => {
-            uav_relay_linux::command::complain(&line);
+            uav_relay_linux::command::print_line(&line);
             ExitCode::from(status)
         }
     }

@@ -42,7 +42,7 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            complain(&failure.line);
+            print_line(&failure.line);
             ExitCode::from(failure.status)
         }
     }
@@ -56,7 +56,7 @@ pub fn usage(error: &clap::Error) -> ExitCode {
         print(&error.to_string());
         return ExitCode::SUCCESS;
     }
-    complain(&wrong(error));
+    print_line(&wrong(error));
     ExitCode::from(2)
 }
 
@@ -90,8 +90,8 @@ fn wrong(error: &clap::Error) -> String {
     wrong.trim_start_matches("error: ").to_owned()
 }
 
-/// Prints the error message `line` on standard error; a closed pipe is ignored.
-pub fn complain(line: &str) {
+/// Prints the line `line` on standard error; a closed pipe is ignored.
+pub fn print_line(line: &str) {
     _ = writeln!(std::io::stderr(), "{line}");
 }
 
@@ -100,9 +100,9 @@ pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// Prints the message `line` on standard error; a closed pipe is ignored.
-pub fn print_line(line: &str) {
-    _ = writeln!(std::io::stderr(), "{line}");
+/// Returns a given option with its value, as the user typed it. `None` if the option is not given.
+pub fn given_option(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
+    value.map(|value| format!("{option} {value}"))
 }
 
 /// Formats a report as one JSON object and a line break.

@@ -490,7 +490,7 @@ const HALF: Duration = Duration::from_millis(4_000);
 
 /// Minimum number of messages in each half of the window for the minimum delay.
 ///
-/// So a gap, and the late messages that arrive at once after it, do not increase the minimum.
+/// With fewer, a gap and the late messages that arrive at once after it could increase the minimum.
 const LEAST: u8 = 8;
 
 /// Assumed maximum drift between the clocks of relay and autopilot, as an exponent: one part in 2^10.

@@ -4,8 +4,7 @@ use clap::{Args, ValueEnum};
 use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::{Interference, Scenario};
 
-use super::options::given_option;
-use crate::command::{Failure, number, whole};
+use crate::command::{Failure, given_option, number, whole};
 use crate::simulator::route::DataLink;
 use crate::simulator::traffic::TrafficSpec;
 

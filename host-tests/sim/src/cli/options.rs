@@ -10,7 +10,7 @@ use uav_relay_scenario::scene::Scene;
 
 use super::data::Data;
 use super::hostile::Hostile;
-use crate::command::{Failure, file, number, whole};
+use crate::command::{Failure, file, given_option, number, whole};
 use crate::simulator::setup::Setup;
 use crate::simulator::true_interference::TrueInterference;
 
@@ -175,10 +175,6 @@ fn grid(text: &str) -> Result<uav_relay::Local, String> {
         columns: side(columns)?,
         rows: side(rows)?,
     })
-}
-
-pub(super) fn given_option(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
-    value.map(|value| format!("{option} {value}"))
 }
 
 /// Command-line options for measurements.

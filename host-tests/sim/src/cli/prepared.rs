@@ -280,13 +280,13 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         return Err(Failure::input(line));
     }
     if let Some(one) = mission::hypothetical(scenario) {
-        command::complain(&format!(
+        command::print_line(&format!(
             "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m replaces all of them, and the SIRs are \
              computed with it; `cargo plan` computes the SIRs with all",
             one.power_w, one.x_m, one.y_m
         ));
         if uploads {
-            command::complain(
+            command::print_line(
                 "note: an upload changes this interferer; all other values stay as they are",
             );
         }

@@ -99,7 +99,7 @@ impl Progress {
         self.bar.set_message(format!("(last: {name})"));
         self.bar.inc(1);
         if !self.is_terminal {
-            command::complain(&format!("{made} of {} figures: {name}", self.figures));
+            command::print_line(&format!("{made} of {} figures: {name}", self.figures));
         }
     }
 }

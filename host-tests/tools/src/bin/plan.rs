@@ -531,7 +531,7 @@ fn write_map(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), 
     let map = Map::new(scenario, plan)
         .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
     for number in &map.left_out {
-        command::complain(&format!(
+        command::print_line(&format!(
             "note: interferer {number} is more than 5 km from the line, and is left out of the map"
         ));
     }

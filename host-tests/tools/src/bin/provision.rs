@@ -80,7 +80,7 @@ fn run(options: &Options) -> Result<String, String> {
         }
     };
     if secret.is_none() {
-        command::complain(
+        command::print_line(
             "no --key-file: frames are not signed, and anybody in range can forge them",
         );
     }
@@ -252,7 +252,7 @@ impl<'a> Asked<'a> {
             if flown.stand_in && !self.options.stand_in {
                 return Err(format!("{line}; --stand-in writes the files nevertheless"));
             }
-            command::complain(&line);
+            command::print_line(&line);
         }
         Ok(Some(flown))
     }
@@ -459,10 +459,10 @@ fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
 
 /// Tells the user which options override the scenario's section `network`.
 ///
-/// So nobody relies on a value in the file that is not used.
+/// Users must not rely on a value of the file that is not used.
 fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
     let say = |option: &str, key: &str| {
-        command::complain(&format!("{option} replaces network.{key} of {name}"));
+        command::print_line(&format!("{option} replaces network.{key} of {name}"));
     };
     if let (Some(given), Some(own)) = (options.probe_after_ms, section.probe_after_ms)
         && given != own
@@ -513,7 +513,7 @@ fn chosen_method(
                     "{name}: network.method = \"{text}\": must be \"{said}\", the method of its [plan]; or compute the plan again"
                 ));
             }
-            command::complain(&format!(
+            command::print_line(&format!(
                 "--method {said} replaces network.method = \"{text}\" of {name}"
             ));
             Ok(method)

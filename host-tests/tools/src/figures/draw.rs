@@ -27,7 +27,7 @@ const PEN: u32 = 4;
 const APART: f64 = 105.0;
 /// Distance of a curve's first marker from its beginning, picture units, for each colour number.
 ///
-/// So the markers of curves that coincide are side by side.
+/// The markers of curves that coincide are then side by side.
 const APART_BY_HUE: u8 = 25;
 
 /// Error: the chart cannot be drawn, with the reason.

@@ -244,7 +244,7 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
 
 /// Proves that no relay image can panic: links each with a panic handler that cannot be linked.
 ///
-/// As a control, it checks that an image with a deliberate panic does not link.
+/// The control is an image with a deliberate panic, which must not link.
 pub(crate) fn no_panic() -> Result<(), String> {
     only_finished_futures_panic()?;
     let link = |example: &str, features: &[&str], flags: &[&str]| {
