@@ -322,6 +322,8 @@ impl<'a> Link<'a> {
         match self.onward()? {
             Onward::Rx(hop) => hop.required_position(target, from_m, place),
             Onward::Tx(hop) => {
+                // Without the feature `field` the compiler removes this branch here.
+                self.mission.field()?;
                 let heard_m = hop.heard_up_to(target, place);
                 let Some(behind) = self.behind else {
                     let is_met = heard_m >= self.mission.config().distance_m;
