@@ -79,7 +79,7 @@
 //! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and holds its position until that one
 //!   is flown or is replaced as a neighbour.
 //! - A rebooted relay does not know its earlier neighbours: it has to start with those of the mission, and silent ones have to be
-//!   replaced by `link`, so that rule 9 applies.
+//!   replaced by `set_neighbour`, so that rule 9 applies.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
 
 mod association;
@@ -104,7 +104,7 @@ use owner::FenceOwner;
 
 /// Guard of one relay: computes safe setpoints on the way to the agreed position.
 ///
-/// Call [`commit`](Self::commit), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`link`](Self::link) with new inputs.
+/// Call [`commit`](Self::commit), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`set_neighbour`](Self::set_neighbour) with new inputs.
 /// After each call [`steer`](Self::steer), fly to its result, then send the messages of [`poll`](Self::poll). Every call takes at
 /// most some hundred operations and two square roots, independent of the length of the chain.
 #[derive(Clone, Copy, Debug)]
@@ -255,7 +255,7 @@ impl Guard {
     ///
     /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget), or until
     /// that neighbour, or a node between the two, is linked and has sent a message.
-    pub fn link(&mut self, side: Side, neighbour: Option<u16>) {
+    pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
             Side::Upstream if self.follower.association.node != node => {

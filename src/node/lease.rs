@@ -16,6 +16,18 @@
 //! | any | completion received | forward it; at the leader: extend the lease from the start of this renewal, schedule the next one |
 //! | any | lease expired | request a new view; the setpoint stays |
 //!
+//! # Expiry
+//! The expiry stops no motion: the relay keeps its setpoint and requests a new view.
+//!
+//! | state | after the expiry | code |
+//! | --- | --- | --- |
+//! | setpoint, guard, fences | unchanged | `Node::steer` |
+//! | `Relay::lease` | `None` | [`Lease::until`] |
+//! | `Event::LeaseLapsed` | raised once per view | `LayerEvent::Lapsed` in `Node::apply` |
+//! | view | requested by hellos to the neighbour toward the leader | `Effects::view_needed`, `LayerEvent::RequestView` |
+//! | links to the neighbours | kept until `NoQuorumTimer` expires, which runs while there is no quorum | `Node::drop_links_if_expired` |
+//! | `Settings::without_quorum` | applies if the new view has no quorum, not at the expiry | `Node::wanted_place` |
+//!
 //! # Safety
 //! No relay uses an old agreement once positions of a later view may be used. Suppose that every member took part in renewal n
 //! and that relay r forwarded it at time t: r relies on the agreement until t + span. Every other member reports the completion

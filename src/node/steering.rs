@@ -76,9 +76,9 @@ impl Steering {
     }
 
     /// Sets the neighbour at `side`; `None` at the end of the chain.
-    pub(crate) fn link(&mut self, side: Side, neighbour: Option<u16>) {
+    pub(crate) fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         if let Some(guard) = self.guard() {
-            guard.link(side, neighbour);
+            guard.set_neighbour(side, neighbour);
         }
     }
 

@@ -119,7 +119,7 @@ impl Drone {
             .into_iter()
             .zip(self.links)
         {
-            guard.link(side, link.map(node));
+            guard.set_neighbour(side, link.map(node));
         }
         guard.control(instant(now_s), !self.taken);
         self.guard = Some(guard);

@@ -68,7 +68,7 @@ impl World {
         let drone = &mut self.drones[k];
         drone.links[usize::from(side == Side::Downstream)] = neighbour;
         if let Some(guard) = &mut drone.guard {
-            guard.link(side, neighbour.map(node));
+            guard.set_neighbour(side, neighbour.map(node));
         }
     }
 

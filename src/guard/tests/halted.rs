@@ -340,7 +340,7 @@ fn a_relay_moves_away_from_a_silent_one_before_across() {
     one.is_at_place(high);
     one.is_at_place(high);
     assert_eq!(one.guard.setpoint(), Some(high));
-    one.guard.link(Side::Upstream, None);
+    one.guard.set_neighbour(Side::Upstream, None);
     one.is_at_place(high);
     assert_eq!(one.guard.setpoint(), Some(aside(110.0, 0.0, 80.0)));
     assert_eq!(
@@ -378,8 +378,8 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
         };
         one.receive(side, node, told);
         assert_eq!(one.guard.hold_reason(side), Some(HoldReason::Order));
-        one.guard.link(side, None);
-        one.guard.link(side.other(), None);
+        one.guard.set_neighbour(side, None);
+        one.guard.set_neighbour(side.other(), None);
         for _ in 0..60 {
             one.is_at(100.0);
             one.guard.remind();
@@ -515,15 +515,15 @@ fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
         let neighbours = if k == 3 { [Some(2), None] } else { neighbours };
         Guard::new(config, neighbours, 7 + u32::from(k), Instant::ZERO)
     });
-    guards[1].link(Side::Upstream, None);
+    guards[1].set_neighbour(Side::Upstream, None);
     guards[1].forget(Side::Upstream, false);
     let mut fences = [0.0_f32; 2];
     for second in 1..20 {
         let now = Instant::from_millis(1_000 * second);
         let first = usize::from(second < 10);
         if second == 10 {
-            guards[0].link(Side::Downstream, Some(2));
-            guards[1].link(Side::Upstream, Some(1));
+            guards[0].set_neighbour(Side::Downstream, Some(2));
+            guards[1].set_neighbour(Side::Upstream, Some(1));
         }
         for k in first..3 {
             guards[k].commit(places[k]);

@@ -175,7 +175,7 @@ fn a_lost_relay_is_kept_clear_of() {
         one.receive(Side::Downstream, 2, lost.sent(Side::Upstream));
     }
     assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
-    one.guard.link(Side::Downstream, None);
+    one.guard.set_neighbour(Side::Downstream, None);
     assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
     assert_eq!(
         one.guard.hold_reason(Side::Downstream),
@@ -187,7 +187,7 @@ fn a_lost_relay_is_kept_clear_of() {
     lost.guard.commit(at(50.0));
     let least = lost.setpoint();
     assert!(least >= 300.0 - 200.0);
-    lost.guard.link(Side::Upstream, None);
+    lost.guard.set_neighbour(Side::Upstream, None);
     assert_eq!(lost.setpoint().to_bits(), least.to_bits());
     lost.guard.forget(Side::Upstream, false);
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
@@ -198,7 +198,7 @@ fn a_lost_relay_is_kept_clear_of() {
 fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
     let mut next = One::new([None, Some(3)], 100.0, 100.0);
-    one.guard.link(Side::Upstream, None);
+    one.guard.set_neighbour(Side::Upstream, None);
     one.guard.forget(Side::Upstream, true);
     one.guard.commit(at(200.0));
     assert_eq!(one.setpoint().to_bits(), 300.0_f32.to_bits());
@@ -211,7 +211,7 @@ fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     });
     assert_eq!(one.guard.steer(one.now), Some(at(310.0)));
     one.is_at(310.0);
-    one.guard.link(Side::Upstream, Some(1));
+    one.guard.set_neighbour(Side::Upstream, Some(1));
     for _ in 0..6 {
         one.receive(Side::Upstream, 1, next.sent(Side::Downstream));
         next.receive(Side::Downstream, 3, one.sent(Side::Upstream));
@@ -223,9 +223,9 @@ fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
 #[test]
 fn a_relay_never_received_may_be_anywhere() {
     let mut guard = Guard::new(config(), [Some(1), Some(3)], 7, Instant::ZERO);
-    guard.link(Side::Upstream, None);
-    guard.link(Side::Downstream, Some(4));
-    guard.link(Side::Downstream, None);
+    guard.set_neighbour(Side::Upstream, None);
+    guard.set_neighbour(Side::Downstream, Some(4));
+    guard.set_neighbour(Side::Downstream, None);
     let now = Instant::from_millis(1000);
     guard.position(now, at(500.0));
     for target in [100.0, 900.0] {

@@ -182,7 +182,7 @@ fn a_relay_that_fell_silent_after_its_start_is_lost() {
     row.all[1].guard = Guard::new(config(), [Some(1), Some(3)], 99, now);
     row.all[1].guard.position(now, at(200.0));
     row.talk();
-    row.all[0].guard.link(Side::Downstream, None);
+    row.all[0].guard.set_neighbour(Side::Downstream, None);
     row.all[0].guard.commit(at(195.0));
     assert!(row.setpoint(0) < Some(195.0));
     let reason = row.all[0].guard.hold_reason(Side::Downstream);

@@ -253,7 +253,7 @@ impl Node {
                 .update
                 .record_hello_number(side, hello.offer_number, now);
             layers.update.reset_offers(side);
-            self.steering.link(side, Some(from));
+            self.steering.set_neighbour(side, Some(from));
             if tells {
                 self.raise_node_event(NodeEvent::Back, side, from);
             }

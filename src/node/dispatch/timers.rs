@@ -84,7 +84,7 @@ impl Node {
         let lost = neighbour.handle_timeout(now, settings, dead, searches, asking);
         let ends = neighbour.has_no_peer() && !ended;
         self.steering
-            .link(side, Some(neighbour.node()).filter(|node| *node != 0));
+            .set_neighbour(side, Some(neighbour.node()).filter(|node| *node != 0));
         if lost {
             self.raise_node_event(NodeEvent::Lost, side, node);
         }

@@ -181,7 +181,7 @@ impl Computation {
             return Action::Stale;
         };
         if holds {
-            self.state.settle();
+            self.state.hold();
         } else {
             self.state.answer();
         }

@@ -139,7 +139,7 @@ impl RoundState {
         self.phase = Phase::Answered;
     }
 
-    pub(crate) const fn settle(&mut self) {
+    pub(crate) const fn hold(&mut self) {
         self.phase = Phase::Holding;
     }
 

@@ -95,7 +95,7 @@ impl Computation {
         let link = self.link(context, is_chosen);
         if let PassKind::Sweep(sweep_pass) = &mut self.pass
             && self.state.is_awaited(answer.number)
-            && sweep_pass.apply_verdict(link, answer)
+            && sweep_pass.apply_sweep_verdict(link, answer)
         {
             return self.conclude_sweep(context);
         }
@@ -152,7 +152,7 @@ impl Computation {
 
     /// Completes the agreement on a target SIR, unless another algorithm of the leader follows.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
-        self.state.settle();
+        self.state.hold();
         if let LeaderTask::Searching { last: false, .. } = self.task {
             match context.settings().method {
                 Method::Adjust(adjust) if ADJUST => {
@@ -243,14 +243,14 @@ impl SweepPass {
                 .committed()
                 .zip(self.committed_before())
                 .and_then(|((target, reach), from_m)| Some(link.ending(target, from_m, reach)?.1));
-            self.settle(&link, place);
+            self.store_position(&link, place);
         }
         self.done
     }
 
     /// Accepts a verdict, the result of a sweep, if this relay has a position for the committed target. Returns true
     /// if the verdict was accepted.
-    pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
+    pub(crate) fn apply_sweep_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
         let met = |target: u8| {
@@ -273,13 +273,13 @@ impl SweepPass {
         self.verdict = verdict.clone();
         self.own = answer.own;
         let place = self.committed().and_then(position);
-        self.settle(&link, place);
+        self.store_position(&link, place);
         true
     }
 
     /// Stores this relay's position `place` for the committed target SIR. Derives the position that the previous
     /// relay must take; if there is no suitable one, the commitment is revoked.
-    fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
+    fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
         }

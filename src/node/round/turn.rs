@@ -128,7 +128,7 @@ impl Computation {
             self.target = Some(turn_pass.sir);
         }
         if stop {
-            self.state.settle();
+            self.state.hold();
         } else {
             self.state.answer();
         }

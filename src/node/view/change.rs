@@ -281,7 +281,7 @@ impl ViewChange {
             accepted,
             usable_in,
         };
-        self.apply_verdict(context, verdict)
+        self.apply_view_verdict(context, verdict)
     }
 
     /// Schedules another view proposal after a refusal, because unreachable relays may return.
@@ -307,13 +307,13 @@ impl ViewChange {
                     accepted: decision.accepted,
                     usable_in: decision.usable_in,
                 };
-                self.apply_verdict(context, verdict)
+                self.apply_view_verdict(context, verdict)
             }
             _ => Effects::STALE,
         }
     }
 
-    fn apply_verdict(&mut self, context: &Context<'_>, verdict: ViewVerdict) -> Effects {
+    fn apply_view_verdict(&mut self, context: &Context<'_>, verdict: ViewVerdict) -> Effects {
         let ViewVerdict {
             reached,
             base,
