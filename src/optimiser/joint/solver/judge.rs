@@ -16,11 +16,11 @@ use core::task::Poll;
 /// Precision, in ln(SIR), of the search for the highest target that a chain meets after an ascent.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound on a chain's SIR that its first and last hop set, in ln(SIR). A chain that meets the
-/// bound less this tolerance ends the search for better ones.
+/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). A chain within
+/// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Distance by which an ascent's first target limit is above the chain's upper bound, in ln(SIR).
+/// Margin of an ascent's first target limit above the upper bound of the chain's SIR, in ln(SIR).
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -67,7 +67,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records the result of one target, and selects the next work.
+    /// Records the result of one target, and selects the next piece of work.
     ///
     /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
     /// position. `Some(true)`: it is met only if some relays stay short of it.
@@ -177,8 +177,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target of a chain by the rules of the messages. Hops are
-    /// computed as the relays do from their messages.
+    /// Returns the work that searches for the highest target with hops as in the relays' messages. The relays will
+    /// compute the same hops from the messages that they exchange.
     ///
     /// The chain results from an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in
     /// ln(SIR). Relays may stay short of their farthest position.
@@ -244,8 +244,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays of a chain that is polished at the end, by trial moves of single relays. Chains with
-/// fixed altitudes are always polished, since their path has kinks.
+/// Maximum number of relays of a chain that is improved at the end by trial moves of single relays. Chains in which
+/// some relays have a fixed altitude are always improved so, since their path has kinks.
 const POLISHED: u16 = 5;
 
 /// Number of times that the final polish of a chain halves the moves of its relays.
@@ -255,7 +255,7 @@ const FIRST_MOVE: f32 = 0.25;
 
 /// Minimum gain of the target, in ln(SIR), for which the final polish accepts a trial move of a relay.
 pub(super) const GAIN: f32 = 2e-5;
-/// Maximum number of accepted trial moves in the final polish of a chain; it then ends.
+/// Maximum number of trial moves that the final polish of a chain accepts. The polish ends after them.
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -390,7 +390,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`, stored or of a new initial chain.
+    /// Returns the lateral offset and altitude of relay `index`. They are those of a new initial chain if `purpose`
+    /// is a start, and otherwise the stored ones.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

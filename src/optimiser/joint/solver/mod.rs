@@ -36,7 +36,7 @@ struct ForwardPass {
     done: u16,
     /// New position of the relay that this forward pass has computed last.
     from: Placement,
-    /// Old position, before this forward pass, of the relay that the pass has computed last.
+    /// Position before this forward pass of the relay that the pass has computed last.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -58,8 +58,8 @@ enum Work {
     Polish(f32),
     /// Run the backward pass, which computes the relays' moves, for this segment of the chain.
     Back(u8),
-    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). If `true`, it stores
-    /// the chain; otherwise it is a trial.
+    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). The `bool` is true
+    /// to store the chain, false for a trial.
     Forward(f32, f32, bool),
 }
 
@@ -105,28 +105,29 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: [Cell; RELAYS],
-    /// Target, in ln(SIR), from which the highest target of the best chain was searched. `None` if a repetition of
-    /// its ascent would give another chain, so that the stored one cannot be used.
+    /// Target from which the search for the best chain's highest target started, in ln(SIR). With it the stored best
+    /// chain replaces a repetition of its ascent. `None` if the repetition would give another chain.
     best_judged: Option<f32>,
-    /// Target from which the current chain's highest target is searched, in ln(SIR).
+    /// Target from which the search for the current chain's highest target started, in ln(SIR).
     judged_at: Option<f32>,
-    /// True while the current ascent runs as it would without a best chain to compare with. A repetition of it then
-    /// gives the same chain.
+    /// True while the comparison with the best chain has not shortened the current ascent. Its stored result then
+    /// equals that of a repetition.
     is_whole: bool,
-    /// True in the last phase, which searches the best target more finely and polishes the chain.
+    /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
+    /// relays try other positions.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
-    /// True if the minimum separation limited the ascent from any initial chain.
+    /// True if the minimum separation has limited the result of any ascent.
     walled: bool,
     /// Number of the current trial move in the final polish of the chain.
     moving: u16,
     /// Number of trial moves that the final polish has accepted.
     moved: u8,
-    /// Lateral offset and altitude of the relay before the current trial move.
+    /// Lateral offset and altitude that the relay of the current trial move had before it.
     kept: Cell,
     /// Segment of the chain whose policies (relays' moves) are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
@@ -177,7 +178,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Processes one portion of the work: ten relays of a pass that moves them, or else twenty.
+    /// Solves the chain in steps: continues by ten relays of a pass that moves them, or twenty of another.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
@@ -248,7 +249,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that the stored best chain equals the one that a repetition of its ascent gives.
+/// Checks that a shortcut of the solver changes nothing. It stores the best chain instead of repeating its ascent.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -326,8 +327,9 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solved chain, as f32 bits, and the number of `step` calls. The chain is its target, and the
-    /// relays' lateral offsets and altitudes.
+    /// Returns the solved chain, and the number of `step` calls. The chain is the target, and each relay's lateral
+    /// offset and altitude, as the bits of f32 numbers. `once_more` repeats the best ascent instead of using the
+    /// stored chain.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -361,8 +363,8 @@ mod tests {
         (bits, portions)
     }
 
-    /// Checks for random missions that the stored best chain equals a repetition of its ascent. The environment
-    /// variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
+    /// Checks for random missions that the stored best chain equals a repetition of its ascent, to the bit. The
+    /// environment variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;
