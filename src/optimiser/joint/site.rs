@@ -519,9 +519,9 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the squared distance by which a relay at `to` is too near the interferer, m^2; 0 if it is not. The
-    /// second result is the weight of the penalty for that, the third the derivative of the squared distance by the
-    /// target in ln(SIR).
+    /// Returns the squared distance by which a relay at `to` is too near the interferer, m^2, or 0. The second result
+    /// is the weight of the penalty for that, the third the derivative of the squared distance by the target in
+    /// ln(SIR).
     ///
     /// A hop of maximum length that ends near the interferer is short. It violates the minimum separation d_min if
     /// |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with noise if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
