@@ -79,7 +79,7 @@ use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Extremum, first_hop_turn, square};
 
-/// Case of the optimal x at a given altitude; the first five are Corollary 1's, for X >= 0.
+/// Case of the optimal x at a given altitude. The first five cases are those of Corollary 1, for X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -192,7 +192,7 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     })
 }
 
-/// Case of the optimal altitude at a given x; the first three are Theorem 2's.
+/// Case of the optimal altitude at a given x. The first three cases are those of Theorem 2.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -274,8 +274,8 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Location of the optimum in the rectangle of allowed x and altitudes. It is an edge with its case, or the inside.
-/// On a corner it is the first of the edges.
+/// Place of the optimum among the allowed x and altitudes: an edge of their rectangle, or its inside. An edge is
+/// given with its case; an optimum on a corner is on the first of its edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {
