@@ -63,9 +63,9 @@ pub(super) struct Association {
     /// Number of the association (session) that the neighbour has left, 0 for none. After that the neighbour counts
     /// as absent: its drone does not fly to setpoints.
     left_number: u16,
-    /// Pending notice to the neighbour that this relay has left an association with it.
+    /// Pending notice to the neighbour that this relay has left an association (session) with it.
     leave_notice: Option<LeaveNotice>,
-    /// Last x received from the neighbour, in any association, m; NaN before the first.
+    /// Last x received from the neighbour, m, in any association (session); NaN before the first.
     seen_m: f32,
     /// Number of reminders, one per second, until the neighbour's last x expires.
     seen_reminders_left: u8,
@@ -140,13 +140,14 @@ impl Association {
         self.left_number != 0
     }
 
-    /// Marks the neighbour as absent, because it has left the association with the number `association`. An absent
+    /// Marks the neighbour as absent, because it has left the association (session) of that number. An absent
     /// neighbour may be anywhere.
     pub(super) const fn mark_absent(&mut self, association: u16) {
         self.left_number = association;
     }
 
-    /// Accepts the number that the neighbour gave to the association. An absent neighbour counts as back.
+    /// Accepts the number that the neighbour gave to the association (session) with this relay. A neighbour that was
+    /// absent counts as back.
     pub(super) const fn pair(&mut self, association: u16) {
         self.peer_number = association;
         self.left_number = 0;
@@ -158,8 +159,8 @@ impl Association {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
 
-    /// Returns a new association in place of this one, which this relay has left. It includes a leave notice if the
-    /// neighbour's number is known, because the neighbour then relies on the old association.
+    /// Returns a new association (session) in place of this one, which this relay has left. It includes a leave
+    /// notice if the neighbour's number is known, because the neighbour then relies on the old association.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own_number: self.own_number,
@@ -176,7 +177,7 @@ impl Association {
         }
     }
 
-    /// Returns a new association with the same neighbour. A pending leave notice is kept.
+    /// Returns a new association (session) with the same neighbour. A pending leave notice is kept.
     pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
         Self {
             leave_notice: self.leave_notice,
@@ -212,7 +213,7 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the notice that this relay has left its association, if it is due.
+    /// Returns the message that this relay has left its association (session), if it is due.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
         core::mem::take(&mut leave_notice.due).then(|| Fence {
@@ -517,7 +518,7 @@ impl KeepOut {
 pub struct Fence {
     /// Number that the sender gave to its association (session) with this neighbour, never 0.
     pub association: u16,
-    /// Echo of the association number that the destination sent last, 0 for none.
+    /// Echo of the association (session) number that the destination sent last, 0 for none.
     pub echo: u16,
     /// Number of the fence, the plane x = constant between the two relays; 0 before the first. The relay upstream
     /// (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
@@ -549,8 +550,8 @@ impl Fence {
     pub const REQUESTS_OPENING: u8 = 4;
     /// Flag: echo of the last [`REQUESTS_OPENING`](Self::REQUESTS_OPENING) received from the destination.
     pub const OPENING_RECEIVED: u8 = 8;
-    /// Flag: the sender has left this association. It does not fly to its setpoints, or did not for a time. Positions and the
-    /// number of the fence are not valid.
+    /// Flag: the sender has left this association (session). It does not fly to its setpoints, or did not for a time.
+    /// Positions and the number of the fence are not valid.
     pub const LEFT: u8 = 16;
     /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond it, is
     /// on the wrong side of a neighbour along x, or does not know its order. The request is repeated every second,
@@ -602,7 +603,7 @@ pub enum HoldReason {
     Close,
     /// Hold reason: a lost relay may still hover between this relay and its agreed position.
     Lost,
-    /// Hold reason: the neighbour's drone is not flown to setpoints, and is in the way or makes no room.
+    /// Hold reason: the neighbour's drone does not fly to setpoints, and is in the way or makes no room.
     NotFlown,
     /// Hold reason: the setpoint has not moved for at least five seconds. The neighbour has not made room.
     Pending,

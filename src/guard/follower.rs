@@ -245,7 +245,7 @@ impl FenceFollower {
             || !self.is_ordered() && self.association.is_on_wrong_side(own, Side::Upstream)
     }
 
-    /// Returns true if the neighbour upstream has announced a fence (limit of x) in this association.
+    /// Returns true if the neighbour upstream has announced a fence (limit of x) in this session.
     pub(super) const fn has_fence(&self) -> bool {
         self.number != 0
     }

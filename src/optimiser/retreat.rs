@@ -135,7 +135,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x of the receiver, m. It leaves the minimum step to a sender at its own smallest x.
+    /// Returns the smallest x of the receiver, m: the minimum step beyond the sender's smallest x.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {

@@ -121,8 +121,8 @@ impl Back {
         })
     }
 
-    /// Returns the SIR of a backward hop received at `x_m` over r, times its squared length, m^2. r is the required
-    /// ratio of backward to forward SIR. Divided by a target, the result is the hop's maximum squared length.
+    /// Returns SIR / r of a backward hop received at `x_m`, times its squared length, m^2. r is the required ratio of
+    /// backward to forward SIR. Divided by a target, the result is the hop's maximum squared length.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;

@@ -445,11 +445,11 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target`, as a smooth function of all numbers. `None` if
-    /// there is no such x.
+    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. That makes
+    /// the result a smooth function, as the joint method requires.
     ///
-    /// Smooth means without a minimum step. The x is less than `from_m`, the sender's x, if the distance across the
-    /// line is longer than the hop may be.
+    /// `None` if there is no such x. It is less than `from_m`, the sender's x, if the distance across the line is
+    /// longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {

@@ -14,12 +14,12 @@ const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 /// relay's distance from the interferer. It also limits the change of the target, in ln(SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust region at which the final target of an ascent is predicted. A smaller limit of the relays' moves
-/// would distort the prediction.
+/// Minimum trust region at which the final target of an ascent (improvement of one chain) is predicted. A smaller
+/// limit of the relays' moves would distort the prediction.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust region below which an ascent ends: the relays' moves are then limited too much for progress. It is a
-/// fraction like [`TRUST`].
+/// Trust region below which an ascent (improvement of one chain) ends, because it makes no progress. It is a fraction
+/// like [`TRUST`].
 const LEAST_TRUST: f32 = 1e-4;
 
 /// Minimum rate at which the spare length at Rx is assumed to fall with the target, in D per ln(SIR). Steps of the
@@ -48,7 +48,8 @@ const CLOSE: f32 = 3e-6;
 /// Expected gain of the target below which the improvement of a chain ends, in ln(SIR).
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected gain of the target below which the final target of an ascent can be predicted, in ln(SIR).
+/// Expected gain of the target below which its final value can be predicted, in ln(SIR). The value is that at the end
+/// of the ascent, the improvement of one chain.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which an ascent is checked for divergence. It has diverged if its chain falls short of
@@ -86,7 +87,8 @@ pub(crate) struct Ascent {
     /// Limit of the target, in ln(SIR). A chain that meets the limit is checked against the upper bound of all
     /// chains.
     limit: f32,
-    /// Next increase of the target's limit if a chain at that limit fails its check, in ln(SIR).
+    /// Next increase of the target's limit, in ln(SIR). It is made if a chain that meets the limit fails the check
+    /// against the upper bound.
     excess: f32,
     /// Cap on the chain's spare length at Rx, in units of D. It is lowered if relays too near the interferer cause a
     /// penalty, so that spare length cannot outweigh it.

@@ -22,8 +22,8 @@ pub(super) enum Start {
     /// `aside` and `up` are the direction of that position from the interferer; `far` is its distance, relative to
     /// the geometric mean of the distances of Tx and Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Initial chain on a parabola as `Arch`, first without a minimum separation. Its highest target is then found
-    /// with hops as in the relays' messages; a relay may stay short of its farthest position.
+    /// Initial chain on a parabola as `Arch`, computed without a minimum separation. Its highest target is then found
+    /// by the rule for hops that the relays use; a relay may stay short of its farthest position.
     Through { aside: f32, up: f32 },
     /// Initial chain for relays of which some have a fixed altitude: a parabola to the side. The altitudes of the
     /// others are interpolated.
@@ -31,9 +31,9 @@ pub(super) enum Start {
     /// `level` is true if the altitude is constant before the first and after the last fixed one, false if it goes
     /// down to Tx and Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Initial chain in a zigzag, if one behind the other the relays need more than the distance D. They alternate
-    /// between a corner of the allowed lateral offsets and altitudes, and a position one separation beside it. The
-    /// corner is at the highest altitude, on the side away from the interferer.
+    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation. The relays
+    /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside
+    /// it. The corner is at the highest altitude, on the side away from the interferer.
     Turns,
     /// Initial chain at the lowest altitude, for a high target. No hop can then pass the interferer in one leap.
     Near,

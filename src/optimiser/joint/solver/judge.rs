@@ -177,8 +177,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target with hops as in the relays' messages. The relays will
-    /// compute the same hops from the messages that they exchange.
+    /// Returns the work that searches for the highest target by the relays' rule for hops. The relays compute hops by
+    /// it from their messages.
     ///
     /// The chain results from an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in
     /// ln(SIR). Relays may stay short of their farthest position.
@@ -205,8 +205,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    /// Returns true if the best chain so far exceeds the upper bound `ceiling` by its tolerance. No other chain can
-    /// be better then. `ceiling` is in ln(SIR).
+    /// Returns true if the best chain so far meets the highest target that the search tries. No other chain can be
+    /// better then. That target is the upper bound `ceiling` plus its tolerance, in ln(SIR).
     pub(super) fn is_complete(&self, ceiling: f32) -> bool {
         self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
     }

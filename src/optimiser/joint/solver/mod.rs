@@ -71,19 +71,19 @@ enum Purpose {
     Raise,
     /// The search computes the chain's slack (spare length at Rx) again after the cap on it was lowered.
     Tighten,
-    /// The search finds the highest target of the chain after an ascent, with hops as in the ascent.
+    /// The search finds the highest target of the chain after an ascent, by the ascent's rule for hops.
     Judge,
-    /// The search finds the highest target after an ascent, with hops as in the relays' messages. Relays may then
-    /// stay short of their farthest position.
+    /// The search finds the highest target after an ascent, by the relays' rule for hops. The relays compute hops by
+    /// it from their messages. Some relays may then stay short of their farthest position.
     Last,
-    /// The search checks, with hops as in the relays' messages, that the chain meets its upper bound.
+    /// The search checks that the chain meets its upper bound, by the rule for hops that the relays use.
     Probe,
-    /// The search checks a trial move of one relay, with hops as in the relays' messages.
+    /// The search checks a trial move of one relay, by the rule for hops that the relays use.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the search computes the hops as relays compute them from their messages (sweeps).
+    /// Returns true if the search computes hops as the relays compute them from their messages.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -178,7 +178,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Solves the chain in steps: continues by ten relays of a pass that moves them, or twenty of another.
+    /// Continues to solve the chain by one bounded step. A step takes ten relays of a pass that moves them, or twenty
+    /// relays of any other pass.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
