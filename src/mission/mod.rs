@@ -15,8 +15,8 @@ pub(crate) mod tests;
 /// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x between two relays, as a fraction of the distance D. The positions remain distinct after
-/// rounding, even near Rx, because it is at least two steps of an f32.
+/// Smallest step in x between two relays, as a fraction of the distance D. It is at least two steps of an f32, even
+/// near Rx, so that the positions remain distinct after rounding.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step in x between two positions, as a fraction of the distance D.

@@ -129,7 +129,8 @@ const LEARNED: f64 = 1.1;
 /// new estimate unless the interference changes.
 const REFINED: u8 = 4;
 
-/// Time that drones need to fly a few metres to new positions. A moving interferer is predicted that far ahead.
+/// Time that drones need to fly a few metres to new positions. The position of a moving interferer is predicted this
+/// far ahead, plus half the interval between two collections of measurements.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
 /// Mean square relative error of measurements that contradicts an estimated source. The relays then treat the

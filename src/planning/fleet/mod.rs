@@ -130,8 +130,8 @@ impl Mission {
     }
 }
 
-/// Returns the minimum number of relays for `target`. `proven` in the result is true if that is the minimum of all
-/// chains without a minimum separation.
+/// Returns the minimum number of relays for `target`. Its field `proven` is only valid for a mission without a
+/// minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))

@@ -91,8 +91,8 @@ pub enum PlaceCase {
     Crossing = 2,
     /// Optimum at x = D: the first hop's SIR falls all the way to Rx, and is the higher one even there.
     AboveRx = 3,
-    /// Optimum where both hops have the same SIR, before the minimum of the first hop's. Or at x = D, if the first
-    /// hop's SIR has recovered by then.
+    /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is at x = D
+    /// instead if the first hop's SIR has risen enough beyond its minimum.
     BeforeValley = 4,
     /// Optimum at x = D: the first hop's SIR has a minimum before Rx, and is the higher one even there.
     OverValley = 5,
@@ -197,12 +197,13 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum AltitudeCase {
-    /// Optimum at the lowest altitude: both hops' SIRs fall with the altitude (x <= Psi^h, or X <= 0).
+    /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises. This is so if X <= 0, or if x <=
+    /// (X^2 + Y^2) / 2X, the paper's Psi^h.
     BothFall = 1,
     /// Optimum at the altitude where the first hop's SIR, rising with altitude, equals the second's.
     Crossing = 2,
     /// Optimum at the lowest altitude, or at the highest one up to which the first hop's SIR rises. The two hops'
-    /// SIRs are equal nowhere between.
+    /// SIRs are equal at no altitude in between.
     End = 3,
     /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,
@@ -260,8 +261,8 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and up to which altitude, m. That altitude
-/// is limited to the allowed range `band`.
+/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and the end of the rise. The end is an
+/// altitude, m, limited to the allowed range `band`.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
