@@ -219,7 +219,7 @@ impl Own {
         self.reminders >= MAX_REMINDERS_STILL && moves
     }
 
-    /// Returns true if the relay has moved away from the position in its last message without setpoints.
+    /// Returns true if the relay has moved away from the position that it sent last in manual control.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.sent_place.cross_section())

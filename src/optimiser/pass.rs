@@ -397,7 +397,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result of a pass of `ladder`, whose `targets` have the spare lengths `slacks`.
+    /// Returns the result of a pass of `ladder`. `slacks` are the chain's spare lengths for its `targets`.
     ///
     /// A target is committed if the next higher one is missed and is within the mission's tolerance of it, or if the
     /// ladder has no other target: the step of the paper's Algorithm 1.

@@ -102,8 +102,8 @@ pub struct NumberedEstimate {
 /// Mean square relative change of the interference up to which a new estimate is never adopted.
 const WORTH: f64 = 1e-5;
 
-/// Mean square relative change of the interference up to which a new estimate needs more information. It is then
-/// adopted only as a refinement. A larger change may mean that the interference itself has changed.
+/// Mean square relative change of the interference up to which a new estimate is only a refinement. A refinement is
+/// adopted if it is based on more information. A larger change may mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
 /// Minimum change of an estimate, over its variance, for its adoption if the interferer is stationary.

@@ -28,8 +28,7 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Number of measured positions that count as much as the operator's expected error. The variance of the measurements
-/// is estimated from both.
+/// Weight of the operator's expected error in the estimated variance: that of four measured positions.
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D over the measured positions. With less, they do not show on which side of the line Tx
@@ -53,7 +52,8 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit has all four unknowns; false if the last one, the side of the line, is omitted.
+    /// True if the fit has all four unknowns. False without the last one, which tells on which side of the line the
+    /// source is.
     full_rank: bool,
 }
 

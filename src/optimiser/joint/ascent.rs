@@ -48,12 +48,12 @@ const CLOSE: f32 = 3e-6;
 /// Expected gain of the target below which the improvement of a chain ends, in ln(SIR).
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected gain of the target below which its final value can be predicted, in ln(SIR). The value is that at the end
-/// of the ascent, the improvement of one chain.
+/// Expected gain of the target below which its final value can be predicted, in ln(SIR). Final is the value at the
+/// end of the ascent, the improvement of one chain.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which an ascent is checked for divergence. It has diverged if its chain falls short of
-/// Rx by more than `ASTRAY` D; D is the distance from Tx to Rx.
+/// Number of iterations after which an ascent (improvement of one chain) is checked for divergence. It has diverged
+/// if its chain falls short of Rx by more than `ASTRAY` D; D is the distance from Tx to Rx.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
@@ -80,8 +80,8 @@ pub(crate) enum AscentStep {
 pub(crate) struct Ascent {
     /// Target SIR of the current chain, in ln(SIR).
     pub(crate) sigma: f32,
-    /// Slack of the current chain: its spare length at Rx for the target `sigma`, m. It is below 0 if the chain is
-    /// too short.
+    /// Slack of the current chain, m: the length by which it could reach beyond Rx at the target `sigma`. It is below
+    /// 0 if the chain is too short.
     pub(crate) slack: f32,
     floor: f32,
     /// Limit of the target, in ln(SIR). A chain that meets the limit is checked against the upper bound of all
@@ -235,8 +235,9 @@ impl Ascent {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if this ascent will, as predicted, end no higher than the target `sigma`, in ln(SIR). `turn` is
-    /// the ascent's next action. The result is false if no prediction is possible.
+    /// Returns true if this ascent is predicted to end no higher than the target `sigma`, in ln(SIR). The ascent
+    /// improves one chain; if it ends no higher than another one, it can be dropped. `turn` is its next action. The
+    /// result is false if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;

@@ -42,9 +42,9 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end point of a hop of maximum length, with which the joint method computes moves. Such a hop
-/// just meets its target, so that two coordinates w of its end, with its start p and the target, determine the third
-/// one (the dependent coordinate).
+/// Derivatives of the end of a hop of maximum length, with which the joint method computes moves. Such a hop just
+/// meets its target. So one coordinate of its end (the dependent one) follows from the other two, w, from the hop's
+/// start p, and from the target.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -54,13 +54,14 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the dependent coordinate of the hop's end by w and p. There is a row for each free
-    /// coordinate w_i of the end, with a value for each coordinate of the start p.
+    /// Second derivatives of the third coordinate of the hop's end, which depends on w and p. w are the other two
+    /// coordinates of the end, p is the start. There is a row for each coordinate of w, with a value for each
+    /// coordinate of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end by its free coordinates w_1 and w_2. The order
-    /// is w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the third coordinate of the hop's end by the other two, w_1 and w_2. The order is w_1
+    /// w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate of the hop's end by the target in ln(SIR), m.
+    /// Derivative of the third coordinate of the hop's end by the target in ln(SIR), m. The other two are fixed.
     pub(super) by_target: f32,
 }
 
@@ -233,11 +234,11 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns a condition without noise that replaces the condition with noise near one hop end. For a hop end at
-    /// the squared distance `s` from the interferer both are equal.
+    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is that of the hop's
+    /// end from the interferer, m^2. The result has the form of a condition without noise.
     ///
-    /// `s` is in m^2, `noise` is the noise over the interferer's power received at 1 m, 1/m^2, `c` is target SIR over
-    /// gain, and `e` is c - 1.
+    /// `noise` is the noise over the interferer's power received at 1 m, 1/m^2, `c` is target SIR over gain, and `e`
+    /// is c - 1.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

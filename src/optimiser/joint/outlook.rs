@@ -163,9 +163,10 @@ pub(crate) struct Policy {
     /// True to take the larger of two solutions for the relay's third coordinate. A hop of maximum length can end at
     /// two positions with the same first two coordinates.
     pub(super) rising: bool,
-    /// Move of the two free coordinates if the previous relay has not moved, m.
+    /// Move of the relay in its two free coordinates if the previous relay has not moved, m.
     pub(super) step: [f32; 2],
-    /// Additional move of each free coordinate for a move of the previous relay, m per m in x, y and h.
+    /// Additional move of the relay in each free coordinate for a move of the previous relay. It is in m per m that
+    /// the previous relay moves in x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
@@ -247,7 +248,7 @@ impl Policy {
         }
     }
 
-    /// Returns the relay's move in its two free coordinates, m.
+    /// Returns the relay's move in its two free coordinates, m; the third one follows from the hop.
     ///
     /// It is the fraction `share` of the relay's own step, plus the reaction to `change`, the move of the previous
     /// relay in x, y and h, m.

@@ -22,8 +22,8 @@ pub(super) enum Start {
     /// `aside` and `up` are the direction of that position from the interferer; `far` is its distance, relative to
     /// the geometric mean of the distances of Tx and Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Initial chain on a parabola as `Arch`, computed without a minimum separation. Its highest target is then found
-    /// by the rule for hops that the relays use; a relay may stay short of its farthest position.
+    /// Initial chain on a parabola as `Arch`, computed without a minimum separation. Its highest target is then
+    /// searched with hops computed as by the relays; a relay may stay short of its farthest position.
     Through { aside: f32, up: f32 },
     /// Initial chain for relays of which some have a fixed altitude: a parabola to the side. The altitudes of the
     /// others are interpolated.

@@ -141,7 +141,8 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of a segment of the chain: the x before it, and the value function at its end.
+/// Stored state of a segment of the chain: the x of the relay before it, and derivatives at its end. The derivatives
+/// are those of the chain's spare length at Rx by the position of the segment's last relay.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Mark {
     /// x of the relay before the segment, m.

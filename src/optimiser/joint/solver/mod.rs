@@ -67,18 +67,18 @@ enum Work {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search raises the target during an ascent, with the chain unchanged.
+    /// The search raises the target during the improvement of a chain, while its relays stay.
     Raise,
     /// The search computes the chain's slack (spare length at Rx) again after the cap on it was lowered.
     Tighten,
-    /// The search finds the highest target of the chain after an ascent, by the ascent's rule for hops.
+    /// The search finds the highest target of an improved chain, with hops as in its improvement.
     Judge,
-    /// The search finds the highest target after an ascent, by the relays' rule for hops. The relays compute hops by
-    /// it from their messages. Some relays may then stay short of their farthest position.
+    /// The search finds the highest target of an improved chain, with hops computed as by the relays. The relays
+    /// compute hops from their messages. Some may then stay short of their farthest position.
     Last,
-    /// The search checks that the chain meets its upper bound, by the rule for hops that the relays use.
+    /// The search checks that the chain meets its upper bound, with hops computed as by the relays.
     Probe,
-    /// The search checks a trial move of one relay, by the rule for hops that the relays use.
+    /// The search checks a trial move of one relay, with hops computed as by the relays.
     Move,
 }
 
@@ -101,17 +101,18 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the best ascent had reached at its end, in ln(SIR). An ascent that will stay below is dropped.
+    /// Target that the improvement of the best chain so far had reached, in ln(SIR). The improvement of another chain
+    /// is stopped once it is predicted to stay below.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: [Cell; RELAYS],
     /// Target from which the search for the best chain's highest target started, in ln(SIR). With it the stored best
-    /// chain replaces a repetition of its ascent. `None` if the repetition would give another chain.
+    /// chain can be used, and its improvement is not repeated. `None` if a repetition would give another chain.
     best_judged: Option<f32>,
     /// Target from which the search for the current chain's highest target started, in ln(SIR).
     judged_at: Option<f32>,
-    /// True while the comparison with the best chain has not shortened the current ascent. Its stored result then
-    /// equals that of a repetition.
+    /// True while the comparison with the best chain has not shortened the improvement of the current one. A
+    /// repetition would then give the same chain.
     is_whole: bool,
     /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
     /// relays try other positions.
@@ -121,11 +122,11 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     pass: ForwardPass,
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
-    /// True if the minimum separation has limited the result of any ascent.
+    /// True if the minimum separation has limited the improvement of any chain.
     walled: bool,
-    /// Number of the current trial move in the final polish of the chain.
+    /// Number of the current trial move of a single relay, at the end of the solution.
     moving: u16,
-    /// Number of trial moves that the final polish has accepted.
+    /// Number of trial moves of single relays that were accepted at the end of the solution.
     moved: u8,
     /// Lateral offset and altitude that the relay of the current trial move had before it.
     kept: Cell,
@@ -250,7 +251,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that a shortcut of the solver changes nothing. It stores the best chain instead of repeating its ascent.
+/// Checks that a shortcut of the solver changes nothing: it stores the best chain. Without the shortcut it would
+/// compute that chain a second time.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -329,8 +331,8 @@ mod tests {
     }
 
     /// Returns the solved chain, and the number of `step` calls. The chain is the target, and each relay's lateral
-    /// offset and altitude, as the bits of f32 numbers. `once_more` repeats the best ascent instead of using the
-    /// stored chain.
+    /// offset and altitude, as the bits of f32 numbers. If `once_more`, the best chain is computed a second time
+    /// instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -364,7 +366,7 @@ mod tests {
         (bits, portions)
     }
 
-    /// Checks for random missions that the stored best chain equals a repetition of its ascent, to the bit. The
+    /// Checks for random missions that the stored best chain equals one computed a second time, to the bit. The
     /// environment variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
