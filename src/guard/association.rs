@@ -498,8 +498,8 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Adds relays at `side` that were never heard as an obstacle. They may hover anywhere beyond `limit_m`, until
-    /// any of them has sent a message.
+    /// Adds an obstacle at `side`: relays that were never heard. They may hover anywhere beyond `limit_m`, until any
+    /// of them has sent a message.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),

@@ -250,8 +250,8 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Updates, after a position report, if this relay is beyond the newest fence (limit of x). If so, a message is
-    /// due, because the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those
+    /// Records that this relay is beyond the newest fence (limit of x), if its known position shows that. A message
+    /// is due then, because the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those
     /// downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {

@@ -711,7 +711,8 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index`, m, with the separation for the relays computed after it.
+    /// Returns the farthest x of relay `index`, m, with enough space for the separation of later relays. Later is in
+    /// the order of computation.
     ///
     /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the maximum squared
     /// distance across the line (in y and altitude) between two neighbours among those relays, m^2; it reduces the
@@ -720,8 +721,8 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index`, m, with no separation for the relays computed after it. Farthest
-    /// means toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest x of relay `index`, m, if later relays need no separation. Later is in the order of
+    /// computation. Farthest means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
@@ -734,12 +735,13 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, with the separation for the relays between it and Rx.
+    /// Returns the largest x of relay `index`, m, with enough space for the relays between it and Rx. Each of those
+    /// relays needs the minimum separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index`, m, with no separation for the relays between it and Rx.
+    /// Returns the largest x of relay `index`, m, if the relays between it and Rx need no separation.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }

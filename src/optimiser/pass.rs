@@ -68,8 +68,8 @@ pub struct Link<'a> {
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
     /// of it for the sake of the next one.
     pub plain: bool,
-    /// Maximum x of the relay, m, which leaves the relays toward Rx their separation. Only the joint method computes
-    /// it; `None` with other methods.
+    /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
+    /// computes it; `None` with other methods.
     pub end_m: Option<f32>,
 }
 

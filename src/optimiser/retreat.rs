@@ -44,7 +44,8 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// Number of bisection steps for the receiver's x, between the x that are best for either direction.
+/// Number of bisection steps for the receiver's x with traffic in both directions. The first interval is from the
+/// best x for forward traffic to the best x for backward traffic.
 const HALVINGS: u8 = 6;
 
 /// Relative rounding error that is allowed to the length of a hop at the limit of its target.

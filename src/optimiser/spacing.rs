@@ -117,7 +117,8 @@ pub struct Hop {
     from_tx: bool,
     /// Maximum x that the hop's receiver may take, m.
     end_m: f32,
-    /// Maximum x of the receiver and of the sender, m. Each leaves the relays after it their separation.
+    /// Maximum x of the receiver and of the sender, m, with enough space for the relays after it. Each of those
+    /// relays needs the minimum separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,
@@ -286,8 +287,8 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target`, for a sender in [0, `from_m`]. `None` if there
-    /// is none.
+    /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`]. `None` if
+    /// there is none.
     ///
     /// If the receiver has a position at least the minimum step beyond `from_m`, it is [`Hop::reach`] for a sender at
     /// `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.

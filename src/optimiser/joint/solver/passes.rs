@@ -318,7 +318,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission.step_with_room(across)
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
+    /// Returns the largest x of relay `index`, m, with enough space for the separation of later relays.
     ///
     /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
