@@ -188,8 +188,8 @@ impl<'a> Link<'a> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay with the smallest x of this relay. Its receiver is at x from `low` to `high`,
-    /// m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop from this relay that lets it take the smallest x. The hop's receiver is at x from `low` to
+    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
