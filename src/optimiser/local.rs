@@ -27,7 +27,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Intervals of a row's samples on each side of the interferer, with a way back.
+/// Number of intervals into which a row of positions is sampled on each side of the interferer. Only for traffic in
+/// both directions; a row has one altitude.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -36,7 +37,8 @@ const ROUNDING: f32 = 3e-7;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Search from coarse to fine altitudes: at most 1080 evaluations of both hops, with a way back 4770.
+    /// Search from coarse to fine altitudes. At most 1080 evaluations of both hops; for traffic in both directions
+    /// 4770.
     #[default]
     Fine,
     /// Search on the paper's grid of positions: `columns` by `rows` evaluations of both hops.
@@ -48,42 +50,45 @@ pub enum Local {
     },
 }
 
-/// Neighbouring relay of the searching relay.
+/// Neighbour of the relay that searches its best position: the other end of one of its two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
-    /// Position of the neighbouring relay.
+    /// Position of the neighbour.
     pub place: Placement,
-    /// Minimum distance between the relay and this one, m.
+    /// Minimum distance between the neighbour and the relay that searches, m.
     pub apart_m: f32,
-    /// Transmit power, W.
+    /// Transmit power of the neighbour, W.
     pub power_w: f32,
 }
 
-/// Hops to and from one relay, whose SIRs the local search evaluates.
+/// Hops from the previous node to a relay and on to the next node, for any position of the relay.
 ///
-/// With the squared lengths l of both hops and the inverse interference q at the relay, the SIRs of the hop from the node before
-/// are A q / l and `returned` / l, those of the hop to the node after `received` / l and A' q / l. The second one of each is of
-/// the way back, divided by r.
+/// With the squared lengths l of both hops and the inverse interference q at the relay, the SIRs of the hop from the
+/// previous node are A q / l and, for traffic toward Tx, `returned` / l. Those of the hop to the next node are
+/// `received` / l and A' q / l. The second one of each is divided by r, the required ratio of backward to forward
+/// SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the node before.
+    /// Gain A of the hop from the previous node. Its SIR is A times inverse interference over squared length.
     gain: f32,
-    /// Gain of the relay times the inverse interference at the node after, or K of the hop to Rx, m^2.
+    /// SIR of the relay's signal at the next node, times the squared length of the hop, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
-    /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
+    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / P, 1/m^2; 0 without noise.
     noise: f32,
 }
 
-/// Way back over both hops; infinite gains without one.
+/// Gains of both hops for traffic from Rx to Tx; infinite for a mission of one direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// Gain of the relay times the inverse interference at the node before, over r, m^2. `K_tx` / r to Tx.
+    /// SIR of the relay's signal at the previous node, times the squared length of the hop, over r, m^2. r is the
+    /// required ratio of backward to forward SIR.
     returned: f32,
-    /// Gain A' of the node after, over r.
+    /// Gain A' of the backward hop from the next node to the relay, over r. r is the required ratio of backward to
+    /// forward SIR.
     gain: f32,
 }
 
@@ -120,7 +125,8 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the hops of a relay of `power_w` watts. `before` is `None` for relay 1, `after` for relay N.
+    /// Returns the hops of a relay of `power_w` watts. `before` is the previous node, `None` for Tx; `after` is the
+    /// next one, `None` for Rx.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -158,7 +164,8 @@ impl Hops {
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
-    /// With a way back, those of each hop's worse direction, the way back divided by r.
+    /// For traffic in both directions, each is the smaller one of the SIR toward Rx and the SIR toward Tx divided by
+    /// r.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -179,7 +186,7 @@ impl Hops {
         cfg!(feature = "reverse") && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the smaller SIR of both hops with the relay at `at`: the paper's local SIR.
+    /// Returns the SIR of the worse of both hops with the relay at `at`: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
@@ -195,7 +202,7 @@ impl Hops {
     }
 }
 
-/// Search in progress for a relay's best position between its two neighbours.
+/// Search for a relay's best position between its two neighbours, which is continued in steps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalSearch {
     how: Local,
@@ -242,8 +249,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus one row. A row has 24 evaluations, for
-    /// both directions 106.
+    /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. An altitude
+    /// takes 24 evaluations, for traffic in both directions 106.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -281,8 +288,8 @@ impl LocalSearch {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the next altitude from coarse to fine. Returns the number of evaluations, `None` after the last
-    /// round.
+    /// Searches the next altitude of the search from coarse to fine. Returns the number of evaluations that this
+    /// took, or `None` after the last round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;
@@ -344,9 +351,10 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Searches `low` to `high` of a row with a way back for the largest worse SIR, which it returns.
+    /// Returns the best SIR of the worse hop for x in `low` to `high`, for traffic in both directions.
     ///
-    /// The best of even samples is improved by steps that halve. It is the maximum if there is one maximum around that sample.
+    /// The best of evenly spaced x is improved by steps that halve. The result is the maximum if there is a single
+    /// maximum around that x.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
@@ -373,8 +381,8 @@ impl LocalSearch {
         best
     }
 
-    /// Evaluates the next point of the grid, altitudes first. Returns the number of evaluations, 1, or `None` after
-    /// the last point.
+    /// Evaluates the next position of the grid; altitudes vary first. Returns the number of evaluations, 1, or `None`
+    /// after the last position.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;
@@ -402,8 +410,8 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns a search by a relay at `altitude_m`, between two relays at `beside_m`, 100 m apart. `apart_m` is the
-    /// minimum separation, and `band` the allowed altitudes, m.
+    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. The relay is at `altitude_m`,
+    /// the neighbours are at `beside_m`. `apart_m` is the minimum separation, and `band` the allowed altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

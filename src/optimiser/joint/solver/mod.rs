@@ -36,7 +36,7 @@ struct ForwardPass {
     done: u16,
     /// New position of the relay that this forward pass has computed last.
     from: Placement,
-    /// Old position, before this forward pass, of the relay that the pass has computed last.
+    /// Position before this forward pass of the relay that the pass has computed last.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -58,8 +58,8 @@ enum Work {
     Polish(f32),
     /// Run the backward pass, which computes the relays' moves, for this segment of the chain.
     Back(u8),
-    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). If `true`, it stores
-    /// the chain; otherwise it is a trial.
+    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). The `bool` is true
+    /// to store the chain, false for a trial.
     Forward(f32, f32, bool),
 }
 
@@ -67,23 +67,23 @@ enum Work {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search raises the target during an ascent, with the chain unchanged.
+    /// The search raises the target during the improvement of a chain, while its relays stay.
     Raise,
     /// The search computes the chain's slack (spare length at Rx) again after the cap on it was lowered.
     Tighten,
-    /// The search finds the highest target of the chain after an ascent, with hops as in the ascent.
+    /// The search finds the highest target of an improved chain, with hops as in its improvement.
     Judge,
-    /// The search finds the highest target after an ascent, with hops as in the relays' messages. Relays may then
-    /// stay short of their farthest position.
+    /// The search finds the highest target of an improved chain, with hops computed as by the relays. The relays
+    /// compute hops from their messages. Some may then stay short of their farthest position.
     Last,
-    /// The search checks, with hops as in the relays' messages, that the chain meets its upper bound.
+    /// The search checks that the chain meets its upper bound, with hops computed as by the relays.
     Probe,
-    /// The search checks a trial move of one relay, with hops as in the relays' messages.
+    /// The search checks a trial move of one relay, with hops computed as by the relays.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the search computes the hops as relays compute them from their messages (sweeps).
+    /// Returns true if the search computes hops as the relays compute them from their messages.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -101,32 +101,34 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the best ascent had reached at its end, in ln(SIR). An ascent that will stay below is dropped.
+    /// Target that the improvement of the best chain so far had reached, in ln(SIR). The improvement of another chain
+    /// is stopped once it is predicted to stay below.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: [Cell; RELAYS],
-    /// Target, in ln(SIR), from which the highest target of the best chain was searched. `None` if a repetition of
-    /// its ascent would give another chain, so that the stored one cannot be used.
+    /// Target from which the search for the best chain's highest target started, in ln(SIR). With it the stored best
+    /// chain can be used, and its improvement is not repeated. `None` if a repetition would give another chain.
     best_judged: Option<f32>,
-    /// Target from which the current chain's highest target is searched, in ln(SIR).
+    /// Target from which the search for the current chain's highest target started, in ln(SIR).
     judged_at: Option<f32>,
-    /// True while the current ascent runs as it would without a best chain to compare with. A repetition of it then
-    /// gives the same chain.
+    /// True while the comparison with the best chain has not shortened the improvement of the current one. A
+    /// repetition would then give the same chain.
     is_whole: bool,
-    /// True in the last phase, which searches the best target more finely and polishes the chain.
+    /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
+    /// relays try other positions.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
-    /// True if the minimum separation limited the ascent from any initial chain.
+    /// True if the minimum separation has limited the improvement of any chain.
     walled: bool,
-    /// Number of the current trial move in the final polish of the chain.
+    /// Number of the current trial move of a single relay, at the end of the solution.
     moving: u16,
-    /// Number of trial moves that the final polish has accepted.
+    /// Number of trial moves of single relays that were accepted at the end of the solution.
     moved: u8,
-    /// Lateral offset and altitude of the relay before the current trial move.
+    /// Lateral offset and altitude that the relay of the current trial move had before it.
     kept: Cell,
     /// Segment of the chain whose policies (relays' moves) are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
@@ -177,7 +179,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.cells.get(at).copied().unwrap_or_default()
     }
 
-    /// Processes one portion of the work: ten relays of a pass that moves them, or else twenty.
+    /// Continues to solve the chain by one bounded step. A step takes ten relays of a pass that moves them, or twenty
+    /// relays of any other pass.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
@@ -248,7 +251,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that the stored best chain equals the one that a repetition of its ascent gives.
+/// Checks that a shortcut of the solver changes nothing: it stores the best chain. Without the shortcut it would
+/// compute that chain a second time.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -326,8 +330,9 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solved chain, as f32 bits, and the number of `step` calls. The chain is its target, and the
-    /// relays' lateral offsets and altitudes.
+    /// Returns the solved chain, and the number of `step` calls. The chain is the target, and each relay's lateral
+    /// offset and altitude, as the bits of f32 numbers. If `once_more`, the best chain is computed a second time
+    /// instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -361,8 +366,8 @@ mod tests {
         (bits, portions)
     }
 
-    /// Checks for random missions that the stored best chain equals a repetition of its ascent. The environment
-    /// variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
+    /// Checks for random missions that the stored best chain equals one computed a second time, to the bit. The
+    /// environment variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;
