@@ -59,7 +59,7 @@ pub struct Scenario {
     pub plan: Option<Planned>,
 }
 
-/// Line from Tx to Rx in geographic coordinates, and the sites of its ends.
+/// Line from Tx to Rx in geographic coordinates, and the geographic positions of its ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     /// Coordinate system of the line from Tx to Rx. It converts between geographic and local positions.
@@ -83,10 +83,11 @@ pub struct ChannelSpec {
     pub air_ground: AirGround,
 }
 
-/// Settings for relays that locate the interferer. For a missing value, `None`, that of [`Listen`] applies.
+/// Settings for relays that locate the interferer by measurements. A missing value, `None`, means the default of
+/// [`Listen`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ListenSpec {
-    /// True if the interferer moves. The defaults of the other settings are then those of [`Listen::following`].
+    /// True if the interferer moves. Missing settings then have the defaults of [`Listen::following`].
     pub following: bool,
     /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
@@ -169,10 +170,9 @@ impl Noise {
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the mission's noise power is too high for some receivers.
+    /// Returns true if the mission's noise power is too high for the receivers with more antenna gain.
     ///
-    /// A mission has one noise power. It is that of the lowest antenna gain, so it is too high where the gain is
-    /// higher.
+    /// A mission has a single noise power for all receivers, which is right for the lowest antenna gain.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
@@ -242,9 +242,9 @@ pub struct RelayOverride {
 }
 
 impl Default for ChannelSpec {
-    /// Returns the paper's channel: 2 GHz, excess losses of 0.1 and 21 dB, line of sight to the ground.
+    /// Returns the paper's channel: 2 GHz, and line of sight between relays and the ground.
     ///
-    /// 0.1 dB is the excess loss with line of sight, 21 dB that of an obstructed link.
+    /// The excess loss is 0.1 dB with line of sight and 21 dB for an obstructed link.
     fn default() -> Self {
         Self {
             carrier_hz: 2e9,

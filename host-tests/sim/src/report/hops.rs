@@ -89,7 +89,8 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
 
 /// Returns the linear SIR of every hop from Rx to Tx. Entry k - 1 is received by node k - 1; node 0 is Tx.
 ///
-/// The formulas and the limit are those of [`hop_sirs`]. Empty unless the mission has one known interferer, or a way back in a field.
+/// The formulas and the limit are the same as in [`hop_sirs`]. Empty unless the mission has one known interferer, or
+/// a random field and a required SIR from Rx to Tx.
 pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let is_known = mission.known_source().is_some();
     let is_both_ways = mission.config().reverse > 0.0 && mission.field().is_some();
@@ -161,8 +162,8 @@ impl WorstBack {
 /// rounding errors.
 const EQUAL: f64 = 1e-3;
 
-/// Returns the name of the direction with the lower SIR, `both` if they are equal. `back` is the SIR of the way back
-/// divided by `reverse`.
+/// Returns the name of the direction with the lower SIR: `forward`, `backward`, or `both` if equal. `there` is the
+/// SIR toward Rx, `back` the SIR toward Tx divided by `reverse`.
 pub const fn direction(there: f64, back: f64) -> &'static str {
     if back < there * (1.0 - EQUAL) {
         "backward"
@@ -192,7 +193,8 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
 
 /// Formats the relays of the chain, lost relays and Rx as a table. With `room` it has a y column.
 ///
-/// With `rx_sir_back` it has columns for the way back: hop k is received by the node before relay k.
+/// With `rx_sir_back` it also has the SIRs from Rx to Tx. The row of a relay then has the SIR at which the previous
+/// node receives this relay.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

@@ -134,7 +134,8 @@ const TOGETHER_S: f64 = 10.0;
 
 /// Groups log entries about the same event, sorted by time.
 ///
-/// The time of an event in which all relays take part is that of its last entry, otherwise that of its first.
+/// An event in which all relays take part, such as an agreement, has the time of its last entry. Any other event has
+/// the time of its first entry.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {
@@ -387,7 +388,7 @@ pub struct RecoveryReport {
     pub offered_s: Option<f64>,
     /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
     ///
-    /// It is the first such event that concerns a lost or joined relay.
+    /// If there are several such events, it is the first one that concerns a lost or a returned relay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
     /// Time when a neighbour first detected that a relay was lost or had returned, s.
@@ -495,9 +496,10 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
         .find(|moment| moment.what == TimelineEvent::Offered(version))
 }
 
-/// Returns the time of the event that caused the loss or the return of relays, `lost` and `back`.
+/// Returns the time of the event that caused the loss of the relays `lost` and the return of `back`.
 ///
-/// The cause for a relay is its latest such event in `earlier`. Of all relays' causes, the earliest is returned.
+/// For each of these relays, the cause is the latest suitable event in `earlier`, such as a failure or the end of a
+/// partition. The earliest of these causes is returned.
 fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {

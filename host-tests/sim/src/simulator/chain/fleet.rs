@@ -18,9 +18,9 @@ const ARRIVED_M: f64 = 1.0;
 /// Period in which the simulated operator looks for landed drones of lost relays.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
-/// Distance, m, beyond the required separation, from which on a pilot ignores another moving drone.
+/// Distance to keep from moving drones during a hand-over, m, in addition to the required separation.
 ///
-/// A pilot hands no drone over while a moving drone is nearer.
+/// A pilot does not hand a drone over to its relay while another moving drone is nearer.
 const TRAFFIC_M: f64 = 30.0;
 
 /// Time after which a pilot lands a drone whose relay is off, or which the pilot took over for good.
@@ -64,7 +64,7 @@ impl Chain {
         self.queue.put(self.now + STEP, 0, QueuedEvent::Fly);
     }
 
-    /// Updates the smallest separation margin of two drones, `margin_m` of the outcome.
+    /// Updates `margin_m` of the outcome, the smallest distance of two drones minus the distance to keep.
     ///
     /// It checks all pairs of flying drones that no pilot controls.
     fn measure_pairs(&mut self) {

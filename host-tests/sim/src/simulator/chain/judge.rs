@@ -101,9 +101,10 @@ impl Chain {
         }
     }
 
-    /// Returns true if one of the longest possible chains of the living relays holds its best positions.
+    /// Returns true if the chain is available: a longest chain of the living relays has its best positions.
     ///
-    /// If these chains are too small for a quorum, their relays hold no positions, and the result is false.
+    /// Several chains of that length may exist. The best positions are those in which the relays settle without
+    /// faults. If such chains are too small for a quorum, their relays have no positions, and the result is false.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
@@ -251,9 +252,10 @@ fn is_counted(part: &[&Member]) -> bool {
     })
 }
 
-/// Returns true if no part of the chain has enough relays for a quorum, and the relays know it.
+/// Returns true if no part of the chain has enough relays for a quorum, and the relays have noticed it.
 ///
-/// Each relay must know its present neighbours, and one relay of each part must have reported the missing quorum.
+/// For this each relay must know its present neighbours, and one relay of each part must have reported the missing
+/// quorum.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));
@@ -272,7 +274,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all of these relays hold positions that were agreed on for the same target SIR.
+/// Returns true if all of these relays have positions that were agreed on for the same target SIR.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()
@@ -286,7 +288,7 @@ fn holds(part: &[&Member]) -> bool {
 impl Chain {
     /// Checks that the setpoint of relay `index` (from 0) is within its limits, and counts violations.
     ///
-    /// It also records the SIR after each round of Algorithm 2.
+    /// It also records the SIR after each round of Algorithm 2, the stepwise improvement of the positions.
     pub(super) fn check(&mut self, index: usize) {
         let Some(member) = self.members.get_mut(index) else {
             return;
