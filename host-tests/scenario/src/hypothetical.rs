@@ -27,7 +27,7 @@ const ASIDE: u32 = 8;
 /// Approximate number of points at which the reported error of the fitted interferer is evaluated.
 const REPORTED: usize = 60_000;
 
-/// Largest lateral distance y_H at which the search places the interferer, relative to the scene's size.
+/// Largest lateral distance y_H at which the search places the interferer, in sizes of the scene.
 ///
 /// At this distance the interference is already the same at all relay positions to a thousandth, so a larger one
 /// would change nothing.
@@ -367,7 +367,7 @@ impl Raster {
         Self::of(scene, &rows, |_| midpoints(0.0, scene.distance_m, columns))
     }
 
-    /// Creates quadrature points in cells that are smaller near the interferers and near the position `also`.
+    /// Creates quadrature points in cells that are smaller near the interferers and the position `also`.
     ///
     /// `also` is (x, y) in m. Each cell has two Gauss points per direction. The number of points is at most about
     /// `most`, > 100, unless the number of interferers alone requires more.

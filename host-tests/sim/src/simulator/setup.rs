@@ -220,7 +220,7 @@ impl Setup {
         })
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain, with 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain. It includes 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let latency = Duration::from_micros(self.link.latency.as_micros() + 1_000);
         self.load().map_or(self.link.hop_time(), |load| {

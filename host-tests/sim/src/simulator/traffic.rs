@@ -24,7 +24,8 @@ use std::fmt;
 use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
-/// Number of packets that are sent after the end of a run, so that the rates are meaningful.
+/// Number of packets that are sent after the end of a run. They make the reported data rates averages over many
+/// packets.
 const AFTER: usize = 1_000;
 /// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;
@@ -247,7 +248,7 @@ struct Queue {
     packets: VecDeque<Ps>,
     /// Hop on which the node sends; `None` while it cannot send.
     hop: Option<Hop>,
-    /// Slot time, ps, that the first packet still needs at the time `since`; 0 before it is sent.
+    /// Slot time, ps, that the first packet still needs, counted from `since`. 0 before its transmission.
     rest: Ps,
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
@@ -298,7 +299,7 @@ impl Queue {
     }
 }
 
-/// End of a transmission in the queue of events: time, order, node, and number of the transmission.
+/// End of a transmission, as an event in a queue: time, order, node, and number of the transmission.
 ///
 /// If several end at the same time, the one nearest to the end of the chain is first.
 type End = Reverse<(Ps, usize, usize, u32)>;

@@ -116,9 +116,11 @@ const SIR_SIZE: f64 = 10.0;
 /// It is larger than the radius of a relay's circle.
 const GAP: f64 = 4.6;
 
-/// Places along a hop at which its SIR may be written, as fractions of its length.
+/// Positions along a hop at which the text with its SIR may be, as fractions of its length.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
-/// Distances of a SIR from its hop, in picture units: positive above the hop, negative below.
+/// Distances, in picture units, by which the text with a hop's SIR may be moved away from the hop.
+///
+/// The sign is the side of the hop: positive for above, negative (also -0.0) for below.
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
 /// Largest number of hops for which each SIR is written beside its hop. For more hops, the SIRs are in one row.

@@ -236,9 +236,10 @@ fn an_overloaded_channel_is_refused_before_flight() {
     assert!(json("--baud 9600 --wires")["sir"].as_f64().unwrap() > 1.0);
 }
 
-/// Checks that a channel that is too slow for fifty relays in range of each other is refused.
+/// Checks that a channel that is too slow for fifty relays in range of each other is rejected.
 ///
-/// The error names settings that would suffice. A run with the slower probing that it names is accepted.
+/// The error names settings that would suffice. A run with the longer probing interval that the error names is
+/// accepted.
 #[test]
 fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
