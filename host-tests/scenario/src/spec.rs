@@ -126,9 +126,9 @@ pub struct Noise {
     pub bandwidth_hz: f64,
     /// Noise figure of the receivers, dB, 0 to 60; 6 by default.
     pub figure_db: f64,
-    /// Noise power, dBm, -200 to 0. If given, it replaces the one from bandwidth and noise figure.
+    /// Noise power, dBm, -200 to 0. If given, it is used instead of the one computed from bandwidth and noise figure.
     pub power_dbm: Option<f64>,
-    /// Antenna gains, dBi, -30 to 60: first that of the relays, then that of Rx. The default is 0.
+    /// Antenna gains, dBi, -30 to 60: of the relays, then of Rx. The default is 0.
     pub gains_dbi: [f64; 2],
 }
 
@@ -232,7 +232,7 @@ pub struct BetaPoint {
     pub beta: f64,
 }
 
-/// Altitude and power of one relay that differ from those of the others. At least one is set if read from a file.
+/// Altitude and power of one relay, if they differ from the common values. At least one is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
     /// Fixed altitude of this relay, m, 0.1 to 1e4. It may be outside `altitude_min_m` to `altitude_max_m`.

@@ -75,7 +75,7 @@ fn a_relay_that_is_not_received_is_reported() {
 
 /// Checks that lost and corrupted frames cause no false reports about other nodes.
 ///
-/// Such reports would be of nodes that do not receive, of wrong keys, or of old epochs.
+/// A false report says that a node does not receive this relay, has another key, or uses an old epoch.
 #[test]
 fn a_bad_channel_causes_no_false_reports() {
     for seed in 1..=3 {
@@ -449,10 +449,11 @@ fn an_epoch_that_went_back_is_reported_with_the_node() {
     }
 }
 
-/// Checks a relay 2 that restarts with the same epoch. Its neighbours take it for a second relay 2.
+/// Checks a relay that restarts with its old epoch. Its neighbours take it for a second relay 2.
 ///
-/// With the larger random claim it takes part at once. With the smaller one it reports that its number is taken, and
-/// gets no setpoint until its neighbours have received nothing of the larger claim for `dead_after`.
+/// At each start a relay draws a random claim number. If the new number is the larger one, the relay takes part at
+/// once. Otherwise it reports a duplicate, and gets no setpoint until its neighbours have received nothing of the old
+/// claim number for `dead_after`.
 #[test]
 fn with_a_reused_epoch_a_relay_joins_or_reports_and_waits() {
     let mut waited = 0;

@@ -407,7 +407,7 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
         .collect()
 }
 
-/// Returns the mission that the chain flies at the end of a run of `setup`, loaded or uploaded.
+/// Returns the mission that the chain flies at the end of a run: of `setup`, or an uploaded one.
 pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
     let version = version(outcome);
     let mut uploads = setup.uploads.iter().map(|spec| spec.upload);
@@ -501,7 +501,8 @@ impl AirReport {
         })
     }
 
-    /// Formats the channel's report as a line; `virtual_s` is the duration of the run, s, for the load.
+    /// Formats the channel's report as a line of text. The load of the channel follows from `virtual_s`, the duration
+    /// of the run, s.
     pub(super) fn text(&self, virtual_s: f64) -> String {
         let counts = self.counts;
         let load = counts.air_time_us as f64 / 1e6 / virtual_s.max(1e-6);

@@ -27,7 +27,7 @@ pub struct RelayReport {
     /// Absent if it is unknown, or if the mission requires no SIR from Rx to Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back: Option<f64>,
-    /// Version of the relay's mission, 0 for the loaded mission; absent without uploads.
+    /// Version of the relay's mission; 0 for the mission loaded before the start. Absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
 }
@@ -115,7 +115,7 @@ pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<
 /// SIR of the worst hop in the direction from Rx to Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WorstBack {
-    /// SIR that hops need from Rx to Tx, as a fraction of that from Tx to Rx (`link.reverse`).
+    /// SIR that hops need from Rx to Tx, as a fraction of the SIR needed from Tx to Rx (`link.reverse`).
     pub reverse: f64,
     /// Linear SIR of the worst hop from Rx to Tx.
     pub worst_back: f64,

@@ -122,7 +122,7 @@ pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
 struct Group {
     first_s: f64,
     last_s: f64,
-    /// Numbers of the relays in the order of their entries; two new neighbours are in order from Tx.
+    /// Numbers of the relays that have logged the event, in the order of their entries.
     relays: Vec<u16>,
     sample: MomentReport,
 }
@@ -336,10 +336,10 @@ fn count(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 
-/// Number of lines that remain at the start of a shortened log, and at its end.
+/// Number of lines that a shortened log keeps at its start, and again at its end.
 const ENDS: usize = 20;
 
-/// Formats the log with a line for each event. A log of more than 40 lines loses those in the middle.
+/// Formats the log with a line for each event. If the log has more than 40 lines, the middle ones are left out.
 pub(super) fn text(timeline: &[MomentReport]) -> String {
     let groups = groups(timeline);
     let mut text = String::new();

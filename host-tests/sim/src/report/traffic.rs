@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::simulator::route::{ChainState, Period, Ps, SECOND};
 use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec, quantile_s};
 
-/// Number of periods that remain at the start of a shortened text, and at its end.
+/// Number of periods that a shortened text lists at its start, and again at its end.
 const ENDS: usize = 10;
 
 /// Largest number of queues that the text lists completely. If there are more, it lists the 8 longest.

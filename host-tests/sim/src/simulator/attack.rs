@@ -378,7 +378,7 @@ fn guessed_handshake(mission: &Mission, way: ForgedRoute, rng: &mut ChaCha8Rng) 
     sealed(plain)
 }
 
-/// Returns the handshake of a relay that starts with a random key; empty in a chain of one relay.
+/// Returns the handshake of a relay that starts with a random key. Empty if the chain has only one relay.
 fn foreign_handshake(
     mission: &Mission,
     way: ForgedRoute,

@@ -408,7 +408,8 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults. The statistics use it to judge the positions of this chain.
+    /// `run` simulates a chain without faults. The statistics compare the positions of this chain with the positions
+    /// from `run`.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;

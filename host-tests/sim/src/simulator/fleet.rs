@@ -544,7 +544,7 @@ impl Pilot {
         self.hands_over_at = self.hands_over_at.max(Some(looked));
     }
 
-    /// Handles a restart of the autopilot or the relay, or a failsafe: the pilot hands over again later.
+    /// Plans another hand-over to the relay, after a restart of the autopilot or the relay, or a failsafe.
     fn schedule_hand_over_after_restart(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * RECOVERS_S));
     }

@@ -24,7 +24,7 @@ pub enum TimelineEvent {
     Booted,
     /// The relay lost its neighbour at this side, toward Tx or toward Rx.
     Lost(Side),
-    /// The relay receives a new or a lost neighbour at this side, toward Tx or toward Rx.
+    /// The relay receives a new neighbour at this side (toward Tx or toward Rx), or again a lost one.
     Found(Side),
     /// The relay accepted a new view: a new membership of the chain.
     ViewAccepted {
@@ -81,7 +81,7 @@ pub enum TimelineEvent {
     NewEstimate,
     /// The relay found that the measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The relay found that another node's measurements contradict those of all other nodes.
+    /// The relay found that one other node's measurements do not agree with those of the rest of the chain.
     SensorOff,
 }
 
@@ -144,7 +144,7 @@ pub struct RelayEnd {
     pub relays: u16,
     /// Number of the view (membership of the chain) that the relay has accepted.
     pub view: u32,
-    /// Version of the relay's mission; 0 for the loaded one.
+    /// Version of the relay's mission; 0 for the mission loaded before the start.
     pub version: u16,
     /// Interference estimate of the relay.
     pub believed: NumberedEstimate,

@@ -120,7 +120,7 @@ impl Track {
     }
 }
 
-/// Computes the true SIR of every hop, with the interference that is really present.
+/// Computation of the true SIR of every hop, from the interference that is really present.
 #[derive(Debug)]
 pub struct TrueHops {
     /// Relays and interferers at time 0, and the interferers' velocity along and beside the line, m/s.
@@ -427,7 +427,8 @@ pub struct DataLink {
     pub packet_bits: f64,
     /// True if data goes from Tx to Rx and from Rx to Tx; false if only to Rx.
     pub both: bool,
-    /// Ratio of the planned data rate to Tx to that to Rx, 0 to 1. It is 0 if only the direction to Rx is planned.
+    /// Planned data rate to Tx, as a fraction (0 to 1) of the planned rate to Rx. It is 0 if only the direction to Rx
+    /// is planned.
     pub reverse: f64,
 }
 

@@ -301,7 +301,7 @@ impl Queue {
 
 /// End of a transmission, as an event in a queue: time, order, node, and number of the transmission.
 ///
-/// If several end at the same time, the one nearest to the end of the chain is first.
+/// If several end at the same time, `order` puts the one nearest to the end of the chain first.
 type End = Reverse<(Ps, usize, usize, u32)>;
 
 /// Simulation of the traffic in one direction, while it runs.

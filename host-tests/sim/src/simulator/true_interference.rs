@@ -150,7 +150,7 @@ impl TrueInterference {
         self.ends && now >= from && now < until
     }
 
-    /// Draws the factor of a measurement's error: the mean of `samples` exponential variables of mean 1.
+    /// Draws the random factor of a measured power: the mean of `samples` exponential variables of mean 1.
     fn mean(&self, rng: &mut impl Rng) -> f64 {
         let samples = f64::from(self.samples);
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))

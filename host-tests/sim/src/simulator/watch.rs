@@ -115,10 +115,10 @@ impl Watch {
         self.is_right = is_right;
     }
 
-    /// Returns the statistics up to `now`. Only with `is_judged` they include the availability.
+    /// Returns the statistics up to `now`. They include the availability only if `is_judged` is true.
     ///
-    /// `flown_m` is the smallest distance of simulated drones, m. Without drones, `None`, the smallest distance of
-    /// setpoints takes its place.
+    /// `flown_m` is the smallest distance of simulated drones, m. If it is `None`, because no drones are simulated,
+    /// the smallest distance of setpoints is used.
     pub fn end(mut self, now: Instant, is_judged: bool, flown_m: Option<f64>) -> Watched {
         self.count_time(now);
         let share = self.first.map_or(0.0, |first| {
@@ -149,7 +149,7 @@ pub struct ObservedState {
     pub relays: u16,
     /// Index of the relay in its view (membership of the chain), from 1 next to Tx.
     pub index: u16,
-    /// Version of the relay's mission; 0 for the loaded one.
+    /// Version of the relay's mission; 0 for the mission loaded before the start.
     pub version: u16,
     /// Linear target SIR of the relay's position; `None` without a target.
     pub target: Option<f32>,

@@ -30,7 +30,7 @@ pub struct Picture {
     pub interferers: Vec<(f64, f64, f64)>,
     /// Earlier or estimated interferers, in the form of `interferers`. They are drawn faintly.
     pub others: Vec<(f64, f64, f64)>,
-    /// Kind of the interferers in `others`: those of the mission before an upload, or the estimated one.
+    /// Kind of the interferers in `others`: of the mission before an upload, or estimated.
     pub others_are: OtherInterferers,
     /// Relays from Tx to Rx: x along the line and altitude, m. A position that is not finite is not drawn.
     pub nodes: Vec<(f64, f64)>,

@@ -352,7 +352,7 @@ fn relays_spread_for_measuring_have_no_sir_in_the_picture() {
     assert!(!svg.contains("SIR 0.000"), "{svg}");
 }
 
-/// Checks that the true and the optimum SIR of a report are those of the remaining relays.
+/// Checks that a report's true and optimum SIR are computed without a lost relay.
 #[test]
 fn a_lost_relay_does_not_count_in_the_status() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";

@@ -34,7 +34,8 @@ impl ChangedRelays {
 }
 
 impl Chain {
-    /// Starts the statistics of the run. `run` simulates a chain without faults, to judge this chain.
+    /// Starts the statistics of the run. `run` simulates a chain without faults, with whose positions this chain is
+    /// compared.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
@@ -188,7 +189,7 @@ impl Chain {
         (settled && others).then_some(Ending::Settled)
     }
 
-    /// Ends a run that has a fixed end (`soak` of the setup) if the next event, at `next`, is later.
+    /// Ends the run if its next event, at the time `next`, is after its fixed end (`soak` of the setup).
     pub(super) fn end_soak(&mut self, next: Instant) {
         if let Some(until) = self.setup.soak
             && next > until
@@ -476,7 +477,7 @@ impl Chain {
 }
 
 impl Member {
-    /// Returns the number of passes and view proposals that this relay has begun, even before reboots.
+    /// Returns the number of passes and view proposals that this relay has begun, also before reboots.
     ///
     /// A pass is a message that relays forward along the whole chain.
     fn begun(&self) -> u32 {
