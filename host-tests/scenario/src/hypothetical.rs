@@ -308,7 +308,7 @@ impl Space {
     }
 }
 
-/// Largest width of a quadrature cell, relative to the distance to the nearest source.
+/// Largest width of a quadrature cell, relative to the distance to the nearest interferer.
 const WIDEST_STEP: f64 = 0.9;
 
 const TRIES: u32 = 6;
@@ -467,9 +467,9 @@ impl Raster {
 
     /// Returns the best power of a hypothetical interferer at (`x`, `y`), m, and the error that remains.
     ///
-    /// The error is the integral of |p g - S|, where g = 1 / distance^2 is the effect of the interferer per watt, p
-    /// its power, and S the same from the true sources. The best p is the median of S / g, weighted by g. The time is
-    /// linear in the number of points.
+    /// The error is the integral of |p g - S|. p is the interferer's power, and g = 1 / distance^2 its effect per
+    /// watt. S is the sum of p g over the true interferers. The best p is the median of S / g, weighted by g. The
+    /// time is linear in the number of points.
     pub fn best_power(&self, x: f64, y: f64) -> BestPower {
         let shape = |node: &Node| {
             let dx = node.x - x;

@@ -20,7 +20,7 @@ pub struct MomentReport {
     pub at_s: f64,
     /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     ///
-    /// For a partition it is the last relay before the gap.
+    /// For a partition it is the relay after which the chain is cut.
     pub relay: u16,
     /// Kind of the event, in words.
     ///

@@ -520,7 +520,9 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
     Ok(members)
 }
 
-/// Queues restarts of autopilots, and landings of drones that a pilot never returns. Returns their number.
+/// Queues the restarts of autopilots, and the landings of drones that a pilot never hands back.
+///
+/// Returns the number of these events.
 fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     let Some(fleet) = &setup.fleet else {
         return 0;

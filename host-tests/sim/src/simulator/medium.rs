@@ -115,7 +115,7 @@ impl Medium {
         true
     }
 
-    /// Processes an event that is due. Returns the frame, if the event ends one.
+    /// Processes an event that is due. If it is the end of a frame, returns that frame.
     ///
     /// `hearers` returns the nodes in range of a sending node.
     pub fn happen(

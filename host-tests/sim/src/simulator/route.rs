@@ -281,7 +281,8 @@ pub enum ChainState {
     Broken,
 }
 
-/// Period in which the view, the state of the chain and the promised data rates do not change.
+/// Period in which the chain's view, its state and the promised data rates are constant. The planner's formula gives
+/// the promised rates.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Period {
     /// Start of the period, ps. It ends where the next one starts.
@@ -316,7 +317,7 @@ pub struct Stage {
 pub struct Route {
     /// Stages, in which no hop changes, in order of time; at least one.
     pub stages: Vec<Stage>,
-    /// Periods, in which view and state do not change, in order of time; at least one.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time. At least one.
     pub periods: Vec<Period>,
     /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
     pub promised_bps: Vec<f64>,

@@ -17,7 +17,7 @@ use super::true_interference::TrueInterference;
 /// Period in which relays 1 to `after` and the other relays do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Partition {
-    /// Number of the last relay before the gap, from 1.
+    /// Number, from 1, of the relay after which the partition cuts the chain.
     pub after: u16,
     /// Start of the partition.
     pub from: Instant,

@@ -139,7 +139,7 @@ pub struct Traffic {
     pub from: Ps,
     /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
-    /// Periods in which the view, the state of the chain and the promised data rates do not change.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time.
     pub periods: Vec<Period>,
     /// Traffic to Rx and, if data goes both ways, traffic back to Tx.
     pub flows: Vec<Flow>,

@@ -241,7 +241,7 @@ impl Chain {
 }
 
 impl Chain {
-    /// Creates the drones of the setup, simple or with autopilots, if any, and starts their time steps.
+    /// Creates the drones of the setup, if any, with or without autopilots, and starts their time steps.
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));
@@ -250,7 +250,8 @@ impl Chain {
         self.line_up();
     }
 
-    /// Moves all simple drones for one time step. Relays that are on get the reported positions of their drones.
+    /// Moves all drones without autopilots for one time step. Relays that are on get the reported positions of their
+    /// drones.
     pub(super) fn fly(&mut self) {
         let now = self.now;
         let Some(mut flight) = self.flight.take() else {
@@ -294,9 +295,10 @@ impl Chain {
         }
     }
 
-    /// Returns true if each simple drone of a living relay is at its agreed position by its own estimate.
+    /// Returns true if each drone that is simulated without autopilot has reached its agreed position.
     ///
-    /// True without simple drones.
+    /// Drones of relays that are off do not count. The position is the drone's own estimate. True if there are no
+    /// such drones.
     pub(super) fn has_arrived(&self) -> bool {
         let Some(flight) = &self.flight else {
             return true;
