@@ -4,7 +4,7 @@
 /// more bytes are noise, of which only the start is kept.
 pub const MOST: usize = 1_024;
 
-/// Piece of a byte stream between two frame delimiters, including the final one.
+/// Bytes of a stream from one frame delimiter to the next: usually a frame. The delimiter at the end is included.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Piece<'a> {
     /// Bytes of the piece with its delimiter. A piece longer than [`MOST`] is cut after [`MOST`] bytes.

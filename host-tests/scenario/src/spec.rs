@@ -70,14 +70,14 @@ pub struct Line {
     pub geoid_m: Option<f64>,
 }
 
-/// Radio channel: the carrier frequency, and the losses in addition to that of free space.
+/// Radio channel: the carrier frequency, and the losses in addition to the free-space loss.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelSpec {
     /// Carrier frequency of the radio channel, Hz, 1e6 to 1e12.
     pub carrier_hz: f64,
-    /// Loss of a line-of-sight link in addition to that of free space, dB, 0 to 200.
+    /// Loss of a line-of-sight link in addition to the free-space loss, dB, 0 to 200.
     pub excess_loss_los_db: f64,
-    /// Loss of an obstructed link in addition to that of free space, dB, `excess_loss_los_db` to 200.
+    /// Loss of an obstructed link in addition to the free-space loss, dB, `excess_loss_los_db` to 200.
     pub excess_loss_nlos_db: f64,
     /// Kind of the links between ground and air: line of sight, obstructed, or a mixture.
     pub air_ground: AirGround,
@@ -289,9 +289,8 @@ impl Default for Scenario {
 }
 
 impl Scenario {
-    /// Returns the bandwidth of the data link, Hz, as the scenario gives it.
-    ///
-    /// It is that of `[link]`, or else that of `[noise]`; `None` without either.
+    /// Returns the bandwidth of the data link, Hz, from the scenario: `[link]`, or else `[noise]`. `None` if neither
+    /// has a bandwidth.
     pub fn bandwidth_hz(&self) -> Option<f64> {
         let own = self.link.as_ref().and_then(|link| link.bandwidth_hz);
         own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))

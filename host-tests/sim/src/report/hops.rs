@@ -64,8 +64,7 @@ pub fn db(linear: f64) -> f64 {
 
 /// Returns the linear SIR of every hop from Tx to Rx, for relays at these positions, from relay 1 on.
 ///
-/// The formulas are those that relays use on board. A SIR is at most the largest f32, even if two positions nearly
-/// coincide.
+/// Relays use the same formulas on board. A SIR is at most the largest f32, even if two positions nearly coincide.
 pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let mut sender = Sender::transmitter(mission);
     let mut from_m = 0.0;

@@ -411,7 +411,7 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction. They are set anew at each agreement and for each new view.
+/// Time slots of all hops, for each direction. The slots are assigned anew at each agreement and for each new view.
 struct Layout {
     view: ViewId,
     agreed: Option<Vec<(usize, Point)>>,

@@ -76,7 +76,7 @@ impl fmt::Display for TrafficError {
 
 impl std::error::Error for TrafficError {}
 
-/// Numbers of packets by what became of them.
+/// Numbers of packets: created, and by outcome (delivered, dropped, or lost with a relay).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Packets {
     /// Number of packets that the source created.
@@ -260,7 +260,8 @@ struct Queue {
 }
 
 impl Queue {
-    /// Adds the queue's length since the last call to its statistics. Must precede each change of the length.
+    /// Adds the queue's length, which was constant since the last call, to its statistics. Must be called before each
+    /// change of the length.
     fn count(&mut self, now: Ps) {
         self.sum += self.packets.len() as u128 * u128::from(now.saturating_sub(self.counted));
         self.counted = now;
@@ -363,7 +364,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Replaces the hops of all nodes by those of `stage`. The queues of relays that are off are lost.
+    /// Replaces the hops of all nodes by the hops of `stage`. The queues of relays that are off are lost.
     fn enter(&mut self, stage: &Stage) {
         self.period = stage.period;
         let mut hops: Vec<Option<Hop>> = vec![None; self.queues.len()];

@@ -131,7 +131,7 @@ pub(super) struct Hop {
     line: [Point; 2],
     /// SIR of the hop in the worse of its directions, dB; `None` if it is unknown.
     decibels: Option<f64>,
-    /// SIRs of the hop in the direction to Rx and in that to Tx, dB; `None` if unknown.
+    /// SIRs of the hop in the direction to Rx and in the direction to Tx, dB; `None` if unknown.
     ways: [Option<f64>; 2],
     /// True if the picture shows SIRs of both directions, to Rx and back to Tx.
     has_back: bool,
@@ -248,9 +248,9 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
     }
 }
 
-/// Returns positions at which a hop's SIR may be written, the best first, each with a point on the hop.
+/// Returns pairs of a point on the hop and a position for the text with its SIR, the best pair first.
 ///
-/// `width` and `height` are those of the text.
+/// `width` and `height` are the size of the text.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);
