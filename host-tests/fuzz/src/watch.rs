@@ -54,14 +54,16 @@ pub struct Watched {
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Sites of the mission that the relay flies.
+    /// Surveyed positions of Tx and Rx in the mission that the relay uses now; `None` if it has none.
     sites: Option<Sites>,
-    /// Distance from Tx to Rx in the mission that the relay was loaded with, m.
+    /// Distance from Tx to Rx in the mission that was loaded into the relay before flight, m.
     loaded_m: f32,
     frames: Frames,
     /// Number of bytes received since the last frame delimiter, for each port.
     begun: [usize; 3],
-    /// View and number of the pass (round of messages) that gave the relay its position, if known.
+    /// Pass (round of messages along the chain) that gave the relay its position: view and number.
+    ///
+    /// `None` if unknown.
     held: Option<(ViewId, u16)>,
     flown: MissionConfig,
 }
@@ -114,12 +116,12 @@ impl Watched {
         self.frames.number
     }
 
-    /// Returns the association number in the relay's last fence message, 0 for none.
+    /// Returns the session number in the relay's last message of its collision guard (a fence), 0 for none.
     pub const fn association(&self) -> u16 {
         self.frames.association
     }
 
-    /// Returns the offer number in the relay's last hello, 0 for none.
+    /// Returns the number in the relay's last hello that an offer of a mission has to repeat, 0 for none.
     pub const fn offer_number(&self) -> u16 {
         self.frames.asked
     }
