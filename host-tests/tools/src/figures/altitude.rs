@@ -39,9 +39,10 @@ fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }
 
-/// Returns the pairs of interferer's offset and altitude, m, that are drawn.
+/// Returns the points of the figure: pairs of the interferer's distance from the line and an altitude.
 ///
-/// Altitudes are 5 m apart; near the paper's best one and at its offset they are 0.5 m apart.
+/// Both are in m. Altitudes are 5 m apart. For the distance of the interferer at which the paper reads its best
+/// altitude, they are 0.5 m apart near that altitude.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {

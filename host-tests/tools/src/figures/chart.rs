@@ -50,7 +50,8 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-/// Style of a curve. Curves of a chart differ in colour, stroke and marker, so one of these is enough.
+/// Style of a curve. Curves of a chart differ in colour, stroke and marker, so that a reader who cannot tell the
+/// colours apart recognises them, too.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
     /// Number of the colour, from 0 to 6, which also selects the shape of the markers.

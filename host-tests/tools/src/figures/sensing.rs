@@ -10,9 +10,9 @@ use crate::listening::{
 };
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Number of random scenes for each curve of the figure with interferers that do not move.
+/// Number of random arrangements of interferers for each curve of the figure in which they do not move.
 pub const SCENES: u64 = 60;
-/// Number of random scenes for each speed in the figure with a moving interferer.
+/// Number of random arrangements for each speed in the figure with a moving interferer.
 pub const PASSES: u64 = 6;
 
 /// Speeds of the moving interferer, m/s.

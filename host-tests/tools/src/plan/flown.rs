@@ -56,7 +56,7 @@ impl Flown {
 
 /// Returns the positions on which `relays` relays in `scenario` would agree by `method`.
 ///
-/// Work: that of [`super::plan`] twice.
+/// The cost is that of two calls of [`super::plan`].
 pub fn flown(
     scenario: &Scenario,
     relays: u16,
@@ -82,7 +82,9 @@ pub fn flown(
     })
 }
 
-/// Returns the plan of what the relays find on board. Its SIRs are against all interferers of the scenario.
+/// Returns the plan with the positions that the relays would find on board by `method`.
+///
+/// Relays use one hypothetical interferer in place of several, but the SIRs in the plan are against all of them.
 fn alone(
     scenario: &Scenario,
     relays: u16,

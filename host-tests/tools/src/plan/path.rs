@@ -28,10 +28,10 @@ const MOST_EVEN: u32 = 1_402;
 
 /// Number of dense grid points on each side of Tx, Rx and every interferer.
 const DENSE: i32 = 22;
-/// Ratio of the distances of two successive dense grid points from their end or interferer.
+/// Ratio by which each dense grid point is farther from Tx, Rx or an interferer than the point before.
 const RATIO: f64 = 1.4;
 
-/// Distance of the nearest dense grid point from its end or interferer, relative to the line's length.
+/// Distance of the nearest dense grid point from Tx, Rx or an interferer, relative to the line Tx-Rx.
 const NEAREST: f64 = 1e-4;
 
 /// Number of grid points in the window around a relay's position; odd, to include the position.
@@ -48,7 +48,9 @@ const NARROWEST: f64 = 1e-7;
 /// Rounding error allowed in a distance of two positions, as a fraction of the line Tx-Rx.
 const ROUNDING: f64 = 1.2e-7;
 
-/// Factor of the small term of a hop's time that decides between equal times in favour of higher SIRs.
+/// Weight of a small extra time that decides between hops of equal time in favour of the higher SIR.
+///
+/// Hops at the same rate step of a radio have equal times.
 const GUIDE: f64 = 1e-3;
 
 /// Calculator of the time, s Hz, that each hop of a scene needs for one bit of data to Rx.
@@ -203,7 +205,7 @@ impl<'a> Times<'a> {
         self.add(total, self.time(&last, from, self.rx(), guide))
     }
 
-    /// Returns the x of the first grid's points, m, ascending. They are dense near ends and interferers.
+    /// Returns the x of the first grid's points, m, ascending. They are denser near Tx, Rx and the interferers.
     fn grid(&self) -> Vec<f64> {
         let d = self.scene.distance_m;
         // Relays that gather keep exactly their least separation: it is a whole number of steps.

@@ -25,7 +25,7 @@ pub enum BlockError {
     Points(usize),
     /// Error: the drone would reject the configuration, for this reason.
     Config(ConfigError),
-    /// Error: the drone would reject the sites of Tx and Rx, for this reason.
+    /// Error: the drone would reject the surveyed positions of Tx and Rx, for this reason.
     Course(CourseError),
     /// Error: the drone would read a different configuration from the block.
     Changed,
@@ -166,7 +166,8 @@ impl Flight {
         Self { secret, ..self }
     }
 
-    /// Sets the drones' greatest speed, m/s. It has no effect without sites in the scenario.
+    /// Sets the drones' greatest speed, m/s. It has no effect if the scenario lacks geographic positions of Tx and
+    /// Rx.
     pub fn no_faster_than(mut self, speed_m_s: f32) -> Self {
         if let Some(sites) = &mut self.sites {
             sites.speed_m_s = speed_m_s;
@@ -182,7 +183,9 @@ impl Flight {
         }
     }
 
-    /// Returns true if the scenario has the sites of Tx and Rx, which setpoints for an autopilot need.
+    /// Returns true if the scenario has the geographic positions of Tx and Rx.
+    ///
+    /// An autopilot needs these, because its setpoints are latitudes and longitudes.
     pub const fn has_sites(&self) -> bool {
         self.sites.is_some()
     }
@@ -278,9 +281,10 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     [settings.probe_after, settings.dead_after]
 }
 
-/// Returns the `probe_after_ms` of a block: `given_ms` of the command line, otherwise the section's.
+/// Returns the silence, ms, after which a relay with this block probes a neighbour.
 ///
-/// 0 means the firmware's default. `name` is that of the scenario, for errors.
+/// It is `given_ms` from the command line, otherwise the value of the scenario's section `network`; 0 selects the
+/// firmware's default. `name` is that of the scenario, for errors.
 ///
 /// # Errors
 /// A line that names a key whose value no block can express, the value and the allowed one.
