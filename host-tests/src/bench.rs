@@ -121,7 +121,7 @@ impl Bench {
 
     /// Returns the ground station at `end`; the first call creates it.
     ///
-    /// `base` is the mission that it was loaded with, `auth` authenticates its frames.
+    /// `base` is the mission loaded into it before flight, `auth` authenticates its frames.
     pub fn ground(&mut self, base: &Mission, end: Side, auth: Auth) -> &mut Ground {
         let ground = || Ground::new(base, end, NETWORK, Wiring::Pair, auth);
         self.grounds[end as usize].get_or_insert_with(ground)

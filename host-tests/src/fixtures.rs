@@ -42,7 +42,7 @@ pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
     Relay::new(mission, identity, settings, u32::from(index), Instant::ZERO).unwrap()
 }
 
-/// Returns what a relay stores of a vote, after it has agreed on view `number`, proposed by relay 1.
+/// Returns the stored record of a relay that has agreed on view `number`, proposed by relay 1.
 ///
 /// The view (membership of the chain) has `relays` relays. `base` is the digest of the mission loaded before flight;
 /// `member` is true if the relay is in the view.

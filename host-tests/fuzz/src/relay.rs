@@ -179,8 +179,8 @@ impl Bench {
         }
     }
 
-    /// Delivers arbitrary bytes. A recorded handshake among them changes the relay's nonces, so the fuzzer then
-    /// forgets its simulated neighbours.
+    /// Delivers arbitrary bytes. If they contain a recorded handshake, it changes the relay's nonces, so the fuzzer
+    /// then forgets its simulated neighbours.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);

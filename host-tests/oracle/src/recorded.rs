@@ -185,7 +185,7 @@ pub fn all() -> Result<&'static [Record]> {
 /// `None` if no chain has a positive SIR and keeps the minimum separation.
 ///
 /// # Errors
-/// If the scene is not recorded: `SEED` and `COUNT` of a test can select recorded scenes only.
+/// If the problem is not recorded: `SEED` and `COUNT` of a test can select recorded problems only.
 pub fn optimum(
     link: &Link,
     corridor: Corridor,

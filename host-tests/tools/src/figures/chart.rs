@@ -199,7 +199,9 @@ impl Chart {
 
 const STEPS: f64 = 6.0;
 
-/// Largest number of decades on a logarithmic axis with labels at 2 and 5, too, not only at 1.
+/// Largest number of decades on a logarithmic axis with tick labels at 1, 2 and 5 times a power of ten.
+///
+/// A longer axis has labels at powers of ten only.
 const FEW_DECADES: f64 = 2.4;
 
 /// Distance that a tick may lie beyond an end of the axis, as a fraction of its length.

@@ -37,7 +37,9 @@ pub enum Kind {
     Even,
 }
 
-/// Table row: expected SIR of a chain in an interference field after one pass of messages along it.
+/// Table row: expected SIR of a chain after one pass of messages along it.
+///
+/// The interference is random; its distribution is known along the line Tx-Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     field: Kind,
@@ -88,7 +90,7 @@ fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     })
 }
 
-/// Returns the mission of `relays` relays in the interference field `kind`.
+/// Returns the mission of `relays` relays whose interference along the line Tx-Rx is of this kind.
 pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     let points = field(kind)?;
     let spec = Field {

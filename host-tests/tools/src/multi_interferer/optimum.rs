@@ -304,8 +304,8 @@ impl<'a> Stages<'a> {
 
     /// Returns the x of each relay, m, in a chain that meets the target if [`Stages::is_met`].
     ///
-    /// They rise from Tx to Rx. Each relay is as near to an even division of the remaining distance as the target
-    /// allows. `None` if the feasible positions are not connected.
+    /// They rise from Tx to Rx. Each relay divides the rest of the line among the remaining hops as evenly as the
+    /// target allows. `None` if the feasible positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;
@@ -600,8 +600,8 @@ pub(super) struct Crossing {
 
 /// Returns the points, in rising order, at which the function `exact` crosses `level`.
 ///
-/// `values` are those of the function at the rising `nodes`. Two crossings between neighbouring nodes are missed.
-/// Work: about 60 evaluations per crossing.
+/// `values` are those of the function at the rising `nodes`. Two crossings between neighbouring nodes are missed. The
+/// cost is about 60 evaluations for each crossing.
 pub(super) fn crossings(
     nodes: &[f64],
     values: &[f64],

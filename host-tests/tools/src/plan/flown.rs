@@ -121,7 +121,7 @@ const SAME_M: f64 = 0.1;
 /// Tolerated difference of the SIR, dB, between the file's plan and the recomputed one.
 const SAME_DB: f64 = 0.01;
 
-/// Returns the section `[plan]` of a scenario file with the positions of `flown`.
+/// Returns the section `[plan]` of a scenario file for the relays' agreed positions `flown`.
 pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned {
     let places: Vec<PlannedPlace> = flown
         .plan
@@ -187,8 +187,9 @@ fn value(of: impl Into<Value>) -> Item {
     Item::Value(of.into())
 }
 
-/// Checks that the plan in the scenario file equals what the relays would agree on, `flown`. `flown` must be computed
-/// for the same number of relays and method.
+/// Checks that the plan in the scenario file equals `flown`, on which the relays would agree.
+///
+/// `flown` must be computed for the same number of relays and method.
 ///
 /// # Errors
 /// A line that states the differences.

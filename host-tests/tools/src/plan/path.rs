@@ -53,7 +53,9 @@ const ROUNDING: f64 = 1.2e-7;
 /// Hops at the same rate step of a radio have equal times.
 const GUIDE: f64 = 1e-3;
 
-/// Calculator of the time, s Hz, that each hop of a scene needs for one bit of data to Rx.
+/// Calculator of the time that each hop of a chain needs for one bit of data to Rx.
+///
+/// The unit is s Hz: the time in s for a bandwidth of 1 Hz.
 #[derive(Clone, Debug)]
 pub struct Times<'a> {
     scene: &'a Scene,
@@ -71,7 +73,8 @@ struct Point {
 }
 
 impl<'a> Times<'a> {
-    /// Creates the calculator for a scene. `reverse` is the rate back to Tx over that to Rx, 0 for one direction.
+    /// Creates the calculator for a chain. `reverse` is the required rate to Tx, as a fraction of the rate to Rx; 0
+    /// for one direction.
     pub fn new(scene: &'a Scene, radio: &'a Radio, reverse: f64) -> Self {
         let steps = match &radio.link.model {
             RateModel::Shannon { .. } => Vec::new(),
@@ -398,7 +401,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Computes the best chains on the grid, for 1 relay up to the number of relays of the scene.
+    /// Computes the best chains on the grid, for 1 relay up to all relays of the chain.
     pub fn new(times: &Times<'_>) -> Self {
         let grid = times.grid();
         let mut layers = Layers::new(times);

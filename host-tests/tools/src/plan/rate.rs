@@ -222,7 +222,7 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
 
 /// Relative gain in rate above which a larger number of relays counts as better.
 ///
-/// Without a least separation more relays never carry less, so tiny gains are ignored.
+/// Smaller gains are ignored, so that the best number is not a larger one that gains next to nothing.
 const RISE: f64 = 1e-4;
 
 /// Largest number of relays for which [`carry_no_more`] looks for a proof.

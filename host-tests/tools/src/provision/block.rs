@@ -21,7 +21,7 @@ use super::config::{
 pub enum BlockError {
     /// Error: the scenario is not a valid mission, for this reason.
     Refused(Refusal),
-    /// Error: the interference field has this many points, more than a block can hold.
+    /// Error: the scenario states the interference at this many positions, too many for a block.
     Points(usize),
     /// Error: the drone would reject the configuration, for this reason.
     Config(ConfigError),
@@ -148,7 +148,7 @@ impl Flight {
         Self { method, ..self }
     }
 
-    /// Sets how the relays measure the interference field; `None` if they do not.
+    /// Sets how the relays measure the interference along the line Tx-Rx; `None` if they do not.
     pub fn measuring(self, measure: Option<Measure>) -> Self {
         Self { measure, ..self }
     }
