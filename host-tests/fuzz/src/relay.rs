@@ -27,7 +27,7 @@ const MAX_WAKES: u8 = 64;
 /// Fuzz target. Reads `data` as a mission, a relay, its settings, and operations on it.
 ///
 /// # Panics
-/// The relay breaks a promise that `watch` checks, or an intact frame is not counted exactly once.
+/// The relay breaks a rule that the module `watch` checks, or an intact frame is not counted exactly once.
 pub fn relay(data: &[u8]) {
     _ = flown(data);
 }

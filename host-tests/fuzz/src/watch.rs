@@ -193,10 +193,10 @@ impl Watched {
         heap::without_allocation(|| self.relay.restart(now));
     }
 
-    /// Handles the relay's timeouts, returns its frames and events, and checks its promises.
+    /// Handles the relay's timeouts, returns its frames and events, and checks the rules that it must keep.
     ///
     /// # Panics
-    /// A promise is broken.
+    /// The relay breaks a rule.
     pub fn settle(&mut self, now: Instant) -> (Vec<Sent>, Vec<Event>) {
         heap::without_allocation(|| self.relay.handle_timeout(now));
         let mut sent = Vec::with_capacity(MOST_FRAMES);

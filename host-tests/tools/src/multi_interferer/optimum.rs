@@ -237,7 +237,7 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Intervals of x in which each relay may be, so that the rest of the chain meets one target SIR.
+/// Intervals of x in which each relay may be, so that all hops from it on to Rx meet one target SIR.
 ///
 /// They are computed from Rx to Tx. The hop from Tx to the first relay is not checked.
 pub(super) struct Stages<'a> {
@@ -246,7 +246,7 @@ pub(super) struct Stages<'a> {
     target: f64,
     /// Feasible hops sent by relays N - 1, N - 2, and so on to 1, in this order.
     before: Vec<Stage>,
-    /// Positions of relay 1 from which the rest of the chain can meet the target.
+    /// Positions of relay 1 from which all hops on to Rx can meet the target SIR.
     first: Vec<Span>,
 }
 

@@ -197,10 +197,10 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
     if other.1 > one.1 { other } else { one }
 }
 
-/// Finds the altitude or lateral position near `own` that maximises the SIR of `at`.
+/// Finds the altitude or lateral position near `own` at which a relay has the best SIR.
 ///
-/// Returns the relay's position and SIR there. `window` is the fraction of the range `least` to `most` that is
-/// searched on either side.
+/// `at` returns the relay's best position and its SIR for a given altitude or lateral position; the best of these is
+/// returned. `window` is the fraction of the range `least` to `most` that is searched on either side.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

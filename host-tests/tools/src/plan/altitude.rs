@@ -16,8 +16,9 @@ use uav_relay_scenario::Scenario;
 
 type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as usize / 10 }>;
 
-/// Returns the plan of the joint method, which chooses x, side and altitude of each of `relays` relays. If that finds
-/// none, the relays stay at their own altitudes.
+/// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
+///
+/// If the method finds none, the relays keep the altitudes that the scenario gives them.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     match joint(&briefed) {

@@ -91,7 +91,7 @@ impl<'a> Carried<'a> {
     /// [`Carried::new`].
     ///
     /// # Errors
-    /// [`NoPlan`] if there is no mission, or if no positions give every hop an SIR above 0.
+    /// [`NoPlan`] if the scenario is not a valid mission, or if no positions give every hop an SIR above 0.
     pub fn plan(&self, relays: u16) -> Result<Plan, NoPlan> {
         let by_sir = source::best(self.scenario, relays, self.tolerance)?;
         let briefed = ProfiledMission::new(self.scenario, relays, self.tolerance)?;

@@ -33,7 +33,7 @@ pub use altitude::solved;
 
 /// Finds the relay positions that `ask` requests for `scenario`, and their SIRs.
 ///
-/// Work: some milliseconds; with free altitudes up to some seconds for fifty relays or more.
+/// It takes some milliseconds; with free altitudes up to some seconds for fifty relays or more.
 ///
 /// # Errors
 /// [`NoPlan`]: an invalid request, or one that cannot be met, with the best SIR found.

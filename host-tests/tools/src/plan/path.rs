@@ -427,9 +427,9 @@ impl Table {
         Self { starts }
     }
 
-    /// Returns the largest number of relays whose grid time is at most 1 + `loss` times the least one.
+    /// Returns the largest number of relays whose time per bit on the grid is near the least one.
     ///
-    /// It is 0 if no time is finite.
+    /// It is at most 1 + `loss` times the least time of all numbers of relays. Returns 0 if no time is finite.
     pub fn largest_within(&self, loss: f64) -> u16 {
         let times = || self.starts.iter().map(|(time, _)| *time);
         let best = times().fold(f64::INFINITY, f64::min);
@@ -438,7 +438,7 @@ impl Table {
         u16::try_from(last).unwrap_or(u16::MAX)
     }
 
-    /// Returns the x of the relays, m, in the best grid chain of `relays` relays; `None` if there is none.
+    /// Returns the x of `relays` relays, m, in their best chain on the grid; `None` if there is none.
     pub fn start(&self, relays: u16) -> Option<&[f64]> {
         let at = usize::from(relays).checked_sub(1)?;
         self.starts.get(at).map(|(_, x)| x.as_slice())

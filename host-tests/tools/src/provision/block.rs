@@ -107,7 +107,7 @@ pub struct Flight {
 impl Flight {
     /// Creates the configuration of `uavs` relays in `scenario`, with the network number `network`.
     ///
-    /// The method is `align`, without measurements. `tolerance` is the relative one of the SIR.
+    /// The method is `align`, without measurements. `tolerance` is the relative tolerance on the achieved SIR.
     ///
     /// # Errors
     /// [`BlockError`] if the scenario is not a valid mission, or does not fit into a block.

@@ -242,7 +242,8 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rate found with all relays, bit/s/Hz. The search also starts from `others`.
+    /// Returns the largest data rate found with all relays, bit/s/Hz. The search also starts from the positions
+    /// `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> f64 {
         let grid = self.on_grid();
         let starts = [grid.last().unwrap().as_slice(), others];

@@ -45,7 +45,9 @@ use crate::reference::joint::{Corridor, FixedCrossSection};
 use crate::reference::{Link, Relay};
 use uav_relay_scenario::number::narrow;
 
-/// Random link, and the corridor in which its relays choose positions. In the link they are at its lowest altitude.
+/// Random link, and the corridor in which its relays choose positions.
+///
+/// The corridor limits altitude and lateral position. In the link all relays are at its lowest altitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Chain of relays with Tx, Rx and interferer.
