@@ -234,8 +234,9 @@ impl Watched {
         (sent, events)
     }
 
-    /// Checks the relay's view: views increase, and each is reported and counted. The relay has an index in its view,
-    /// between its neighbours.
+    /// Checks the relay's view (membership of the chain): views increase, and each is reported and counted.
+    ///
+    /// The relay must have an index in its view, and the neighbours must be before and after it.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -263,8 +264,10 @@ impl Watched {
         self.stats = stats;
     }
 
-    /// Checks the relay's setpoint. Each change is reported. The setpoint is the agreed position, or inside the
-    /// guard's geofence.
+    /// Checks the relay's setpoint, and that each of its changes is reported.
+    ///
+    /// Without a collision guard the setpoint must be the agreed position. With a guard it must be inside the
+    /// geofence, or at least no farther outside than before.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
@@ -307,8 +310,9 @@ impl Watched {
         }
     }
 
-    /// Checks the relay's agreed position. It is between Tx and Rx and in the lateral range, at an altitude that this
-    /// relay may have.
+    /// Checks the relay's agreed position.
+    ///
+    /// It must be between Tx and Rx, in the permitted lateral range, and at an altitude permitted to this relay.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.agreed_place();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {

@@ -162,7 +162,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
-    /// Appends a lateral position y, m, within 1e5 or 100 to either side.
+    /// Appends a lateral position y, m. Either up to 100 m or up to 1e5 m on either side of the line is possible.
     pub(super) fn lateral(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));

@@ -15,7 +15,7 @@ use super::{
     one_both_ways,
 };
 
-/// Returns the plan with the fewest relays, at their own altitudes, that meet the SIR `target`.
+/// Returns the plan with the fewest relays that meet the SIR `target`; relays keep their own altitudes.
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     let how = if scenario.reverse > 0.0 {
         "eq. (Opt) for both directions"
