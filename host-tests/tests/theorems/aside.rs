@@ -64,10 +64,7 @@ fn no_worse_than_brute_force(
         SceneResult { case, short, told }
     };
     // Fewer scenes than in the theorems' tests, because the search is expensive.
-    let seen: Vec<SceneResult> = (0..count(3_000) as u64)
-        .into_par_iter()
-        .map(look)
-        .collect();
+    let seen: Vec<SceneResult> = (0..count(3_000) as u64).into_par_iter().map(look).collect();
     let mut cases = BTreeMap::new();
     for one in &seen {
         *cases.entry(one.case.clone()).or_insert(0) += 1;
