@@ -69,7 +69,7 @@ pub(crate) struct Context<'a> {
     pub(crate) member: &'a Member,
     /// Identifier of the newest mission that this relay has stored. The relay may still fly an older one.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last one of its chain: it has no neighbour on the side away from the leader.
+    /// True if this relay is the last one of its chain, with no neighbour on the side away from the leader.
     pub(crate) end: bool,
     /// Remaining leases of other relays, which delay the use of a new view's positions.
     pub(crate) other_leases: OtherLeases,

@@ -120,7 +120,7 @@ pub(crate) struct IndexClaims {
     /// Last contact with another node of this number: its time, and a flag; `None` before any. The flag is true if
     /// this relay already had a position at the first contact.
     contest: Option<(Instant, bool)>,
-    /// Times at which a number was last seen in use by two nodes: this relay's number, a neighbour's number.
+    /// Times at which a number was last seen used by two nodes: this relay's number, a neighbour's number.
     observed: [Option<Instant>; 2],
     /// Time at which this relay last received a frame that it had sent itself.
     echoed: Option<Instant>,
