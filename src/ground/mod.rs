@@ -554,8 +554,8 @@ pub enum Progress {
         /// Node number of the relay that flies the mission.
         by: u16,
     },
-    /// All relays of a view (agreed members of the chain) fly the mission. Relays outside this view take no part
-    /// until they fly the mission, too.
+    /// Complete: all relays of a view (agreed members of the chain) fly the mission. Relays outside this view take no
+    /// part until they fly the mission, too.
     Flown {
         /// Node number of the relay that reports that all relays of its view fly the mission.
         by: u16,
