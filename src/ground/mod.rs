@@ -317,7 +317,7 @@ impl Ground {
     }
 
     /// Handles a hello of relay `by` that answers the query for the mission that it flies. If the relay has stored an
-    /// uploaded mission, its next message contains it.
+    /// uploaded mission, it sends that mission in its next message.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;

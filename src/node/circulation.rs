@@ -34,7 +34,8 @@ use crate::time::{Duration, Instant, Jitter};
 /// then twice as long, and each relay may take thirty steps of a computation.
 const SLOW: u32 = 4;
 
-/// Limit of n in the wait after n retransmissions, 2 << n hop times. The wait is thus at most eight hop times.
+/// Number of retransmissions after which the wait for a reply stops doubling. The wait after n of them is 2 << n hop
+/// times, so it is at most eight.
 const LOG_MOST: u32 = 2;
 
 /// Wait before the first retransmission on a lossy channel, in hop times. The neighbour's reply arrives earlier, even

@@ -92,7 +92,7 @@ const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 /// [`least_interval`] apart.
 const DEFENCES: u8 = 32;
 
-/// Number of claims by which this relay answers another frame that bears its node number.
+/// Number of claims by which this relay answers a frame with its node number that is no claim.
 ///
 /// With signed frames it is the number of claims after this relay has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
@@ -302,7 +302,7 @@ impl IndexClaims {
         }
     }
 
-    /// Schedules repeated claims against `rival`, for some seconds or until `rival` is known to be passive.
+    /// Schedules repeated claims in answer to `rival`, for some seconds or until `rival` is passive.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {

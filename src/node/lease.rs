@@ -96,8 +96,8 @@ impl Lease {
         }
     }
 
-    /// Extends by the longest lease the time for which other members may rely on this relay. A lease from before this
-    /// relay's restart may still run at these members.
+    /// Assumes that other members may rely on this relay for a whole lease longer than before. A lease from before
+    /// this relay's restart may still run at these members.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }

@@ -130,11 +130,11 @@ pub(crate) struct Session {
 /// Result of the authentication of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// Valid new message of a member; `first` if it is the first proof that the node is present.
+    /// Valid new message of the node. `first` is true if it is the first proof that the node is present.
     Fresh { first: bool },
-    /// New handshake that proves that the node is present; `first` if it is the first proof.
+    /// New handshake that proves that the node is present. `first` is true if it is the first such proof.
     Handshake { first: bool },
-    /// Handshake with the right tag but without proof: it may have been recorded.
+    /// Handshake with the right tag but no proof that the node is present: it may have been recorded.
     Unproven,
     /// Received frame without an authentication tag.
     Unsigned,

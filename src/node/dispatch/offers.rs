@@ -97,8 +97,9 @@ impl Node {
 
     /// Handles an offer of a mission from node `from` at `side`. Both have loaded the same mission before flight.
     ///
-    /// This relay replies with a hello. To an offer in time it does so only if it has stored or refused that mission,
-    /// or has a newer one; else the reply would trigger the same offer again.
+    /// An offer that repeats no recent number is answered by a hello, which the next offer can answer. After any
+    /// other offer a hello is sent only if this relay has stored or refused the mission, or has a newer one.
+    /// Otherwise the hello would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,

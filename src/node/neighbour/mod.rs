@@ -32,7 +32,8 @@ impl Neighbours {
         downstream: Neighbour::NONE,
     };
 
-    /// Starts the neighbours of node `node` at `now`: the next node numbers in a chain of `all` relays.
+    /// Starts both sides of relay `node` at `now`. The first neighbours are the relays with the next node numbers, in
+    /// a chain of `all` relays.
     pub(crate) fn begin(
         &mut self,
         node: u16,
@@ -75,7 +76,7 @@ impl Neighbours {
         self.upstream.has_changed(now) || self.downstream.has_changed(now)
     }
 
-    /// Leaves the view: there is no neighbour of an agreed view until the next view.
+    /// Leaves the view. Until the next view, no side has a neighbour that belongs to a view.
     pub(crate) const fn leave(&mut self) {
         self.upstream.leave();
         self.downstream.leave();

@@ -59,7 +59,7 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True once this relay has started a pass along the chain, until the start is counted.
+    /// True once this relay has started a pass along the chain, until the statistics count that start.
     pub(super) began: bool,
     /// Configured altitude and power of this relay.
     pub(super) profile: Profile,

@@ -162,7 +162,7 @@ impl Seats {
         }
     }
 
-    /// Returns true if the collection of profiles has begun, but not all of `relays` relays are known.
+    /// Returns true if the collection of profiles has begun, but some of the `relays` profiles are missing.
     pub(super) fn is_partial(&self, relays: u16) -> bool {
         self.known.is_some_and(|known| known < relays)
     }

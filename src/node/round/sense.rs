@@ -347,9 +347,9 @@ pub(super) struct SensorState {
     pub(super) named: u16,
     /// Leader's search for the relay with a faulty sensor, by leaving out one relay after the other.
     pub(super) trial: Trial,
-    /// Ground stations (Tx, Rx) whose measurements contradict the estimate; known at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements do not fit those of the relays; at the leader only.
     pub(super) ends: EndsOff,
-    /// True if the last measurements contradict each other, and no single relay explains that.
+    /// True if the last measurements contradict each other, and the faulty sensor was not found.
     pub(super) contradicted: bool,
     /// True if this relay measures nothing where the other relays' measurements predict interference.
     pub(super) deaf: bool,
@@ -361,7 +361,7 @@ pub(super) struct SensorState {
     pub(super) is_distributed: bool,
     /// Amount and expected error of the measurements from which the current estimate was made.
     pub(super) known: Knowledge,
-    /// Reason why the last collected measurements gave no estimate; `None` if they did.
+    /// Reason why the last collected measurements gave no estimate; `None` if they gave one.
     pub(super) unfit: Option<Unfit>,
     /// Interval between sensing passes, as a multiple of `Listen::every`. A sensing pass collects measurements.
     pub(super) wait: u32,

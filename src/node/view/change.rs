@@ -28,8 +28,8 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum number of views by which one message may advance the latest known view number. One message cannot use up
-/// all numbers.
+/// Maximum number of views by which one message may advance the latest known view number. One message thus cannot use
+/// up all numbers.
 const MAX_ADVANCE: u32 = 4096;
 
 /// State of one relay in view changes, by which the relays agree on the members of the chain.
@@ -103,8 +103,8 @@ impl ViewChange {
     }
 
     /// Records that another relay knows `view`. The latest known view advances by at most [`MAX_ADVANCE`] numbers,
-    /// because one message could otherwise use up all of them. A relay that was away for long receives `view` often
-    /// enough.
+    /// because one message could otherwise use up all of them. A relay that was away for long catches up, because it
+    /// receives `view` repeatedly.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
@@ -159,7 +159,8 @@ impl ViewChange {
         self.request.request_now(now);
     }
 
-    /// Handles a view proposal or a decision from a neighbour. This relay has stored the mission that it names.
+    /// Handles a view proposal or a decision from a neighbour. This relay has stored the mission of the proposed
+    /// view.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let all = context.member.all;
         match message {

@@ -139,7 +139,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of `node`, this relay, is no quorum for `proposal` without others. It does not vote.
+    /// Returns true if the vote of `node`, this relay, is not enough for a quorum on `proposal`. It does not vote.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -213,8 +213,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. At most `most`, also if the
-/// time is unknown.
+/// Returns the time until positions of the next view may be used, in tenths of a second. `most` is its maximum, and
+/// stands for an unknown time.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };

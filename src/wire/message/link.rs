@@ -28,8 +28,8 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could be inserted between the destination and its neighbour on this side. The sender and
-    /// that neighbour then receive each other.
+    /// True if the sender could be inserted between the destination and its neighbour on this side. This requires
+    /// that the sender and that neighbour receive each other.
     pub ready: bool,
     /// Number of connected relays from the sender to the end of the chain away from the destination. It includes the
     /// sender: 1 to 1000.

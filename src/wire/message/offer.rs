@@ -55,7 +55,7 @@ struct OfferBody {
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// Relative SIR that hops need in the direction from Rx to Tx, and transmit power of Rx in W.
+    /// Required SIR from Rx to Tx, relative to that from Tx to Rx, and transmit power of Rx in W.
     back: [f32; 2],
     /// Positions of Tx and Rx, encoded by [`Sites::to_bytes`]; all 0 if the upload has none.
     sites: SitesBody,

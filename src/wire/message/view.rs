@@ -42,7 +42,7 @@ pub struct Poll {
 }
 
 impl Poll {
-    /// Returns a poll without votes yet; `agreed` is the view whose members are polled.
+    /// Returns the state of a poll before any relay has voted. `agreed` is the view whose members vote.
     pub(crate) const fn of(agreed: View) -> Self {
         Self {
             agreed,

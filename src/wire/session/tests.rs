@@ -120,7 +120,8 @@ fn a_link_is_proven_by_three_handshakes_or_four_if_crossed() {
     }
 }
 
-/// Checks that a lost handshake does no lasting harm. The node without a proof requests again, and receives a reply.
+/// Checks that a lost handshake does no lasting harm. The node that lacks a proof of the other's presence requests it
+/// again.
 #[test]
 fn one_lost_handshake_leaves_both_ends_proven() {
     for lost in 0..4 {
@@ -336,8 +337,8 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks which frames under the relay's own number reveal another node with that number. It takes a handshake with
-/// the same key and no older epoch.
+/// Checks which frames under the relay's own number reveal another node with that number. Only a handshake with the
+/// same key and no older epoch does.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -426,7 +427,7 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks that of two nodes with one number, the silence of the larger claim admits the smaller one. Recorded frames
+/// Checks that of two nodes with one number, the smaller claim is accepted once the other is silent. Recorded frames
 /// of the node with the larger claim are then rejected, until it sends again.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
