@@ -321,7 +321,7 @@ impl MissionUpdate {
         uploads.is_some_and(|uploads| uploads.refused.replace(id) != Some(id))
     }
 
-    /// Stores `upload` if it is newer than the stored mission, for these relays, and within the geofence.
+    /// Stores `upload` if it is newer than the stored mission, and fits this relay's mission and geofence.
     pub(crate) fn store_if_newer(&mut self, member: &Member, upload: &Upload) -> Offered {
         let id = upload.id();
         if id <= self.latest {

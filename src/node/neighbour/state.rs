@@ -78,7 +78,7 @@ pub(crate) struct Neighbour {
     unselected_at: Option<Instant>,
     /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
-    /// Number of consecutive hellos without reception of this relay, for each node on this side.
+    /// Number of consecutive hellos that do not list this relay as received, for each node on this side.
     pub(super) not_received: ConsecutiveCounts,
     /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Reports go to the firmware;
     /// bit 0 is the nearest node.
@@ -592,7 +592,7 @@ impl PendingHeartbeat {
     };
 }
 
-/// Number of consecutive hellos without reception of this relay after which the sender is reported.
+/// Number of consecutive hellos that do not list this relay as received before a node is reported.
 ///
 /// Fewer may be due to a lost frame or two.
 const NOT_RECEIVED: u8 = 8;

@@ -311,7 +311,7 @@ mod tests {
         }
     }
 
-    /// Returns the record of a relay that has just started, in a chain of three.
+    /// Returns the stored votes of a relay that has just started, in a chain of three.
     fn fresh() -> ViewRecord {
         ViewRecord::new(digest(relay(3).mission()), Electorate::new(3, 1))
     }

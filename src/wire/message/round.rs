@@ -188,7 +188,7 @@ pub const MOST_NAMED: usize = 8;
 /// Profile of a relay, altitude and power, that differs from the mission's common one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Index in the view of the relay with this profile, from 1 next to Tx.
+    /// Index of the relay among the members of the view, 1 next to Tx.
     pub index: u16,
     /// Fixed altitude of the relay, m; 0 if the relay chooses its altitude.
     pub held_m: f32,
