@@ -3,7 +3,7 @@
 use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::watch::{ObservedState, groups, has_agreed};
 
-/// Returns the state of a flying relay: relay `index` of `relays` relays in membership view `view`.
+/// Returns the observed state of a flying relay: relay `index` of `relays`, in membership view `view`.
 fn seen(view: u32, relays: u16, index: u16) -> ObservedState {
     ObservedState {
         is_on: true,

@@ -15,12 +15,13 @@ use mavlink::dialects::common::{
 use super::*;
 use crate::vehicle::{Target, axis};
 
-/// Creates the only relay of a chain, with a motion guard, between the two sites of the vehicle.
+/// Creates the only relay of a chain, with a motion guard. Tx and Rx are where the simulated vehicle expects them.
 fn relay(settings: Settings) -> Relay {
     of(1, 1, settings)
 }
 
-/// Creates relay `index` of `relays` relays with a motion guard, between the two sites of the vehicle.
+/// Creates relay `index` of `relays` relays with a motion guard. Tx and Rx are where the simulated vehicle expects
+/// them.
 fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -34,7 +35,8 @@ fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Returns a copy of the autopilot link that has received the relay's current outputs once more.
+/// Returns a copy of the autopilot link that received the relay's outputs again. An equal copy shows that the link
+/// had received all of them.
 fn with_repeated_outputs(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     let mut link = link.clone();
     link.handle_ready(now, relay.is_ready());
@@ -182,7 +184,9 @@ fn exchange_passes_the_radios_noise_to_the_relay() {
     assert_eq!(relay.stats().samples_rejected, 1);
 }
 
-/// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.
+/// Exchanges frames between two neighbouring relays with motion guards. A silent second relay gets and sends none.
+///
+/// The drone of `second` starts at x = `start_m` and flies to its setpoints at once.
 fn exchange_fences(
     first: &mut Relay,
     second: &mut Relay,
@@ -297,7 +301,9 @@ fn a_drone_out_of_sequence_cannot_be_engaged() {
     assert_eq!(vehicle.events.last(), Some(&waits));
 }
 
-/// Checks that the autopilot link follows its relay to a mission with other sites, and back.
+/// Checks that the autopilot link uses the new line if its relay adopts a mission that moves Tx.
+///
+/// A second mission then moves Tx back.
 #[test]
 fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
     let auth = Some(Auth {

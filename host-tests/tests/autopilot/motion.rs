@@ -298,7 +298,7 @@ fn a_wrong_clock_stops_positions_for_seconds_at_most() {
     }
 }
 
-/// Checks that setpoint control continues if the simulator pauses for 1.5 s and loses that time.
+/// Checks that setpoint control survives a pause of the autopilot of 1.5 s, which its clock loses.
 #[test]
 fn a_short_pause_of_the_autopilot_ends_no_flight() {
     for echoes in [true, false] {

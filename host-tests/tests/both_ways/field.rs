@@ -48,7 +48,7 @@ fn the_best_places_in_a_field_are_found() {
     }
 }
 
-/// Checks that the agreement equals, to the bit, the positions computed without messages.
+/// Checks that a chain agrees by messages on exactly the positions that are computed without messages.
 #[test]
 fn a_chain_in_a_field_agrees_on_its_silent_places() {
     let mut rng = generator(3322);

@@ -49,7 +49,8 @@ fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     assert!(once >= 55, "{once}");
 }
 
-/// Checks that relays whose missions differ in `reverse` or in the power of Rx do not form a chain.
+/// Checks that missions that differ in the requirement of the return direction do not match. Their digests must
+/// differ, so that relays with such missions do not form a chain. The requirement is `reverse` and the power of Rx.
 #[test]
 fn relays_with_other_ways_back_do_not_form_a_chain() {
     let mut rng = generator(3307);

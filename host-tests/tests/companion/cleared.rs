@@ -49,7 +49,7 @@ impl Drones {
         self.lines[index - 1].iter().any(|line| line.contains(part))
     }
 
-    /// Moves drones 1 and 2 to their setpoints until the condition holds.
+    /// Moves drones 1 and 2 to their setpoints until `is_so` returns true.
     fn fly_until(&mut self, is_so: impl Fn(&Self) -> bool) {
         let end = Instant::now() + LIMIT;
         while !is_so(self) {

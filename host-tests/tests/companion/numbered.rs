@@ -6,7 +6,7 @@ use crate::chain::{Chain, QUICK};
 use crate::files::until;
 use crate::medium::{Medium, QUIET};
 
-/// Checks that relay 3 keeps its number when relay 2 is lost and relay 3 is the second of two.
+/// Checks that relay 3 keeps its number in logs and status when relay 2 is lost. It is the second in the chain then.
 #[test]
 fn a_drone_keeps_its_number_when_its_place_changes() {
     let chain = Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK);
