@@ -11,8 +11,9 @@ use uav_relay_oracle::reference::Link;
 
 use super::{ROUNDING, chain, round};
 
-/// Returns the mission of `link`, and its relays' profiles by index. Relays beyond the last one have the common
-/// profile.
+/// Returns the mission of `link`, and a function from a relay's index to its altitude and power.
+///
+/// A relay beyond those of `link` has the common profile of the mission.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
     let of = move |index: u16| profile_of(&mission, &own, index);
@@ -27,7 +28,8 @@ fn with(link: &Link, relays: usize) -> Link {
     link
 }
 
-/// Returns the fewest relays that meet `target`, by trying each number in f64; 0 if more than `most`.
+/// Returns the fewest relays that meet `target`, by trying each number in f64. Returns 0 if there is none up to
+/// `most`.
 fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
     let all = with(link, most);
     let mut from = 0.0;

@@ -41,7 +41,7 @@ const ROUGH_S: f64 = 120.0;
 /// Time at which a flight fails if not all drones have arrived, s.
 const LAST_S: f64 = 900.0;
 
-/// Line of relays over the ground. All lines start at the same transmitter.
+/// Line from Tx to Rx: its number, and its direction on the ground. All lines start at the same Tx.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     number: u32,
@@ -178,11 +178,11 @@ struct World {
     least_m: Vec<f64>,
     /// Time since which each drone has hovered under its pilot's control, s; infinite for other drones.
     hovers_s: Vec<f64>,
-    /// Time when a drone first received the position of its hovering neighbour, s; infinite before. The neighbour
+    /// Time when a drone first received the position of a hovering neighbour, s; infinite before. The neighbour
     /// hovers under its pilot's control.
     known_s: Vec<f64>,
-    /// Distance required of a drone and a neighbour that hovers under its pilot's control, m. It is set `BRAKES_S`
-    /// after `known_s`.
+    /// Distance required of a drone and a neighbour that hovers under its pilot's control, m. It applies from
+    /// `BRAKES_S` after the time in `known_s`, because the drone must brake first.
     hovering_m: Vec<f64>,
     /// Indices of drones whose pilots give control back as soon as no other drone is passing them.
     later: Vec<usize>,

@@ -193,7 +193,9 @@ impl World {
         least < most
     }
 
-    /// Checks that no two drones came closer in this step, or can come before they stop, than permitted.
+    /// Checks that no two drones are closer than permitted in this step, and cannot be soon after.
+    ///
+    /// The check covers each position where a drone may be before new setpoints arrive.
     fn check(&mut self) {
         let separation = f64::from(self.config.separation_m);
         let floor = separation - self.allowed_m();

@@ -290,7 +290,7 @@ impl Meeting {
         }
     }
 
-    /// Returns the longest time with setpoints at both duplicates, ms, and their final number of setpoints.
+    /// Returns the longest time with setpoints at both duplicates, ms, and how many have one in the end.
     fn fly(self) -> (u64, usize) {
         let rng = &mut ChaCha8Rng::seed_from_u64(self.seed);
         let chain = self.first_chain(rng);

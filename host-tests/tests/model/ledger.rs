@@ -159,7 +159,7 @@ impl Ledger {
         }
     }
 
-    /// Records that the relay received interference samples that it does not use.
+    /// Counts `samples` interference samples that the relay received but does not use.
     pub(crate) fn refuses(&mut self, samples: u32) {
         self.refused += samples;
     }
@@ -247,7 +247,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks that a relay holds its position only for a target SIR that the chain can meet.
+    /// Checks that a relay has an agreed position only for a target SIR that the chain can meet.
     fn check_target(&mut self, scenario: &Scenario, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let target = relay.target();

@@ -18,13 +18,13 @@ use super::wires::Pass;
 /// that travels along the chain. No other pass has a multiple of this number.
 const FIRST: u16 = 64;
 
-/// Number of latest passes (rounds of messages along the chain) that are known to be over.
+/// Number of passes (rounds of messages along the chain) before the last one that count as late.
 ///
-/// A pass with an older number counts as one from before a reboot. A leader's next pass may skip at most so many
-/// numbers.
+/// A pass with an older number counts as one from before a reboot. A leader's next pass has a number that is at most
+/// this much larger.
 const NEAR: u16 = 32;
 
-/// Returns what a membership view adds to the mission digest in its messages along the chain.
+/// Returns the number that messages along the chain add to the mission digest in a membership view.
 ///
 /// It is the lower half of the view's 32-bit name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {

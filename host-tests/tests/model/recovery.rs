@@ -35,7 +35,7 @@ impl World<'_> {
             .collect()
     }
 
-    /// Runs the chain until every relay holds a position for the same target SIR. Returns the time taken.
+    /// Runs the chain until every relay has an agreed position for the same target SIR. Returns the time taken.
     fn agree(&mut self, at_most: Duration) -> Checked<Duration> {
         let begun = self.now;
         while !self.agrees() {
@@ -52,8 +52,8 @@ impl World<'_> {
 
     /// Returns the longest permitted time to an agreement after a restart in any state of the chain.
     ///
-    /// It allows for one lost message on each line. A relay that waits for a result over h hops retransmits after (2
-    /// h + 2) `hop_time` and an eighth.
+    /// It allows for one lost message in each direction of each link. A relay that waits for a result over h hops
+    /// retransmits after (2 h + 2) `hop_time` and an eighth.
     fn patience(&self) -> Duration {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;

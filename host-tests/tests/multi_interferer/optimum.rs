@@ -120,7 +120,7 @@ fn a_scene_without_an_optimum_has_none() {
     assert!(held(false) && !held(true));
 }
 
-/// Checks that a chain of as many relays as the separation permits is placed, and one of a thousand.
+/// Checks that positions are found for as many relays as the separation permits, and for a thousand.
 ///
 /// The thousand relays have different powers. One relay too many must be refused.
 #[test]

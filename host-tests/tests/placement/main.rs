@@ -87,7 +87,7 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
 
 /// Checks that chains of 1 to 50 relays, identical or with their own powers, reach the optimum.
 ///
-/// D is 10 m to 100 km, and the interferer is anywhere.
+/// Tx and Rx are 10 m to 100 km apart, and the interferer is anywhere.
 #[test]
 fn the_optimum_is_found_on_random_links() {
     let own_power = Style {
