@@ -19,7 +19,7 @@ fn round(value: f64) -> f64 {
 }
 
 /// Draws a scenario with interferers or a field of interference. It may have ranges of altitude and lateral offset, a
-/// separation, and own relay profiles.
+/// separation, and relays with their own altitude and power.
 fn scenario(rng: &mut impl Rng) -> Scenario {
     let style = Style {
         relays: 1..=1,

@@ -58,8 +58,9 @@ fn upload(
 
 /// Checks a run with uploads. Returns the first fault as an error.
 ///
-/// Members of a membership view must fly the same mission, which a quorum has held. Setpoints must be within limits.
-/// A settled chain must fly `version`, in the positions of a new chain with `config`.
+/// All members of a membership view must fly the same mission. At least as many relays must have received that
+/// mission before. Setpoints must be within limits. A settled chain must fly `version`, in the positions of a new
+/// chain with `config`.
 fn judge(
     setup: &Setup,
     outcome: &Outcome,

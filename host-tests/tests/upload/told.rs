@@ -200,8 +200,10 @@ fn an_upload_outside_the_geofence_is_refused_and_reported() {
     }
 }
 
-/// Checks that a relay with its own altitude refuses an upload like the others. Its geofence is wider only for that
-/// altitude.
+/// Checks that a relay with its own altitude refuses an upload like the others.
+///
+/// The uploaded altitude is outside the permitted range. It is within that relay's geofence only because the geofence
+/// includes the relay's own altitude.
 #[test]
 fn a_relay_with_its_own_altitude_refuses_like_the_others() {
     let base = at_120(3, Band::at(120.0));

@@ -27,7 +27,7 @@ pub(crate) struct Kind {
     pub(crate) seed: u64,
     /// Reception range on a shared channel, as a difference of relay indices.
     pub(crate) reach: usize,
-    /// Relay (from 0) that is loaded with another mission, and that mission.
+    /// Relay (from 0) that has another mission than the others before flight, and that mission.
     pub(crate) stranger: Option<(usize, Mission)>,
     /// Relay (from 0) whose epoch goes back at its second start.
     pub(crate) goes_back: Option<usize>,
@@ -125,7 +125,8 @@ pub(crate) struct Air {
     pub(crate) groups: usize,
     /// Time at which the largest number of groups flew different agreements, µs.
     pub(crate) groups_us: u64,
-    /// Time since which all relays have held positions in one view, µs; `None` while they do not.
+    /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
+    /// the agreed membership of the chain.
     pub(crate) whole_since_us: Option<u64>,
     /// Number of relays that may be missing from an agreement that counts as flown.
     pub(crate) spare: usize,
@@ -497,7 +498,7 @@ impl Air {
         holding.iter().filter_map(of).max().unwrap_or(0)
     }
 
-    /// Returns true if all relays are on and hold positions in one membership view of all relays.
+    /// Returns true if all relays are on and have agreed positions in one membership view of all relays.
     fn is_whole(&self) -> bool {
         let all = usize::from(self.kind.mission.relays());
         let is_on = |at: &usize| self.seen[*at].is_on;

@@ -15,7 +15,8 @@ use host_tests::fixtures::voted;
 use rand::{RngExt, SeedableRng};
 use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
-/// Longest permitted time from the last fault until all relays hold positions in one view, s.
+/// Longest permitted time from the last fault until all relays have agreed positions in one view, s. A view is the
+/// agreed membership of the chain.
 const WHOLE_S: u64 = 120;
 
 /// Returns the environment variable `name` as a number, or `usual`.
@@ -28,7 +29,7 @@ fn number(name: &str, usual: u64) -> u64 {
 struct Measured {
     seed: u64,
     /// Time from the last fault until the chain was whole for good, s; `None` beyond 15 minutes. In a whole chain,
-    /// all relays hold positions in one membership view.
+    /// all relays have agreed positions in one membership view.
     whole_s: Option<f64>,
     groups: usize,
     groups_s: f64,
@@ -133,7 +134,8 @@ fn every_schedule_ends_in_one_whole_chain_within_120_s() {
 /// Checks that of a relay and its copy, one loses its setpoint within 2 s.
 ///
 /// The copy is a second drone with the same index. The chain must be whole once one of them is removed. Two chains
-/// may fly at once only if a cut separates relay and copy, because each of them has its vote.
+/// may fly at once only if a cut separates relay and copy: both of them vote then, so that two parts may have a
+/// quorum.
 #[test]
 fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
