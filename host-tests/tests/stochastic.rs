@@ -235,7 +235,7 @@ fn even(relays: usize) -> StochasticLink {
     }
 }
 
-/// Checks that relays loaded with a constant field measure the true one, and agree again.
+/// Checks that relays whose mission has a constant field measure the true field, and agree again.
 #[test]
 fn measurements_replace_the_agreed_field() {
     let mut rng = generator(67);

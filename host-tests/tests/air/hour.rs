@@ -15,8 +15,8 @@ const DIES_S: u64 = 60;
 /// Time at which a run with a failing relay ends, s.
 const ENDS_S: u64 = 900;
 
-/// Returns eight relays on a CSMA channel of 57 600 baud that loses the fraction `share` of the frames. The losses
-/// come in runs of `burst` frames. The frames are signed.
+/// Returns the setup of eight relays on a CSMA channel of 57 600 baud that loses frames. It loses the fraction
+/// `share` of the frames, in runs of `burst` frames. The frames are signed.
 fn losing(share: f64, burst: f64) -> Setup {
     let mut setup = Setup::on_air(mission(8), Access::Csma);
     setup.link.baud = 57_600;

@@ -342,7 +342,8 @@ fn the_drone_is_engaged_and_led_to_its_position() {
     }
 }
 
-/// Checks that setpoint control ends if the autopilot falls silent. It returns only if the pilot chooses it again.
+/// Checks that setpoint control ends if the autopilot falls silent. Setpoint control returns only if the pilot
+/// chooses it again.
 #[test]
 fn a_silent_autopilot_is_found_again() {
     let mut scene = Scene::new(true);
@@ -399,8 +400,8 @@ fn a_stuck_writer_does_not_stop_the_readers() {
 
 /// Checks that a relay forgets its lost neighbour on an operator's command.
 ///
-/// An operator gives it when that neighbour's drone is gone. The firmware passes the relay's events to the autopilot
-/// link.
+/// The operator sends the command because the neighbour's drone is gone. The firmware passes the relay's events to
+/// the autopilot link.
 #[test]
 fn an_operator_clears_a_lost_relay() {
     let mut scene = Scene::of(2, true);

@@ -149,7 +149,7 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
 /// Random generator of attacks.
 pub(crate) struct Attacker {
     pub(crate) rng: ChaCha8Rng,
-    /// Bodies of valid messages of every kind.
+    /// Valid messages of every kind, each without a frame's header and CRC.
     pub(crate) messages: Vec<Plain>,
 }
 

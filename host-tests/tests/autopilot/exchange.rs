@@ -184,9 +184,10 @@ fn exchange_passes_the_radios_noise_to_the_relay() {
     assert_eq!(relay.stats().samples_rejected, 1);
 }
 
-/// Exchanges frames between two neighbouring relays with motion guards. A silent second relay gets and sends none.
+/// Exchanges frames between two neighbouring relays with motion guards.
 ///
-/// The drone of `second` starts at x = `start_m` and flies to its setpoints at once.
+/// If `is_silent` is true, the second relay neither receives nor sends frames. Its drone starts at x = `start_m` and
+/// flies to its setpoints at once.
 fn exchange_fences(
     first: &mut Relay,
     second: &mut Relay,

@@ -248,8 +248,8 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Largest permitted relative errors of a point's distance from the line. Each applies up to the distance in m that
-/// precedes it, which counts from the line's middle to the point.
+/// Pairs (d, e): points up to d m from the line's middle may have the relative error e. The error is that of a
+/// point's distance from the line.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
 #[test]

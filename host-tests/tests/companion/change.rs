@@ -12,8 +12,8 @@ use crate::pty::Pty;
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Chain of two relay processes without drones. Their mission's length is the distance of Tx and Rx in [`SITED`], so
-/// that it can be uploaded to with those positions.
+/// Chain of two relay processes without drones. The mission's length equals the distance of Tx and Rx in [`SITED`],
+/// so that the ground station may upload missions with these positions.
 struct Bench(Chain);
 
 impl Bench {

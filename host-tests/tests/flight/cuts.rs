@@ -8,7 +8,7 @@ use super::*;
 /// Longest time from the last repair of the chain until all relays are in one membership view, s.
 const SOON_S: f64 = 120.0;
 
-/// Returns all pairs of different links to cut, each link named by the relay before it.
+/// Returns all pairs of different links to cut, each given by the index of the relay before it.
 ///
 /// The first cut of a pair is also the first to heal.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {

@@ -28,7 +28,7 @@ const NOISE_M: f64 = 0.5;
 /// Rounding error of a position, m: positions are f32 of up to 1 km.
 const ROUNDING_M: f64 = 2e-3;
 
-/// Returns eight drones in order along x on one radio channel.
+/// Returns the setup of a flight of eight drones, which are in order along x, on one radio channel.
 fn eight(rng: &mut ChaCha8Rng) -> Setup {
     let mission = eight_apart(SEPARATION_M as f32);
     let mut setup = Setup::on_shared_channel(mission);

@@ -63,7 +63,7 @@ fn a_relay_rebooted_in_a_pass_gets_a_position_in_a_new_view() {
 }
 
 /// Checks that a relay that reboots in a settled chain gets a position by a new membership view. It requests the view
-/// at the first lease renewal that it does not know, or on its own.
+/// when it receives a lease renewal that it does not know, or else after a time by itself.
 #[test]
 fn a_relay_rebooted_later_gets_a_position_in_a_new_view() {
     for rebooted in 1..4 {

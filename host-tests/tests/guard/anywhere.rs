@@ -81,7 +81,7 @@ struct Drone {
     at: Point,
     velocity: Point,
     bias: Point,
-    /// Point that the autopilot is following, over the ground, m.
+    /// Point that the autopilot is following, m, in coordinates of the ground and not of a line.
     target: Point,
     /// Velocity of the point that the autopilot is following, m/s.
     target_velocity: Point,
@@ -371,7 +371,7 @@ impl World {
     }
 }
 
-/// Returns random agreed positions: in order along the line, separated, and within the box across it.
+/// Returns random agreed positions: in order along x, separated, and with y and altitude as permitted.
 fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(config.geofence.most_x_m);
     let step = f64::from(config.separation_m) * 1.001;

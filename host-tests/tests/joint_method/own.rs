@@ -19,7 +19,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Draws a chain in the vertical plane in which some relays have their own power or a held altitude. Returns `None`
+/// Draws a chain in the vertical plane in which some relays have their own power or a fixed altitude. Returns `None`
 /// if no relay differs.
 fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     let drawn = scenario(rng, &(2..=20), ROOMY);
@@ -63,7 +63,7 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     Some((drawn, setup))
 }
 
-/// Checks that chains with different powers or held altitudes come near the joint optimum. Their SIR is never below
+/// Checks that chains with different powers or fixed altitudes come near the joint optimum. Their SIR is never below
 /// that at the configured altitudes.
 #[test]
 fn different_relays_come_near_the_joint_optimum() {
@@ -117,7 +117,7 @@ fn different_relays_come_near_the_joint_optimum() {
     assert!(f64::from(passes) <= 3.5 * count as f64, "{passes}");
 }
 
-/// Checks that a relay that holds its altitude keeps it, while its neighbours choose others.
+/// Checks that a relay that is configured to keep its altitude does so. Its neighbours choose other altitudes.
 #[test]
 fn one_relay_may_have_a_fixed_altitude() {
     let (link, corridor) = close_by(6);

@@ -59,7 +59,7 @@ fn tick(settings: &Settings, relays: usize) -> Duration {
     Duration::from_micros(round.clamp(span / 64 + 1, span / QUESTIONS as u64))
 }
 
-/// Returns the longest interval of heartbeat requests to a neighbour, from the shortest one.
+/// Returns the longest interval of heartbeat requests to a neighbour, given the shortest one.
 fn spread(tick: Duration) -> Duration {
     Duration::from_micros(tick.as_micros() + tick.as_micros() / 8 + 1)
 }

@@ -4,7 +4,7 @@ use uav_relay_oracle::reference::joint::Place;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Relay};
 
-/// Relative excess over the optimum that f32 rounding permits a target SIR.
+/// Largest permitted relative excess of a target SIR over the optimum, because of f32 rounding.
 const ABOVE: f64 = 1e-4;
 
 /// Reference model of a mission's chain, in f64.

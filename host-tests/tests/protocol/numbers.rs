@@ -114,7 +114,7 @@ fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
 
 /// Checks that a sweep message with the same number but other content counts as another one.
 ///
-/// A relay before this one that rebooted sends such a message.
+/// A relay closer to the leader sends such a message if it has rebooted.
 #[test]
 fn the_same_number_with_other_content_is_another_pass() {
     let changes: [fn(&mut Sweep); 4] = [

@@ -24,9 +24,10 @@ fn receive(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, WireMessag
     bench.sent_with_claims()
 }
 
-/// Returns relay 4 of 8 after it answered a sweep message in its own name by an index claim.
+/// Returns relay 4 of 8 after it received a sweep message that names relay 4 as the sender.
 ///
-/// It claims its index because another node may have it. Also returns that sweep message and the number of the claim.
+/// The relay has answered by an index claim, because another node may have its index. Also returns that sweep message
+/// and the number of the claim.
 fn relay_4(wiring: Wiring, port: Port) -> (Bench, WireMessage, u32) {
     let mut bench = Bench::new(4, 8, wiring);
     bench.now = NOW;

@@ -25,7 +25,8 @@ impl fmt::Debug for WireMessage {
     }
 }
 
-/// Decodes and checks a body by the tables of `FORMAT.md`. The error is the reason for a refusal.
+/// Decodes and checks a message by the tables of `FORMAT.md`. The `body` is a frame without header and CRC. The error
+/// is the reason for a refusal.
 fn walked(body: &[u8]) -> Result<Fields<'static>, MessageError> {
     match walk::message(&FORMAT, body) {
         Ok((_, fields)) => Ok(fields),
@@ -47,7 +48,8 @@ impl WireMessage {
         walked(body).map(|_| Self(body.to_vec()))
     }
 
-    /// Checks a body by the tables of `FORMAT.md`. The error is the reason for a refusal.
+    /// Checks a message by the tables of `FORMAT.md`. The `body` is a frame without header and CRC. The error is the
+    /// reason for a refusal.
     pub(crate) fn verdict(body: &[u8]) -> Result<(), MessageError> {
         walked(body).map(|_| ())
     }

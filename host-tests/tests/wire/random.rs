@@ -181,7 +181,7 @@ fn node_numbers_out_of_range_are_not_encoded() {
     }
 }
 
-/// Checks that a sweep message with a joint solution is encoded as `Aside`, without measured values.
+/// Checks that a sweep with a joint solution is encoded as message `Aside`, without measured values.
 #[test]
 fn joint_sweeps_are_asides_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {
