@@ -103,7 +103,7 @@ fn fine_search_gains_sir_over_a_coarse_grid() {
 
 /// Checks that the paper's grid search makes the same moves as a separate program.
 ///
-/// It starts from positions at which the SIRs of the hops differ much.
+/// The start positions are such that the SIRs of the hops differ much.
 #[test]
 fn grid_search_moves_as_the_reference_program() {
     let link = Link {

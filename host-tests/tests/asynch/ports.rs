@@ -120,8 +120,9 @@ fn deframed(bytes: &[u8]) -> [usize; 2] {
     counted
 }
 
-/// Checks that dropping the port runner during a write truncates at most one frame. The runner is run again, and ends
-/// the truncated frame before it sends the next.
+/// Checks that dropping the port runner during a write truncates at most one frame.
+///
+/// When the runner runs again, it ends the truncated frame before it sends the next one.
 #[test]
 fn a_frame_that_is_cut_short_is_ended_before_the_next() {
     for cut in 1..12 {

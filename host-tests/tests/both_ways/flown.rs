@@ -49,8 +49,9 @@ fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     assert!(once >= 55, "{once}");
 }
 
-/// Checks that missions that differ in the requirement of the return direction do not match. Their digests must
-/// differ, so that relays with such missions do not form a chain. The requirement is `reverse` and the power of Rx.
+/// Checks that missions with different requirements for the return direction have different digests.
+///
+/// For this reason relays with such missions do not form a chain. The requirements are `reverse` and the power of Rx.
 #[test]
 fn relays_with_other_ways_back_do_not_form_a_chain() {
     let mut rng = generator(3307);

@@ -59,8 +59,9 @@ fn value(chain: &Chain, places: &[Place]) -> f64 {
     hops.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops. It is found
-/// by a grid search with altitudes within `altitudes_m`.
+/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops.
+///
+/// The position is found by a grid search with altitudes within `altitudes_m`.
 fn turn(chain: &Chain, places: &[Place], node: usize, altitudes_m: [f64; 2]) -> (Place, f64) {
     let [from, to] = [node - 1, node + 1].map(|node| place_of(chain, places, node));
     let worse = |at: Place| hop(chain, node, from, at).min(hop(chain, node + 1, at, to));

@@ -135,7 +135,7 @@ fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     assert_eq!(apart.position()["sites_look_swapped"], false);
 }
 
-/// Checks that a drone outside its geofence but near the line from Tx to Rx is reported. It may still be controlled.
+/// Checks that a flying drone outside its geofence is reported, even near the line from Tx to Rx.
 #[test]
 fn a_drone_outside_the_geofence_is_reported_in_the_air() {
     // 380 m along a line that starts 500 m farther on.

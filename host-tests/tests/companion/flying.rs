@@ -166,7 +166,8 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     (flight, place)
 }
 
-/// Reboots the autopilot on the ground. It forgets the message requests, and its clock restarts.
+/// Reboots the autopilot on the ground. The autopilot forgets the companion's message requests, and its clock
+/// restarts.
 fn is_switched_off_and_on(flight: &mut Flight) {
     flight.drone.order("reboot");
     flight.relay.line("autopilot: on the ground, or not armed");

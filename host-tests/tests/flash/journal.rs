@@ -106,8 +106,8 @@ fn worn_flash_is_skipped() {
     assert!(!log(&mut none).append(&entry(1), WhenFull::Erase));
 }
 
-/// Checks that a power failure at any moment neither loses stored records nor creates others. It may happen during an
-/// erase, a record or a word.
+/// Checks that a power failure at any moment neither loses stored records nor creates others. The power may fail
+/// during an erase, within a record or within a word.
 #[test]
 fn no_record_is_lost_at_any_power_failure() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(37));

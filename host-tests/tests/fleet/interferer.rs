@@ -51,8 +51,8 @@ fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
     last.sir_rx(x).unwrap()
 }
 
-/// Draws a target SIR that needs one to several dozen relays. It is a fraction of the highest SIR that both the first
-/// and the last hop can have.
+/// Draws a target SIR that needs one to several dozen relays. The target is a fraction of the highest SIR that both
+/// the first and the last hop can have.
 fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
     let d = link.distance_m;
     let first = (0..200)

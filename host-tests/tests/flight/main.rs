@@ -45,8 +45,8 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
 
 /// Returns the smallest permitted distance between drones, m, each started at most `starts` times.
 ///
-/// The motion guard keeps the separation between reported positions. Both positions have a constant error, and the
-/// random error of one report for each start.
+/// The motion guard keeps the separation between reported positions. The reported position of each drone has a
+/// constant error, and the random error of one report for each start.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }

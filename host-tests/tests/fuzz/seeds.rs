@@ -137,8 +137,8 @@ fn relay() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns input bytes with an offer of the next mission version, from `side`. It is the paper's mission with the
-/// interferer at another position.
+/// Returns input bytes with an offer of the next mission version, from `side`. The offered mission is the paper's
+/// with the interferer at another position.
 fn offer(side: u8) -> Vec<u8> {
     let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];

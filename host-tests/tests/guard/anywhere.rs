@@ -186,8 +186,8 @@ struct World {
     hovering_m: Vec<f64>,
     /// Indices of drones whose pilots give control back as soon as no other drone is passing them.
     later: Vec<usize>,
-    /// Drones whose pilots gave control back in motion, and the times at which their braking ends, s. Their distances
-    /// are checked from then on.
+    /// Drones whose pilots gave control back in motion, and the times at which their braking ends, s. The distances
+    /// of these drones are checked from then on.
     brakes: Vec<(usize, f64)>,
     rng: ChaCha8Rng,
 }

@@ -143,9 +143,9 @@ fn one_relay_may_have_a_fixed_altitude() {
 
 /// Checks the number of round trips if some relays have a power or altitude of their own.
 ///
-/// The first round trip computes and finds that relays differ. Each further one collects the data of up to eight of
-/// these relays, and the last one computes again. If the leader is one of these relays, the first round trip is
-/// omitted.
+/// The first round trip computes and finds that relays differ. Each further round trip collects the data of up to
+/// eight of these relays, and the last one computes again. If the leader is one of these relays, the first round trip
+/// is omitted.
 #[test]
 fn different_relays_take_three_round_trips_or_more() {
     for (relays, own, trips) in [
@@ -255,8 +255,8 @@ fn faults_change_nothing_on_random_links() {
     assert!(injected > 10_000);
 }
 
-/// Checks that the joint solver reaches the optimum in few computation steps. It must abandon hopeless start points,
-/// but not the best one.
+/// Checks that the joint solver reaches the optimum in few computation steps. For this the solver must abandon
+/// hopeless start points, but not the best one.
 #[test]
 fn few_portions_lead_to_the_joint_optimum() {
     for (relays, lateral_m, most, best) in [

@@ -239,9 +239,10 @@ fn one_of_two_hidden_duplicates_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }
 
-/// Two chains that meet on a shared channel and both have a relay with one index.
+/// Test of two chains that meet on a shared channel. Each chain has a relay with the same index, a duplicate.
 ///
-/// Each chain has half of the other relays. They come into range once the relays of both have agreed on positions.
+/// Each chain has half of the other relays. The chains come into range of each other once both have agreed on
+/// positions.
 #[derive(Clone, Copy, Debug)]
 struct Meeting {
     relays: u16,

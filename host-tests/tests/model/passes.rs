@@ -47,7 +47,8 @@ pub(crate) enum PassClass {
     Late,
     /// Classification: a pass (a message along the chain) that does not continue the known ones.
     ///
-    /// It is of another membership view, from before the leader's reboot, or the relay has missed the pass before it.
+    /// The pass is of another membership view, or from before the leader's reboot, or the relay has missed the pass
+    /// before it.
     Foreign,
 }
 

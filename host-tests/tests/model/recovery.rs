@@ -52,8 +52,8 @@ impl World<'_> {
 
     /// Returns the longest permitted time to an agreement after a restart in any state of the chain.
     ///
-    /// It allows for one lost message in each direction of each link. A relay that waits for a result over h hops
-    /// retransmits after (2 h + 2) `hop_time` and an eighth.
+    /// The time allows for one lost message in each direction of each link. A relay that waits for a result over h
+    /// hops retransmits after 9/8 of (2 h + 2) `hop_time`.
     fn patience(&self) -> Duration {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;

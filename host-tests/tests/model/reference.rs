@@ -21,7 +21,7 @@ pub(crate) enum Reference {
 }
 
 impl Reference {
-    /// Returns the SIRs of the N + 1 hops. Those at a relay without a position are meaningless.
+    /// Returns the SIRs of the N + 1 hops. The SIRs of the hops at a relay without a position are meaningless.
     pub(crate) fn hops(&self, places: &[Option<Place>]) -> Vec<f64> {
         let x: Vec<f64> = places
             .iter()

@@ -116,8 +116,8 @@ fn the_optimum_is_found_on_random_links() {
     }
 }
 
-/// Checks that relays of different altitudes and powers meet their agreed target SIR. It may be below the optimum,
-/// but not above.
+/// Checks that relays of different altitudes and powers meet their agreed target SIR. The target may be below the
+/// optimum, but not above.
 #[test]
 fn chains_of_different_relays_meet_the_agreed_target() {
     let mut all = Mixed::default();

@@ -131,8 +131,8 @@ fn three_drones_fly_the_transmitters_upload() {
     }
 }
 
-/// Checks that drones fly the newest mission stored in their flash. It has versions 2 and 3, and a version 4
-/// truncated by a power failure.
+/// Checks that drones fly the newest mission stored in their flash. The flash has versions 2 and 3, and a version 4
+/// that a power failure has truncated.
 #[test]
 fn three_drones_fly_a_stored_upload() {
     let loaded = paper(3);

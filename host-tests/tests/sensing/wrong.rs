@@ -186,7 +186,9 @@ fn correct_sensors_are_not_accused() {
     assert_eq!(all, 0);
 }
 
-/// Checks that measurements of Tx and Rx help although they start late or stop early. Rx is behind a hill.
+/// Checks that measurements of Tx and Rx help although they start late or stop early.
+///
+/// The measurements matter because Rx is behind a hill, which the mission does not know.
 #[test]
 fn measurements_of_an_end_may_come_late_or_stop() {
     let [begin, late, end] = [0, 60_000, 10_000_000].map(Instant::from_millis);

@@ -313,7 +313,7 @@ fn a_refusal_reaches_the_ground_despite_losses() {
 
 /// Checks that of two uploads by two ground stations, all relays fly the newer one.
 ///
-/// The other station must learn of it.
+/// The ground station with the older upload must learn of the newer one.
 #[test]
 fn the_newer_upload_of_two_stations_is_flown() {
     let settled: Vec<u64> = (0..count())

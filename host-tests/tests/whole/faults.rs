@@ -18,8 +18,8 @@ fn event_count(air: &Air, name: &str) -> u32 {
     air.events.iter().filter_map(of).sum()
 }
 
-/// Checks that four relays fly without long pauses although one link works in one direction only. One of the relays
-/// may be left out.
+/// Checks that four relays fly without long pauses although one link works in one direction only. The chain may leave
+/// out one of the four relays.
 #[test]
 fn a_permanent_one_way_link_leaves_out_one_relay_for_good() {
     let mut late = Vec::new();

@@ -38,8 +38,8 @@ fn a_part_without_quorum_stops_requesting_views() {
     assert!(bench.now > Instant::from_millis(60_000));
 }
 
-/// Checks that a leader without a quorum proposes again, after ever longer waits. The first one is `probe_after`; it
-/// doubles with each refusal, up to eight times.
+/// Checks that a leader without a quorum proposes again, after ever longer waits. The first wait is `probe_after`.
+/// Each refusal doubles the wait, up to eight times `probe_after`.
 #[test]
 fn a_leader_without_quorum_proposes_at_growing_intervals() {
     let mut head = Bench::new(1, 8, Wiring::Pair);

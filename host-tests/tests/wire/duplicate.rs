@@ -140,8 +140,10 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     (relay, frames)
 }
 
-/// Checks that handshakes take the place of index claims if relays have a key. One of two duplicates becomes passive,
-/// the other one answers; a relay's own handshakes have no effect on it.
+/// Checks that handshakes take the place of index claims if relays have a key.
+///
+/// One of two duplicates (relays with the same index) becomes passive, the other one answers. A relay's own
+/// handshakes have no effect on it.
 #[test]
 fn with_a_key_handshakes_are_the_claims() {
     let mut passive = 0;

@@ -177,7 +177,7 @@ fn a_possibly_decided_view_is_proposed_again() {
 
 /// Checks that a leader continues if its proposal ends in a decision for an earlier membership view.
 ///
-/// It must send its next proposal.
+/// The leader must then send its next proposal.
 #[test]
 fn a_leader_continues_after_an_earlier_view_is_decided() {
     let mut head = Bench::new(1, 8, Wiring::Pair);

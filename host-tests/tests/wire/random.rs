@@ -21,8 +21,8 @@ use super::strategies::{bodies, headers, kinds, messages};
 proptest! {
     #![proptest_config(config(4000))]
 
-    /// Checks that both codecs agree on random messages, and the overhead of a frame. It is a header, a CRC, a
-    /// stuffing byte and a delimiter.
+    /// Checks that both codecs agree on random messages. A frame is longer than its message by 16 bytes: header, CRC,
+    /// a stuffing byte and a delimiter.
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(wire_message in messages(), head in headers()) {
         let message = message(&wire_message);

@@ -135,7 +135,7 @@ fn a_token_is_forwarded_and_its_result_returned() {
 
 /// Checks that messages that the relay does not await are stale.
 ///
-/// These are answers to another message or of another kind, and messages of rounds along the chain that are over.
+/// Such messages answer another message, or are of another kind, or belong to a round along the chain that is over.
 /// Tokens (messages of Algorithm 2) are stale without a position, in a field, or beyond Rx.
 #[test]
 fn unexpected_or_unfit_messages_are_stale() {

@@ -182,8 +182,8 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     assert_eq!(stale(&met, line), (1, 0));
 }
 
-/// Checks that a relay whose new mission is along another line waits until its drone can have stopped. It has no
-/// setpoint meanwhile.
+/// Checks that a relay whose new mission is along another line waits until its drone can have stopped. Meanwhile the
+/// relay has no setpoint.
 #[test]
 fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let config = paper(1);
