@@ -149,7 +149,7 @@ fn the_fixed_step_is_that_of_the_paper() {
 
 /// Checks that relays with own altitudes or powers in a field meet their agreed target SIR.
 ///
-/// The leader does not know these at first, so that the target that it predicts is wrong.
+/// The leader does not know these altitudes and powers at first, so that the target that it predicts is wrong.
 #[test]
 fn different_relays_meet_the_agreed_target_in_a_field() {
     let mut rng = generator(68);

@@ -235,8 +235,9 @@ impl OutputPin for Pin {
     }
 }
 
-/// Checks that the transmit-enable pin is high while bytes leave, and at most two byte times longer. The writer's
-/// `flush` ignores a FIFO of 4 bytes.
+/// Checks that the transmit-enable pin is high while bytes leave, and at most two byte times longer.
+///
+/// This must hold although the writer's `flush` returns while up to 4 bytes are still in a FIFO.
 #[test]
 fn the_pin_is_high_while_bytes_leave_and_little_longer() {
     for capacity in [1, 4, 16, 1_000] {

@@ -8,8 +8,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::scenes::{ENDS, adversarial, in_noise, mission, usual};
 
-/// Checks that relays agree on exactly the positions that are computed without messages. The chain carries data in
-/// both directions.
+/// Checks that a two-way chain agrees by messages on exactly the positions computed without messages.
 #[test]
 fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     let mut rng = generator(3306);

@@ -88,7 +88,7 @@ fn the_best_places_near_an_interferer_in_noise_are_found() {
 
 /// Checks that relays stay at Tx if an interferer lies between them and a weak Rx.
 ///
-/// A chain whose last relay passes the interferer has a two-way SIR of less than 0.3 of theirs.
+/// A chain whose last relay passes the interferer has a two-way SIR of less than 0.3 of that with all relays at Tx.
 #[test]
 fn relays_stay_at_tx_where_an_interferer_is_between_them_and_a_weak_rx() {
     let chain = Chain {

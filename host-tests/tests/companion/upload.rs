@@ -41,8 +41,8 @@ fn ground(files: &Files, version: &str, more: &str) -> Relay {
     Relay::ground(&format!("{upload} {more}"))
 }
 
-/// Checks that an upload from the transmitter reaches two relays and survives their restarts. The wires are with and
-/// without noise.
+/// Checks that an upload from the transmitter reaches two relays and survives their restarts. This must hold on wires
+/// with and without noise.
 #[test]
 fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     let (loaded, uploaded) = (simulated(&Scenario::default(), 2), simulated(&new(), 2));
@@ -76,7 +76,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
 
 /// Checks that a relay that restarts without its upload file receives the uploaded mission again.
 ///
-/// The mission was uploaded from the receiver, on one channel.
+/// The first upload came from a ground station at the receiver, on the channel that all share.
 #[test]
 fn a_relay_without_its_upload_is_offered_it_again() {
     let uploaded = simulated(&new(), 2);

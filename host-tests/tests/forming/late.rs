@@ -9,7 +9,7 @@ use host_tests::bench::Bench;
 /// Checks that a message of the leader from before its reboot does not spoil the agreement after it.
 ///
 /// The message starts a round along the chain, is delayed, and arrives in the last round of the new agreement, by
-/// Algorithm 2. No relay may follow it.
+/// Algorithm 2. No relay may act on the message.
 #[test]
 fn a_sweep_from_before_a_reboot_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {

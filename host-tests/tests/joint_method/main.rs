@@ -258,8 +258,8 @@ fn random_chains_come_near_the_joint_optimum() {
 
 /// Checks that 95 % of random chains with a wide least separation are within 0.1 % of the optimum.
 ///
-/// The optimum may need relays that stay behind the farthest position that meets the target SIR. The joint method
-/// does not consider those.
+/// The optimum may need relays that are not as far along the line as the target SIR permits. The joint method does
+/// not consider such positions.
 #[test]
 fn crowded_chains_are_seldom_far_from_the_joint_optimum() {
     let count = count(60);

@@ -352,8 +352,9 @@ impl Meeting {
     }
 }
 
-/// Checks that one of two duplicates in settled chains gives up its setpoint when the chains meet. Only handshakes
-/// reveal a duplicate. Settled chains send them with the lease renewals alone.
+/// Checks that one of two duplicates in settled chains gives up its setpoint when the chains meet. Duplicates are
+/// relays with the same index. Only handshakes reveal a duplicate, and settled chains send them only with the lease
+/// renewals.
 #[test]
 fn one_of_two_settled_duplicates_loses_its_setpoint() {
     let mut faults = Vec::new();

@@ -181,7 +181,7 @@ fn extreme_scenes_have_a_finite_fit() {
 }
 
 /// Checks that the fitted interferer is on the true ones' side if lateral offsets are permitted. Without lateral
-/// offsets, its side is always positive.
+/// offsets, the y of the fitted interferer is always positive.
 #[test]
 fn with_lateral_range_the_fit_is_on_the_right_side() {
     let source = |x_m: f64, y_m: f64| Source {

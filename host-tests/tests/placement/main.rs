@@ -31,8 +31,8 @@ fn hop_sirs_agree_with_the_reference() {
 
 /// Checks the farthest position at which a hop meets a target SIR against the reference.
 ///
-/// A third of the targets are near the SIR of a hop whose sender and interferer are equally far away. There the
-/// printed formulas lose their digits.
+/// A third of the targets are near the SIR of a hop whose sender and interferer are equally far away, because the
+/// printed formulas lose precision there.
 #[test]
 fn reaches_agree_with_the_reference() {
     let seen = reaches_agree(&mut generator(12), 20_000, false, |rng, of| {

@@ -71,9 +71,9 @@ fn with_wrong(wild: &RandomScene, node: u16, says: BrokenReading) -> Outcome {
     run(wrong).unwrap()
 }
 
-/// Checks that no kind of wrong sensor costs much SIR, and that the right sensor is reported as wrong.
+/// Checks that no kind of faulty sensor costs much SIR, and that the faulty one is reported.
 ///
-/// `node` gives the node with the wrong sensor for each scene. `sound` has the fraction of the optimum SIR that each
+/// `node` gives the node with the faulty sensor for each scene. `sound` has the fraction of the optimum SIR that each
 /// scene reaches without faults.
 fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
     for (what, says) in KINDS {

@@ -56,7 +56,7 @@ proptest! {
 
     /// Checks that the longest messages have the documented lengths.
     ///
-    /// An offer fills a frame except for the tag.
+    /// The longest message, an offer, fills a frame except for the authentication tag.
     #[test]
     fn the_longest_messages_have_the_documented_lengths(
         offer in kinds(&["Offer"]),

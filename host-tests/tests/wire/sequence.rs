@@ -169,7 +169,8 @@ fn unexpected_or_unfit_messages_are_stale() {
 
 /// Checks that a sweep message in a field loses the targets that need its sender beyond Rx.
 ///
-/// The message lists the position that its sender needs for each target SIR. Here the relay forwards an empty list.
+/// The message lists the position that its sender needs for each target SIR. Here no target remains, so that the
+/// relay forwards an empty list.
 #[test]
 fn a_reach_beyond_rx_leaves_no_feasible_target() {
     let (mut bench, from, to) = relay_4(mission(Interference::Field(FIELD)));
