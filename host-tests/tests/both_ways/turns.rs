@@ -50,7 +50,8 @@ fn place_of(chain: &Chain, places: &[Place], node: usize) -> Place {
     }
 }
 
-/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`.
+/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`. It counts the worse direction of
+/// each hop.
 fn value(chain: &Chain, places: &[Place]) -> f64 {
     let hops = (1..=places.len() + 1).map(|node| {
         let [from, to] = [node - 1, node].map(|node| place_of(chain, places, node));

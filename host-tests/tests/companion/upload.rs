@@ -320,7 +320,7 @@ const WRONG: &[&str] = &[
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Wrong options that the ground station recognises after it has requested the mission that relays fly.
+/// Wrong options that the ground station recognises after it has requested the relays' present mission.
 const UNFIT: &[&str] = &[
     "--new-band 30,300",
     "--new-min-separation 1001",

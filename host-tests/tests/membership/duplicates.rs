@@ -202,8 +202,8 @@ fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Dura
     found
 }
 
-/// Checks that one of two duplicate relays gives up its setpoint in time, and one reports the other. The chain has to
-/// fly within `FLIES_MS`.
+/// Checks that one of two duplicate relays gives up its setpoint in time, and one reports the other. The whole chain
+/// must have setpoints within `FLIES_MS`.
 fn at_most_one_flies(medium: Medium, most_ms: u64) {
     let mut faults = Vec::new();
     for kind in 0..8 {

@@ -10,7 +10,7 @@ use super::scenario::{Calm, Kind};
 /// Longest time to an agreement of a chain without faults, ms of virtual time.
 const LONGEST_MS: u64 = 20_000;
 
-/// Largest number of further membership views after an agreement.
+/// Largest permitted number of further membership views after an agreement.
 const MOST_VIEWS: u32 = 2;
 
 /// Time of observation after the agreement, ms, in which no relay may be lost or move.

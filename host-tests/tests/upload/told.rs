@@ -311,7 +311,7 @@ fn a_refusal_reaches_the_ground_despite_losses() {
     });
 }
 
-/// Checks that of two uploads by two ground stations, all relays fly the newer one.
+/// Checks that of two uploads by two ground stations, all relays use the newer one in the end.
 ///
 /// The ground station with the older upload must learn of the newer one.
 #[test]
@@ -374,8 +374,8 @@ fn the_newer_upload_of_two_stations_is_flown() {
     );
 }
 
-/// Checks that a ground station at either end learns which mission is flown. This must hold although frames are lost
-/// and missions are uploaded.
+/// Checks that a ground station at either end learns which mission the relays use. This must hold although frames are
+/// lost and missions are uploaded.
 #[test]
 fn the_ground_learns_which_mission_is_flown() {
     for round in 0..40 {

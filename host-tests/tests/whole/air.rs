@@ -121,20 +121,20 @@ pub(crate) struct Air {
     loss: f64,
     rng: ChaCha8Rng,
     seen: Vec<ObservedState>,
-    /// Largest number of groups of relays that flew different agreements at once.
+    /// Largest number of groups of relays that used positions of different agreements at the same time.
     pub(crate) groups: usize,
-    /// Time at which the largest number of groups flew different agreements, µs.
+    /// Time at which the largest number of groups used positions of different agreements, µs.
     pub(crate) groups_us: u64,
     /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
     /// the agreed membership of the chain.
     pub(crate) whole_since_us: Option<u64>,
-    /// Number of relays that may be missing from an agreement that counts as flown.
+    /// Number of relays that may lack an agreed position while the chain counts as positioned.
     pub(crate) spare: usize,
-    /// Total time in which the relays, except for at most `spare`, have flown one agreement, µs.
+    /// Total time in which all relays but at most `spare` have had positions of one agreement, µs.
     pub(crate) flown_us: u64,
-    /// Time at which the relays, except for at most `spare`, first flew one agreement, µs.
+    /// Time at which all relays but at most `spare` first had positions of one agreement, µs.
     pub(crate) first_us: Option<u64>,
-    /// Longest interruption of the time in which the relays fly one agreement, µs.
+    /// Longest interruption of the time in `flown_us`, µs: too many relays lack an agreed position.
     pub(crate) longest_us: u64,
     flies: bool,
     changed_us: u64,
@@ -465,7 +465,7 @@ impl Air {
         }
     }
 
-    /// Adds the time since the last call to the time flown, or to the present interruption.
+    /// Adds the time since the last call to the time in `flown_us`, or to the present interruption of it.
     pub(crate) fn measure(&mut self) {
         let span_us = self.now_us - self.changed_us;
         if self.flies {
@@ -483,8 +483,8 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the size of the largest group that flies one agreement with all members of its view. A view is the
-    /// agreed membership of the chain.
+    /// Returns the size of the largest membership view whose members all have positions of one agreement. A view is
+    /// the agreed membership of the chain.
     fn flying(&self) -> usize {
         let holds = |seen: &&ObservedState| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding

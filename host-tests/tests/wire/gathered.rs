@@ -168,8 +168,8 @@ fn a_collection_with_its_receivers_profile_is_stale() {
 
 /// Checks that a relay treats a wrong result of a collection of profiles as stale, and changes nothing.
 ///
-/// A profile is a relay's altitude and power. The result has another number or begins behind another relay, lacks
-/// profiles, has some of relays beyond the chain, or arrives twice.
+/// A profile is a relay's altitude and power. A result is wrong if it has another number or begins behind another
+/// relay, lacks profiles, has some of relays beyond the chain, or arrives twice.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let mut bench = fourth(false);

@@ -79,7 +79,7 @@ pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) 
     WireMessage::new("Hello", &fields)
 }
 
-/// Returns the hello of a node that flies the mission from before flight and receives no other node.
+/// Returns the hello of a node that uses the mission from before flight and receives no other node.
 ///
 /// `newest` is the newest membership view that it knows.
 pub(crate) fn loaded_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> WireMessage {
