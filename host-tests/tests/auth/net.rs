@@ -348,7 +348,8 @@ impl Net {
         });
     }
 
-    /// Returns the bits of each relay's setpoint and target SIR, for exact comparison.
+    /// Returns the bits of each relay's setpoint and target SIR, for exact comparison. A relay without these has
+    /// `None`.
     pub(crate) fn bits(&self) -> Vec<Option<([u32; 3], u32)>> {
         self.relays
             .iter()

@@ -39,7 +39,8 @@ pub(crate) struct Chain {
     /// Serial wires between the relays, or one shared channel.
     pub(crate) media: Vec<Medium>,
     is_shared: bool,
-    /// Serial wire between relay 1 (tty 1) and the ground station at the transmitter (tty 0).
+    /// Serial wire between relay 1 (tty 1) and the ground station at the transmitter (tty 0). `None` in a chain
+    /// without a ground station.
     pub(crate) tx: Option<Medium>,
     of: usize,
     pub(crate) files: Files,

@@ -46,7 +46,7 @@ pub(crate) struct Drone {
     pub(crate) guard: Option<Guard>,
     /// First setpoint of the guard since it last had none; `None` while it has none.
     begun: Option<Placement>,
-    /// Indices of the drones with which the relay has links, toward Tx and toward Rx.
+    /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],
     pub(crate) flies: bool,
     /// True while the drone's radio works.

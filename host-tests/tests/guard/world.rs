@@ -226,7 +226,8 @@ impl World {
     }
 }
 
-/// Returns the indices of drone `k`'s neighbours toward Tx and Rx, among `relays` drones.
+/// Returns the indices of drone `k`'s neighbours toward Tx and Rx among `relays` drones. The first and the last drone
+/// have only one.
 pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
     [k.checked_sub(1), (k + 1 < relays).then_some(k + 1)]
 }

@@ -36,17 +36,18 @@ pub(crate) struct Ledger {
     longest: Duration,
     /// Membership view that the relay has accepted; 0 after each start.
     pub(crate) view: ViewId,
-    /// Number of the last pass (round of messages along the chain) that the relay accepted in this view.
+    /// Number of the last pass (round of messages along the chain) that the relay accepted in this view. `None`
+    /// before the first.
     pub(crate) pass: Option<u16>,
     /// Number of the last pass (round of messages along the chain) of the relay before each of its reboots.
     pub(crate) passes_before: Vec<u16>,
     /// Largest Upsilon = E[1/I] (I is the interference power) that the relay has ever measured, 1/W.
     ///
-    /// Measurements from before its reboots count, too.
+    /// `None` before the first measurement. Measurements from before its reboots count, too.
     pub(crate) measured_per_w: Option<f64>,
     /// Epoch of the relay since its last start: at least 1, increasing, different for all relays.
     pub(crate) epoch: u32,
-    /// Record of the relay's votes in its flash, after the last vote.
+    /// Record of the relay's votes in its flash, after the last vote; `None` before the first vote.
     pub(crate) record: Option<ViewRecord>,
     /// Signed frames that the relay has accepted since its last start.
     accepted: AcceptedFrames,
@@ -70,7 +71,7 @@ pub(crate) struct Turn<'a> {
     pub(crate) relay: &'a Relay,
     pub(crate) sent: u32,
     pub(crate) events: &'a [Event],
-    /// Largest Upsilon = E[1/I] (I is the interference power) that any relay has measured, 1/W.
+    /// Largest Upsilon = E[1/I] (I is the interference power) that any relay has measured, if any, 1/W.
     pub(crate) measured_per_w: Option<f64>,
 }
 

@@ -27,11 +27,12 @@ pub(crate) struct Kind {
     pub(crate) seed: u64,
     /// Reception range on a shared channel, as a difference of relay indices.
     pub(crate) reach: usize,
-    /// Relay (from 0) that has another mission than the others before flight, and that mission.
+    /// Relay (from 0) that has another mission than the others before flight, if any, and that mission.
     pub(crate) stranger: Option<(usize, Mission)>,
-    /// Relay (from 0) whose epoch goes back at its second start.
+    /// Relay (from 0) whose epoch goes back at its second start, if any.
     pub(crate) goes_back: Option<usize>,
-    /// Relay (from 0) of which a second drone, the copy, exists. The copy's number follows those of all relays.
+    /// Relay (from 0) of which a second drone, the copy, exists, if any. The copy's number follows those of all
+    /// relays.
     pub(crate) copied: Option<usize>,
 }
 
@@ -140,7 +141,8 @@ pub(crate) struct Air {
     changed_us: u64,
     /// Number of frames sent by all relays.
     pub(crate) frames: u64,
-    /// Last times at which the copied relay received its copy, and the copy received the relay, µs.
+    /// Last times at which the copied relay received its copy, and the copy received the relay, µs. `None` before the
+    /// first.
     received_us: [Option<u64>; 2],
     /// Time since which a relay and its copy have both had setpoints, µs.
     ///

@@ -147,8 +147,9 @@ fn a_member_adds_its_vote() {
     }
 }
 
-/// Checks that the last relay decides again for a view that was accepted and may have been agreed on. A view is the
-/// agreed membership of the chain.
+/// Checks that the last relay decides for an earlier view if relays may have agreed on it already.
+///
+/// As in Paxos, the value that was accepted last is proposed again. A view is the agreed membership of the chain.
 #[test]
 fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);
