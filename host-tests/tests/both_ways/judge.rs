@@ -13,8 +13,8 @@ pub(crate) struct Chain {
     pub(crate) interferer: [f64; 3],
     /// Further interferers, each with its power in W, and its x and y in m.
     pub(crate) others: Vec<[f64; 3]>,
-    /// Points of a field that replaces the interferer: x in m, and Upsilon = E[1/I] in 1/W. I is the interference
-    /// power. The list is empty if there is an interferer.
+    /// Points of a field of interference that replaces the interferer: x in m, and Upsilon = E[1/I] in 1/W. I is the
+    /// interference power. The list is empty if there is an interferer.
     pub(crate) field: Vec<[f64; 2]>,
     /// Path-loss factors, 1/m^2: of links with a drone at one or both ends, and of links on the ground.
     pub(crate) loss: [f64; 2],

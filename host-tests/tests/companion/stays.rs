@@ -236,7 +236,7 @@ fn a_full_disk_is_reported_once_and_ends_no_relay() {
 
 /// Checks that a disk that blocks delays the frames that a relay sends, but nothing else.
 ///
-/// In place of a blocked disk, the relay's view file is a FIFO that is not read.
+/// In place of a blocked disk, the file for the relay's membership votes is a FIFO that is not read.
 #[test]
 fn a_slow_disk_delays_only_its_own_frames() {
     let chain = Chain::on_channel(2, Medium::pluggable(2));

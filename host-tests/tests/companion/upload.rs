@@ -136,7 +136,7 @@ fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
 
 /// Checks that the ground station reports the first relay that flies the new mission, and later all.
 ///
-/// The wire between relays 2 and 3 is cut as soon as relay 3 has decided on the view with the mission.
+/// The wire between relays 2 and 3 is cut as soon as relay 3 has decided on the membership view with the mission.
 #[test]
 fn the_ground_reports_progress_until_all_relays_fly() {
     let state = Arc::new(Mutex::new(Wire::Open));

@@ -36,8 +36,8 @@ pub(crate) struct Ledger {
     longest: Duration,
     /// Membership view that the relay has accepted; 0 after each start.
     pub(crate) view: ViewId,
-    /// Number of the last pass (round of messages along the chain) that the relay accepted in this view. `None`
-    /// before the first.
+    /// Number of the last pass (round of messages along the chain) accepted in this membership view. `None` before
+    /// the first.
     pub(crate) pass: Option<u16>,
     /// Number of the last pass (round of messages along the chain) of the relay before each of its reboots.
     pub(crate) passes_before: Vec<u16>,

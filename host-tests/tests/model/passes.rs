@@ -117,7 +117,7 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay takes part in its view's first pass for the second time, after a reboot.
+    /// Returns true if the relay takes part in its membership view's first pass again, after a reboot.
     ///
     /// A pass is a round of messages along the chain.
     pub(crate) fn repeats_first_pass(&self) -> bool {

@@ -67,7 +67,7 @@ impl World<'_> {
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }
 
-    /// Returns the longest time that a request for a new view takes to the leader. Each relay may wait for
+    /// Returns the longest time that a request for a membership view takes to the leader. Each relay may wait for
     /// `probe_after` before it forwards the request.
     fn view_request_time(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;

@@ -129,7 +129,7 @@ pub(crate) struct Air {
     /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
     /// the agreed membership of the chain.
     pub(crate) whole_since_us: Option<u64>,
-    /// Number of relays that may lack an agreed position while the chain counts as positioned.
+    /// Number of relays that may lack an agreed position without an interruption of the time in `flown_us`.
     pub(crate) spare: usize,
     /// Total time in which all relays but at most `spare` have had positions of one agreement, µs.
     pub(crate) flown_us: u64,

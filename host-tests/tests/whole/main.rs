@@ -165,8 +165,8 @@ fn with_a_duplicate_one_chain_flies_and_recovers_later() {
 
 /// Checks that a chain becomes whole again after schedules of faults that are hard to recover from.
 ///
-/// The difficulties are view numbers far ahead, an idle neighbour that is switched on elsewhere, two interleaved
-/// chains, and two candidates for one position that are received in turn.
+/// The difficulties are numbers of membership views far ahead, an idle neighbour that is switched on elsewhere, two
+/// interleaved chains, and two candidates for one position that are received in turn.
 #[test]
 fn schedules_that_once_got_stuck_end_in_one_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
@@ -231,7 +231,7 @@ fn a_drone_switched_on_hours_early_joins_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Checks that a chain recovers if one relay has a stored vote with a far later view number. The vote is from an
+/// Checks that a chain recovers if one relay has a stored vote on a far later membership view. The vote is from an
 /// earlier flight.
 #[test]
 fn a_relay_with_far_later_views_joins_within_120_s() {

@@ -130,8 +130,8 @@ fn a_full_roster_is_continued_by_the_next_pass() {
 
 /// Checks that a relay that has missed the collection of profiles refuses a sweep that needs them.
 ///
-/// A profile is a relay's altitude and power. The relay requests a new view then. It misses a collection, for
-/// example, by a reboot.
+/// A profile is a relay's altitude and power. The relay then requests a new membership view. A relay misses a
+/// collection, for example, by a reboot.
 #[test]
 fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
     let fresh = fourth(false);

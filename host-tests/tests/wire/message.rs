@@ -15,7 +15,7 @@ use uav_relay_decode::{walk, write};
 /// Tables of messages and fields, read from `FORMAT.md`.
 pub(crate) static FORMAT: LazyLock<Format> = LazyLock::new(|| Format::load().unwrap());
 
-/// Body of a valid message, whose fields have the names in `FORMAT.md`.
+/// Valid message without the header and CRC of its frame. Its fields have the names in `FORMAT.md`.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct WireMessage(Vec<u8>);
 

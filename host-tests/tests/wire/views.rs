@@ -43,9 +43,9 @@ fn agreed_in_view(view: u32) -> (Bench, u16) {
     (bench, own)
 }
 
-/// Checks that a relay accepts messages along the chain and lease renewals only with its view's digest.
+/// Checks that a relay accepts messages along the chain only with the digest of its membership view.
 ///
-/// The relay answers messages with another digest by a hello.
+/// The same holds for lease renewals. The relay answers messages with another digest by a hello.
 #[test]
 fn passes_have_the_digest_of_their_view() {
     for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {
