@@ -53,10 +53,11 @@ pub(crate) enum Operation {
     Measure(u8, u8),
 }
 
-/// Difference of two random seeds of a leader whose first message numbers differ by 64. No smaller step is possible.
+/// Step between random seeds of a leader. A step raises the number of the leader's first message by 64, the least
+/// amount possible, so that a rebooted leader with such a seed repeats recent numbers.
 const NEXT_LIFE: u32 = 54_336;
 
-/// Draws a relay's random seed. Some seeds make a rebooted leader use its recent message numbers again, which is hard
+/// Draws a relay's random seed. With some seeds, a rebooted leader repeats its recent message numbers, which is hard
 /// to handle.
 pub(crate) fn seeds() -> impl Strategy<Value = u32> {
     prop_oneof![any::<u32>(), (0..4_u32).prop_map(|life| life * NEXT_LIFE)]

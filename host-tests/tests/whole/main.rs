@@ -42,7 +42,8 @@ fn flown(seed: u64, schedule: &Schedule) -> Measured {
     ended(seed, schedule, schedule.begun())
 }
 
-/// Runs the chain `air` to the end of its schedule, and until it is whole.
+/// Runs the chain `air` to the end of its schedule, and then until all relays have agreed positions. Gives up after
+/// 15 minutes.
 fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Measured {
     let end = schedule.faults_end_us;
     air.run(end);
