@@ -50,7 +50,8 @@ fn place_of(chain: &Chain, places: &[Place], node: usize) -> Place {
     }
 }
 
-/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`.
+/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`. It counts the worse direction of
+/// each hop.
 fn value(chain: &Chain, places: &[Place]) -> f64 {
     let hops = (1..=places.len() + 1).map(|node| {
         let [from, to] = [node - 1, node].map(|node| place_of(chain, places, node));
@@ -59,8 +60,9 @@ fn value(chain: &Chain, places: &[Place]) -> f64 {
     hops.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops. It is found
-/// by a grid search with altitudes within `altitudes_m`.
+/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops.
+///
+/// The position is found by a grid search with altitudes within `altitudes_m`.
 fn turn(chain: &Chain, places: &[Place], node: usize, altitudes_m: [f64; 2]) -> (Place, f64) {
     let [from, to] = [node - 1, node + 1].map(|node| place_of(chain, places, node));
     let worse = |at: Place| hop(chain, node, from, at).min(hop(chain, node + 1, at, to));

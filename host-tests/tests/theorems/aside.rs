@@ -96,7 +96,8 @@ type Draw = fn(&mut ChaCha8Rng) -> LateralScene;
 
 /// Checks that the best position of a relay at a given altitude, with lateral offsets, is found.
 ///
-/// It is compared with brute force in random scenes. Every case of the solution must occur, except those of `absent`.
+/// The position is compared with brute force in random scenes. Every case of the solution must occur, except those of
+/// `absent`.
 fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -111,7 +112,7 @@ fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
 
 /// Checks that the best position of a relay at any altitude, with lateral offsets, is found.
 ///
-/// It is compared with brute force in random scenes. The cases of the solution in `cases` must occur.
+/// The position is compared with brute force in random scenes. The cases of the solution in `cases` must occur.
 fn anywhere(seed: u64, draw: Draw, cases: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
