@@ -59,7 +59,7 @@ pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
     if nu > 0.0 { s / (1.0 + nu * s) } else { s }
 }
 
-/// Sending node of a hop: its lateral offset and altitude, and its power relative to the interference.
+/// Sending node of a hop: lateral offset, altitude, and transmit power relative to the interference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
@@ -94,8 +94,8 @@ impl Sender {
         }
     }
 
-    /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x. Infinite if both are at
-    /// one place.
+    /// Returns the SIR at a relay at `to` that receives from this sender at x = `from_m`. Infinite if both are at one
+    /// place.
     ///
     /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is
     /// the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta /
@@ -116,7 +116,7 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     mission.receiver_gain(power_w) / (square(distance) + across)
 }
 
-/// Returns the SIR at Tx when a relay at `from` sends to it with `power_w` watts. 0 unless the interferer is known.
+/// Returns the SIR at Tx when a relay at `from` sends to it with `power_w` watts. 0 while the interferer is unknown.
 pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let across = square(from.y_m) + square(from.altitude_m);
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
@@ -151,7 +151,7 @@ pub(crate) const fn square(x: f32) -> f32 {
 /// Number of bisection steps for an x at which the slope of the first hop's SIR changes its sign.
 const HALVINGS: u8 = 32;
 
-/// Maximum number of doublings of x in the search for a point at which a condition fails.
+/// Maximum number of doublings of x in the search for an x beyond an extremum of the first hop's SIR.
 const DOUBLINGS: u8 = 64;
 
 /// Shape of SIR_1, the SIR of the first hop, along x >= 0 at one altitude.
@@ -199,8 +199,8 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// Function phi(x), whose sign is that of the slope of the first hop's SIR along x. `x` is the interferer's X, and
-/// `q` is X^2 + Y^2.
+/// Function phi(x) that has the sign of the slope of the first hop's SIR along x. The field `x` is the interferer's
+/// X, and `q` is X^2 + Y^2.
 struct Slope {
     x: f32,
     q: f32,
@@ -220,14 +220,14 @@ impl Slope {
     }
 
     /// Returns half the derivative of phi at x = `at`, m, for an interferer at X > 0. phi has the sign of the slope
-    /// of the first hop's SIR. The derivative falls beyond X.
+    /// of the first hop's SIR. Beyond X the derivative falls.
     fn bend(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)
     }
 
-    /// Returns the maximum of the first hop's SIR along x, for X < 0; `peak` is its x without noise, m. X is that of
-    /// the interferer.
+    /// Returns the maximum of the first hop's SIR along x, for an interferer at X < 0. `peak` is the x of the maximum
+    /// without noise, m.
     fn hill(&self, peak: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Hill(peak);
@@ -235,8 +235,8 @@ impl Slope {
         Extremum::Hill(last(0.0, peak, |at| self.sign(at) > 0.0))
     }
 
-    /// Returns the extrema of the first hop's SIR along x, for X > 0. `bottom` is the x of the minimum without noise,
-    /// m. X is that of the interferer.
+    /// Returns the extrema of the first hop's SIR along x, for an interferer at X > 0. `bottom` is the x of the
+    /// minimum without noise, m.
     fn turns(&self, bottom: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Valley(bottom);
@@ -255,7 +255,8 @@ impl Slope {
     }
 }
 
-/// Returns the last x in [`low`, `high`] at which `holds` is true. It is true at `low` and changes once.
+/// Returns the last x in [`low`, `high`] at which `holds` is true, by bisection. `holds` is true at `low` and changes
+/// once.
 fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
     let (mut low, mut high) = (low, high);
     for _ in 0..HALVINGS {
