@@ -5,7 +5,7 @@ use super::axis::{Axis, AxisError};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 
-/// Line on earth and speed limit with which a drone flies a mission.
+/// Line on earth from Tx to Rx and speed limit with which a drone flies a mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
     /// Line on earth from transmitter to receiver.
@@ -21,7 +21,8 @@ pub struct Course {
 pub enum CourseError {
     /// The positions of Tx and Rx do not define a line.
     Axis(AxisError),
-    /// The distance of Tx and Rx along the ground, m, which differs from the mission's.
+    /// The distance of Tx and Rx along the ground is not the mission's distance. The value is the distance along the
+    /// ground, m.
     Distance(f64),
 }
 

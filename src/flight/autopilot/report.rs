@@ -55,7 +55,7 @@ impl Topic {
     const COUNT: usize = 7;
 }
 
-/// Line of text for the operator, stored in two parts.
+/// Line of text for the operator. The text is stored in two parts, which are joined when it is sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Line {
     topic: Topic,
@@ -146,7 +146,7 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// Queues a line for the operator. A full queue drops its oldest line.
+    /// Queues a line for the operator. If the queue is full, its oldest line is dropped.
     pub(super) fn queue_line(&mut self, line: Line) {
         let newest = self.lines.iter().rfind(|other| other.topic == line.topic);
         if newest == Some(&line) {
@@ -236,7 +236,7 @@ impl Report {
         }
     }
 
-    /// Removes the next text or number that is due, and returns it as encoded by `encode`. `None` if nothing is due.
+    /// Removes the next text or number that is due, and returns it encoded by `encode`. `None` if nothing is due.
     pub(super) fn take<T>(
         &mut self,
         now: Instant,
@@ -306,11 +306,12 @@ pub enum AutopilotEvent {
     Refused,
     /// Report of the autopilot that it is outside of its fence.
     FenceBreached,
-    /// Drone so far from its line that it has no position in the mission's coordinates. Check that the sites are
-    /// those of this flight. Reported once on the ground and at most once in 10 s in the air.
+    /// Drone so far from the line Tx to Rx that it has no position in the mission's coordinates. Check that the
+    /// configured positions of Tx and Rx are those of this flight. Reported once on the ground and at most once in 10
+    /// s in the air.
     OffLine(OffLine),
-    /// Command of the operator over MAVLink that clears all lost relays of one side.
-    /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
+    /// Accepted command of the operator that clears the lost relays of one side, because they have landed. It came
+    /// over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
     LostCleared {
         /// Side whose relays are cleared.
         side: Side,
@@ -337,12 +338,12 @@ pub(super) struct Events {
     pub(super) restarted: bool,
     pub(super) released: Option<Release>,
     pub(super) state: Option<State>,
-    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], whichever is newer.
+    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], the newer one of the two.
     pub(super) waits: Option<AutopilotEvent>,
     pub(super) breached: bool,
     pub(super) refused: bool,
     pub(super) off_line: Option<OffLine>,
-    /// Pending [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
+    /// Pending result of a command: [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
     pub(super) clearance: Option<AutopilotEvent>,
 }
 
