@@ -41,8 +41,8 @@ fn uploads() -> Journal<Sectors> {
 pub(crate) struct Views(views::Views);
 
 impl Views {
-    /// Restores the votes from before the reboot into a new `relay`. Only an uploaded mission may have been restored
-    /// before.
+    /// Restores the votes from before the reboot into a new `relay`. Call it before any other use of the relay, but
+    /// after a stored upload was restored.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());
