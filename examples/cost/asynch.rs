@@ -125,8 +125,8 @@ fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Measures the instructions with which relay 2 handles a sweep message, with the blocking and the async port driver.
-/// The sweep message carries the search for the positions along the chain.
+/// Measures the instructions with which relay 2 handles a sweep message. The blocking and the async driver of its ports are
+/// compared. The sweep message carries the search for the positions along the chain.
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = relay_and_sweep() else {
         return;

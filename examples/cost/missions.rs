@@ -56,7 +56,7 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
-/// Mission of three relays with a range of altitudes, and of lateral offsets up to 280 m to either side.
+/// Mission of three relays with ranges of altitudes and of lateral offsets, 280 m to either side.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,

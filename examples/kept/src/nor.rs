@@ -35,7 +35,8 @@ impl<F: NorFlash> Nor<F> {
         }
     }
 
-    /// Returns the flash offset of a sector's word `first`; `None` if the sector has fewer than `words` more.
+    /// Returns the flash offset of a sector's word `first`. `None` if `words` words from there exceed the
+    /// sector.
     fn place(&self, sector: usize, first: usize, words: usize) -> Option<u32> {
         let start = self.sectors.get(sector)?.start;
         let end = first.checked_add(words)?;
