@@ -49,7 +49,8 @@ impl Views {
         Self(views::Views::resume(relay, now, log, log::votes_restored))
     }
 
-    /// Stores the relay's changed votes. Returns true even if the write fails, so that the relay flies on.
+    /// Stores the relay's changed votes on the chain's membership. Returns true even if the write fails, so that the
+    /// relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
         if let Some(stored) = self.0.store(record, views::log(flash::VIEWS, block())) {
             log::votes(stored);
