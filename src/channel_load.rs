@@ -60,7 +60,7 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the capacity, 1e-6 bit, that the channel needs in one `probe_after` to carry the idle chain.
+    /// Returns the capacity that the idle chain needs in one `probe_after`, in units of 1e-6 bit.
     ///
     /// It is the number of bits sent in that time, divided by the fraction of the channel that they may take. Divided
     /// by a time in microseconds it gives bit/s.

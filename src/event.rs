@@ -6,7 +6,7 @@
 use crate::geodetic::LineError;
 use crate::side::Side;
 
-/// Event of the relay that a firmware may react to; it reads the changed state from the relay.
+/// Event of the relay that a firmware may react to. The firmware reads the changed state from the relay.
 ///
 /// A *node* is a relay's index before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -38,8 +38,9 @@ pub enum Event {
         /// Index of the neighbour that is received now.
         node: u16,
     },
-    /// A node has reported eight times in a row that it does not receive this relay. It cannot be a neighbour. Raised once until
-    /// the node receives this relay. An operator checks this transmitter and that receiver: antenna, power, channel.
+    /// A node has reported eight times in a row that it does not receive this relay. The node therefore cannot be a
+    /// neighbour. Raised once until the node receives this relay. An operator checks this transmitter and that
+    /// receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node that does not receive this relay.
         node: u16,

@@ -117,8 +117,8 @@ pub struct Settings {
     /// Method that the leader runs; the other relays follow. The leader is relay 1, or relay N if the mission gives
     /// the interference as a distribution along x.
     pub method: Method,
-    /// Measurement of the interference by this relay; `None` for no measurement. The result replaces the distribution
-    /// along x that the mission gives. `None` also if the mission gives no distribution.
+    /// Measurement of the interference by this relay; `None` for no measurement. The measured interference replaces
+    /// the distribution along x that the mission gives. Use `None` if the mission gives no such distribution.
     pub measure: Option<Measure>,
     /// Estimation of an unknown interferer from measurements; `None` for no estimation. It has to be `None` if the
     /// mission gives the interference as a distribution along x. Set it on all relays of a chain, or on none.
@@ -130,8 +130,8 @@ pub struct Settings {
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
-    /// Key and epoch for signing frames. With it the relay accepts signed frames only; without it, it accepts frames from any
-    /// sender. Give the key to all relays of a network, or to none.
+    /// Key and epoch for signing frames. With a key the relay accepts signed frames only; without one, it accepts
+    /// frames from any sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
     /// Maximum time from one relay's `poll_transmit` to the next relay's, above 0. It applies to a message of 100
     /// bytes (a sweep), includes the computation, and is scaled for longer messages.
@@ -141,8 +141,9 @@ pub struct Settings {
     pub probe_after: Duration,
     /// Silence after which a neighbour is lost, and minimum duration of a lease; above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the previous
-    /// view, or half of them including its proposer. Without it, the parts of a split chain would interfere with each other.
+    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the
+    /// previous view, or half of them including its proposer. Without this rule, the parts of a split chain would
+    /// interfere with each other.
     pub quorum: bool,
     /// Behaviour of the relay while too few relays are reachable for a quorum.
     pub without_quorum: WithoutQuorum,

@@ -79,7 +79,8 @@ struct SweepCost {
     settled: bool,
 }
 
-/// Prints the costs of a sweep (search for positions along the chain). The traffic is in one direction, and in both.
+/// Prints the costs of a sweep (search for positions along the chain). They are measured for a mission with traffic
+/// in one direction, and for one with traffic in both.
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     const BOTH_WAYS: Mission = Mission::new(MissionConfig {

@@ -96,7 +96,7 @@ impl Tap {
 /// used.
 ///
 /// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if
-/// `asked` exists, the file is `numbered`.
+/// `asked` exists, a number is added to the file's name.
 ///
 /// # Errors
 /// One line that names the file.

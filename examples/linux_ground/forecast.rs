@@ -29,7 +29,7 @@ struct Letter {
     bytes: Vec<u8>,
 }
 
-/// Simulated chain of relays, whose links lose nothing.
+/// Simulated chain of relays, whose links lose no frame.
 struct Chain {
     relays: Vec<Relay>,
     agreed: Vec<bool>,

@@ -33,7 +33,7 @@ struct Station<'a> {
     hearing: NearbyRelays,
     rejections: RejectionReasons,
     uploading: Option<Uploading>,
-    /// True if a confirmation is awaited, and the operator's answer can be read from standard input.
+    /// True if the operator has answered a request for confirmation: standard input is readable.
     is_answered: bool,
 }
 
@@ -252,8 +252,8 @@ impl<'a> Station<'a> {
     }
 }
 
-/// Reads the operator's answer from standard input, which must be readable. The text is empty at the end of the
-/// input.
+/// Reads the operator's answer from standard input, in which it must be available. The text is empty at the end of
+/// the input.
 fn answered() -> String {
     let mut line = String::new();
     match std::io::stdin().read_line(&mut line) {

@@ -35,7 +35,7 @@ impl From<String> for Fault {
     }
 }
 
-/// Result of an upload or of the program; `None` while it goes on.
+/// Result of an upload or of the program; `None` while the upload or the program continues.
 pub(crate) type Outcome = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]

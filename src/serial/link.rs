@@ -275,12 +275,12 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads that failed for another reason.
     pub other: u32,
-    /// Number of failed writes, and of failed queries if the last byte has been sent. Failed writes are repeated.
+    /// Number of failed writes, and of failed queries for the end of a transmission. Failed writes are repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,
-    /// Number of frames dropped because the transmit queue was full: the port accepts nothing. The relay repeats what
-    /// matters.
+    /// Number of frames dropped because the transmit queue was full: the port accepts nothing. The relay retransmits
+    /// those that matter.
     pub dropped: u32,
     /// Number of frames for a port that this driver does not have. The relay's [`Wiring`](crate::Wiring) then does
     /// not match the driver.

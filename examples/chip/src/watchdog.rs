@@ -14,7 +14,7 @@ const RELOAD: u32 = 2_999;
 /// stops the core for at most 2 s.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
-/// Maximum time for which the relay's main loop sleeps, ms. It feeds the watchdog each time it has run.
+/// Maximum time for which the relay's main loop sleeps, ms. The loop feeds the watchdog before it sleeps.
 pub const TURN_MS: u64 = 500;
 
 /// Lateness of the relay's timer, ms, from which on the main loop must not feed the watchdog any more.

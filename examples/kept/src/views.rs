@@ -16,7 +16,7 @@ use crate::journal::{Flash, Journal, WhenFull, pack, unpack};
 /// Addresses of the two flash sectors that store votes: sectors 1 and 2 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 
-/// Payload of a journal record that stores the relay's votes, words.
+/// Payload length of a journal record that stores the relay's votes, words.
 pub const WORDS: usize = ViewRecord::LENGTH.div_ceil(4);
 
 /// Packs a record of the relay's votes on the chain's membership into words.
@@ -35,7 +35,7 @@ pub const fn log<F: Flash>(flash: F, block: u32) -> Journal<F> {
     Journal::new(flash, WORDS, block)
 }
 
-/// State of the storage of the relay's votes: whether it works.
+/// State of the storage of the relay's votes: working, or failing.
 #[derive(Debug)]
 pub struct Views {
     /// True if the newest record of votes is in the flash.

@@ -313,8 +313,8 @@ const REFUSED_AFTER: u8 = 6;
 /// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
-/// Maximum difference between a standing target and the target that an ArduCopter reports. In 1e-7 degrees. For a
-/// moving target it is [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
+/// Maximum difference of a standing target from the one that an ArduCopter reports, 1e-7 degrees. For a moving target
+/// it is [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
 const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;

@@ -56,7 +56,7 @@ const SETTLED: Duration = Duration::from_millis(1_000);
 /// Minimum time between two reports of reasons not to engage the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which the guard must hold the drone back before the reason is reported. The guard keeps drones apart.
+/// Time for which the guard (collision avoidance) must hold the drone back before this is reported.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.

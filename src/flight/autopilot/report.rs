@@ -32,7 +32,7 @@ const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 
-/// Topic of a line of text to the operator. A newer line replaces a waiting one of its topic.
+/// Topic of a line of text to the operator. If a line has to wait, a newer line of the same topic replaces it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
     /// Engagement or release of the drone by the relay.
@@ -296,15 +296,15 @@ pub enum AutopilotEvent {
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
     Released(Release),
-    /// Reason for which the drone cannot be engaged, or is not engaged in the companion's mode.
+    /// Reason for which the drone cannot be engaged, or is not engaged in the mode OFFBOARD or GUIDED.
     Waits(WaitReason),
-    /// Readiness: the pilot may now engage the drone by choosing the companion's mode.
+    /// Readiness: the pilot may now engage the drone by choosing the mode OFFBOARD or GUIDED.
     Ready,
     /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
     ///
     /// The sent position is outside the autopilot's own fence, or another companion sends targets to it.
     Refused,
-    /// Report of the autopilot that it is outside of its fence.
+    /// Report of the autopilot that the drone is outside of the autopilot's fence.
     FenceBreached,
     /// Drone so far from the line Tx to Rx that it has no position in the mission's coordinates. Check that the
     /// configured positions of Tx and Rx are those of this flight. Reported once on the ground and at most once in 10
