@@ -84,8 +84,8 @@ pub(crate) struct Companion {
     state: Option<&'static str>,
     answers: AnswerMonitor,
     off_line: OffLineMonitor,
-    /// Numbers of lost relays that the operator has cleared over MAVLink, because they have landed. They are kept
-    /// until `take_cleared` collects them.
+    /// Numbers of lost relays that have landed, as the operator has reported over MAVLink. They are kept until
+    /// `take_cleared` collects them.
     cleared: Vec<u16>,
 }
 
@@ -199,7 +199,7 @@ impl Companion {
         self.check_fence(now, log, sites, relay.mission().config().lateral);
     }
 
-    /// Returns and removes the numbers of lost relays that the operator has cleared over MAVLink.
+    /// Removes and returns the numbers of lost relays that have landed, as reported over MAVLink.
     pub(crate) fn take_cleared(&mut self) -> Vec<u16> {
         std::mem::take(&mut self.cleared)
     }

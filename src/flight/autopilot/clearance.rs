@@ -33,16 +33,16 @@ struct LostSide {
     is_full: bool,
 }
 
-/// Lost relays on both sides, and the operator's command to clear them: the report that they landed.
+/// Lost relays on both sides, and the operator's command that reports them as landed (clears them).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// Last accepted command to clear lost relays: its sender, and the numbers of these relays.
+    /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers.
     accepted: Option<(Address, RelayNumbers)>,
     /// Answer to a command that has not been sent yet: its addressee, and its `MAV_RESULT`.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays the operator has cleared; `None` once this is passed to the relay.
+    /// Side whose lost relays have landed; `None` once this is passed to the relay.
     cleared: Option<Side>,
 }
 
@@ -70,8 +70,8 @@ impl Clearance {
         }
     }
 
-    /// Processes the operator's command to clear lost relays; returns the event for the firmware. `from` is its
-    /// sender, and `parameters` are the numbers of the relays.
+    /// Processes the operator's command that reports lost relays as landed. Returns the event for the firmware.
+    /// `from` is the command's sender, and `parameters` are the numbers of the relays.
     pub(super) fn command(
         &mut self,
         from: Address,
@@ -110,7 +110,7 @@ impl Clearance {
         self.answer.take()
     }
 
-    /// Removes and returns the side whose lost relays the operator has cleared, for the relay.
+    /// Removes and returns the side whose lost relays have landed, for the relay.
     pub(super) const fn take_cleared(&mut self) -> Option<Side> {
         self.cleared.take()
     }

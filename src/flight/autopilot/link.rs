@@ -51,9 +51,9 @@ const SHORT_TIME: Duration = Duration::from_millis(60_000);
 /// Maximum time from a mode change to the report of the fence breach that caused it, by an ArduCopter.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason not to engage the drone must last before it is reported.
+/// Time for which a reason not to control the drone must last before the operator is told.
 const SETTLED: Duration = Duration::from_millis(1_000);
-/// Minimum time between two reports of reasons not to engage the drone.
+/// Minimum time between two reports of reasons not to control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
 /// Time for which the guard (collision avoidance) must hold the drone back before this is reported.
@@ -96,12 +96,12 @@ pub struct Autopilot {
     recovery: Duration,
     /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason for which the drone cannot be engaged, `None` if it can, and the time since which it holds.
+    /// Reason for which the relay cannot control the drone, `None` if it can, and the time since then.
     wait: (Option<WaitReason>, Instant),
-    /// Last reported reason for which the drone cannot be engaged, and the time of the report. An inner `None` is the
-    /// report that the drone can be engaged.
+    /// Last reported reason for which the relay cannot control the drone, and the time of the report. An inner `None`
+    /// is the report that it can.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
-    /// True while the relay is ready to be engaged.
+    /// True while the relay is ready to control the drone, once the pilot chooses OFFBOARD or GUIDED.
     ready: bool,
     /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
     /// because of the upstream neighbour, the second because of the downstream one.
@@ -321,9 +321,9 @@ impl Autopilot {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
-    /// Sets whether the relay is ready for the pilot to engage the drone; true at the start. While it is false, a PX4
-    /// in [`State::Standby`] receives no targets, so that it refuses OFFBOARD. Nothing else changes: an engaged drone
-    /// stays engaged, and an ArduCopter accepts GUIDED all the same.
+    /// Sets whether the relay is ready to control the drone; true at the start. While it is false, a PX4 in
+    /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD. Nothing else changes: a drone that the
+    /// relay controls stays under control, and an ArduCopter accepts GUIDED all the same.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
@@ -340,8 +340,8 @@ impl Autopilot {
 
     /// Reports to the operator why the guard (collision avoidance) holds the relay back, for each side.
     ///
-    /// Reasons are sent while the drone is engaged or in [`State::Standby`], once they have lasted for 3 s. Shorter
-    /// ones are normal while the relays agree on new positions. Equal lines are at least 10 s apart.
+    /// Reasons are sent while the relay controls the drone or in [`State::Standby`], once they have lasted for 3 s.
+    /// Shorter ones are normal while the relays agree on new positions. Equal lines are at least 10 s apart.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
         if self.newest_hold.0 != reasons {
@@ -371,8 +371,9 @@ impl Autopilot {
 
     /// Processes an event of the relay, and sends events that matter in flight to the operator as text.
     ///
-    /// A new view (agreed set of relays) is reported once its positions are agreed, if the drone is engaged and not
-    /// held back. The reason to hold a drone back is reported by [`handle_hold`](Self::handle_hold).
+    /// A new view (agreed set of relays) is reported once its positions are agreed, if the relay controls the drone
+    /// and the guard does not hold it back. The reason to hold a drone back is reported by
+    /// [`handle_hold`](Self::handle_hold).
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {
@@ -499,7 +500,7 @@ impl Autopilot {
         Release { cause, mode }
     }
 
-    /// Returns the reason for which the pilot cannot engage the drone now, or `None`.
+    /// Returns the reason for which the pilot cannot give the relay control now; `None` if there is none.
     fn wait_reason(&self, now: Instant) -> Option<WaitReason> {
         let vehicle = &self.vehicle;
         let is_px4 = vehicle.kind() == Some(Kind::Px4);
@@ -520,7 +521,7 @@ impl Autopilot {
         }
     }
 
-    /// Reports the reason for which the drone cannot be engaged, once it has lasted for a second.
+    /// Reports the reason for which the relay cannot control the drone, once it has lasted for a second.
     fn review_wait(&mut self, now: Instant) {
         if self.state != State::Standby {
             self.reported_wait = None;
@@ -549,7 +550,7 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time to report the present reason not to engage the drone; `None` if it is reported.
+    /// Returns the time to report the present reason not to control the drone; `None` if it is reported.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -726,12 +727,12 @@ impl Autopilot {
         self.noise.take()
     }
 
-    /// Returns the side whose lost relays the operator has cleared, once: for `Relay::clear_lost`.
+    /// Returns the side whose lost relays have landed, as the operator has reported. Once, for `Relay::clear_lost`.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
         self.clearance.take_cleared()
     }
 
-    /// Returns the next event.
+    /// Returns the next event of this link for the firmware; `None` if there is none.
     pub fn poll_event(&mut self) -> Option<AutopilotEvent> {
         let hears = self.streams.answers_requests();
         let mistrusted = || {

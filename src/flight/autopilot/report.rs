@@ -35,9 +35,9 @@ const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 /// Topic of a line of text to the operator. If a line has to wait, a newer line of the same topic replaces it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
-    /// Engagement or release of the drone by the relay.
+    /// Control of the drone: the relay takes or loses it.
     Control,
-    /// Reason for which the pilot cannot engage the drone.
+    /// Reason for which the pilot cannot give the relay control of the drone.
     Wait,
     /// Reason why the guard (collision avoidance) holds the drone back because of its upstream neighbour.
     Upstream,
@@ -47,7 +47,7 @@ pub(super) enum Topic {
     Relay,
     /// Breach of the autopilot's own fence.
     Fence,
-    /// Command of the operator to clear lost relays.
+    /// Command of the operator that reports lost relays as landed.
     Clearance,
 }
 
@@ -277,7 +277,7 @@ impl Report {
     }
 }
 
-/// Maximum number of relays that one command to clear lost relays can name.
+/// Maximum number of lost relays that one command of the operator can report as landed.
 pub(super) const MOST: usize = 7;
 
 /// Numbers of the relays that a command names; unused entries are 0.
@@ -296,9 +296,10 @@ pub enum AutopilotEvent {
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
     Released(Release),
-    /// Reason for which the drone cannot be engaged, or is not engaged in the mode OFFBOARD or GUIDED.
+    /// Reason for which the pilot cannot give the relay control of the drone, by OFFBOARD or GUIDED. Or the reason
+    /// for which the relay does not use the mode that the pilot has chosen.
     Waits(WaitReason),
-    /// Readiness: the pilot may now engage the drone by choosing the mode OFFBOARD or GUIDED.
+    /// Readiness: the pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
     Ready,
     /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
     ///
@@ -313,14 +314,15 @@ pub enum AutopilotEvent {
     /// Accepted command of the operator that clears the lost relays of one side, because they have landed. It came
     /// over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
     LostCleared {
-        /// Side whose relays are cleared.
+        /// Side of this relay whose lost relays have landed.
         side: Side,
         /// Numbers of the relays, padded with zeros.
         relays: RelayNumbers,
         /// Sender of the command.
         from: Address,
     },
-    /// Denied command of the operator to clear lost relays. It does not name exactly the lost relays of one side.
+    /// Denied command of the operator, which reports lost relays as landed. It does not name exactly the lost relays
+    /// of one side.
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: RelayNumbers,

@@ -195,8 +195,8 @@ impl Release {
     }
 }
 
-/// Reason for which the pilot cannot engage the drone. Or the reason for which the relay does not use the mode
-/// OFFBOARD or GUIDED that the pilot has chosen.
+/// Reason for which the pilot cannot give the relay control of the drone. Or the reason for which the relay does not
+/// use the mode OFFBOARD or GUIDED that the pilot has chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {
