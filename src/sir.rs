@@ -37,8 +37,8 @@ use crate::root::sqrt;
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
-/// interferer it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In an interference field it is Upsilon(x) /
-/// `Upsilon_max`, with noise.
+/// interferer at (X, Y) it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). For interference that
+/// the mission gives as a distribution along x, it is Upsilon(x) / `Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -97,10 +97,11 @@ impl Sender {
     /// Returns the SIR at a relay at `to` that receives from this sender at x = `from_m`. Infinite if both are at one
     /// place.
     ///
-    /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is
-    /// the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta /
-    /// `mu_los`). In an interference field it is the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x) /
-    /// (`mu_los` d^2).
+    /// With the interferer at (X, Y), the sender at (x0, y0, h0), its gain A, s = X - x0 and d = x - x0 it is A ((s -
+    /// d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is the paper's `SIR_1` for h0
+    /// = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). For interference that
+    /// the mission gives as a distribution along x, it is the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x)
+    /// / (`mu_los` d^2).
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
         let across = to.cross_section().apart_squared(self.cross_section);
@@ -284,8 +285,8 @@ fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
 /// Returns the largest SIR of the first hop to a relay at `altitude_m`. The maximum is over all x in [0, D].
 ///
 /// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of
-/// [`first_hop_turn`] for X < 0, with noise as well. In an interference field it is an upper bound: the largest
-/// Upsilon right above the transmitter. It is larger at lower altitudes.
+/// [`first_hop_turn`] for X < 0, with noise as well. For interference that the mission gives as a distribution along
+/// x, it is an upper bound: the largest Upsilon right above the transmitter. It is larger at lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

@@ -107,7 +107,7 @@ impl Axis {
     /// Maximum distance from the line of a position in its coordinates, m: beside, before and beyond it.
     pub const AROUND_M: f32 = 5_000.0;
 
-    /// Creates the line between two sites on the ground.
+    /// Creates the line from a transmitter at `tx` to a receiver at `rx`, both on the ground.
     ///
     /// Poles and the antimeridian need no special case. Constant work.
     ///
@@ -125,7 +125,7 @@ impl Axis {
     /// ```
     ///
     /// # Errors
-    /// [`AxisError`] if a latitude or longitude is out of range, or the sites are too close or too far apart.
+    /// [`AxisError`] if a latitude or longitude is out of range, or the two positions are too close or too far apart.
     #[inline(never)] // called from several places
     pub fn try_new(tx: Geodetic, rx: Geodetic) -> Result<Self, AxisError> {
         if !tx.is_valid() {
@@ -163,7 +163,7 @@ impl Axis {
         })
     }
 
-    /// Creates the line from the transmitter to the receiver of `sites`, see [`try_new`](Self::try_new).
+    /// Creates the line between the Tx and Rx positions `sites`, see [`try_new`](Self::try_new).
     ///
     /// # Errors
     /// Same as for [`try_new`](Self::try_new).

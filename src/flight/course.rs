@@ -27,9 +27,10 @@ pub enum CourseError {
 }
 
 impl Course {
-    /// Returns the course of a drone that flies `mission` between `sites` with a maximum of `speed_m_s`.
+    /// Returns the course of a drone that flies `mission`: its line on earth and its speed limit.
     ///
-    /// `speed_m_s` is 0.1 to 20 m/s, or 0 for that of [`Pace::default`]. Constant work.
+    /// `sites` are the positions of Tx and Rx. `speed_m_s` is the speed limit, 0.1 to 20 m/s, or 0 for that of [`Pace::default`].
+    /// Constant work.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -44,7 +45,7 @@ impl Course {
     /// ```
     ///
     /// # Errors
-    /// [`CourseError`] if the sites define no line, or one of another length than the mission's.
+    /// [`CourseError`] if Tx and Rx define no line, or a line of another length than the mission's.
     #[inline(never)] // frees its stack before the relay needs some
     pub fn try_new(sites: Sites, speed_m_s: f32, mission: &Mission) -> Result<Self, CourseError> {
         let axis = Axis::between(sites).map_err(CourseError::Axis)?;

@@ -794,7 +794,7 @@ impl Autopilot {
     ///
     /// | step | from | to | data | why at this point |
     /// | --- | --- | --- | --- | --- |
-    /// | 1 | relay | link | line between the sites of an adopted mission | the positions and the setpoint of later steps are along it |
+    /// | 1 | relay | link | line between the Tx and Rx positions of an adopted mission | the positions and the setpoint of later steps are along it |
     /// | 2 | | link | timeouts that are due by `now` | an overdue link releases the drone |
     /// | 3 | link | relay | control state | an engaged relay starts from the first position that it receives afterwards |
     /// | 4 | link | relay | position, sample of the radio's noise, side with cleared lost relays | the relay computes its setpoint from them |
@@ -812,7 +812,7 @@ impl Autopilot {
     /// once, and [`handle_bearing`](Self::handle_bearing) the bearing of an antenna that [`point_antenna`](Self::point_antenna) does not set. The first line is that of [`new`](Self::new); an
     /// exchange replaces a line of [`fly_along`](Self::fly_along).
     ///
-    /// Constant work: one call of each input of the relay and of the link, and a new [`Axis`](crate::flight::axis::Axis) when the sites have changed.
+    /// Constant work: one call of each input of the relay and of the link, and a new [`Axis`](crate::flight::axis::Axis) when these positions have changed.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
