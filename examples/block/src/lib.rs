@@ -107,7 +107,7 @@ pub const MAX_POINTS: usize = 16;
 /// Number of bytes covered by the block's CRC: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
-/// Maximum silence of a neighbour after which a heartbeat is requested, as a block may set it, ms.
+/// Maximum value of `probe_after_ms` in a block: silence of a neighbour before a heartbeat request, ms.
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.

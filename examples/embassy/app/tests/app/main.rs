@@ -14,7 +14,8 @@ mod vehicle;
 mod votes;
 mod watchdog;
 
-/// Logger that discards all lines, so that the tests build each line and find one that panics.
+/// Logger that discards all lines. With it the firmware builds each line, so that the tests would find a panic in
+/// one.
 #[defmt::global_logger]
 struct Logger;
 
