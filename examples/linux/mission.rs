@@ -13,10 +13,10 @@ pub const DISTANCE_M: [f32; 2] = [1.0, 1e6];
 /// Permitted range of an altitude, m.
 pub const ALTITUDE_M: [f32; 2] = [0.1, 1e4];
 
-/// Permitted range of the left limit of lateral positions, y in m.
+/// Permitted range of the lower limit of lateral offsets y, left of the line Tx to Rx, m.
 pub const LEFT_M: [f32; 2] = [-1e5, 0.0];
 
-/// Permitted range of the right limit of lateral positions, y in m.
+/// Permitted range of the upper limit of lateral offsets y, right of the line Tx to Rx, m.
 pub const RIGHT_M: [f32; 2] = [0.0, 1e5];
 
 /// Permitted range of a transmit power, W.
@@ -102,12 +102,13 @@ pub struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// Returns the interferer of the command line, else the `field` of a file, else the paper's interferer.
+    /// Returns the interference of the mission. It is the interferer of the command line, or else `field`, the
+    /// interference that the file gives along x, or else the paper's interferer.
     pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
-    /// Returns the mission's parameters for `relays` relays. Without a `channel` it has the paper's.
+    /// Returns the mission's parameters for `relays` relays. If `channel` is `None`, the channel is the paper's.
     ///
     /// # Errors
     /// One line that says what is wrong.
@@ -147,7 +148,7 @@ impl MissionOptions {
     }
 }
 
-/// Checks a mission's parameters. Error messages name options with their `prefix`, "--" or "--new-".
+/// Checks a mission's parameters. Error messages name options, which begin with `prefix`: "--" or "--new-".
 ///
 /// # Errors
 /// One line that names the option and the fault.

@@ -20,7 +20,8 @@ use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{self, Method, MissionOptions};
 use uav_relay_linux::site::SiteOptions;
 
-/// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
+/// Latency of a frame between two relays. It is caused by two kernels, two USB adapters (up to 16 ms each) and the
+/// computation.
 const LATENCY: Duration = Duration::from_millis(40);
 
 /// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.
@@ -197,7 +198,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
     plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
-/// Adds the options of the file's sections `[network]` and `[companion]`.
+/// Adds the options that the file's sections `[network]` and `[companion]` give.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.companion;
@@ -358,7 +359,8 @@ fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, S
     mission::mission(config, "--")
 }
 
-/// Parses an interference field. Its points are leaked, because the mission refers to them until the program ends.
+/// Parses the interference's distribution along x. Its points are leaked, because the mission refers to them until
+/// the program ends.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text
