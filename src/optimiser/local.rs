@@ -6,7 +6,8 @@
 //! after Algorithm 1, a grid has no better point, but this method finds one.
 //!
 //! With a way back each hop counts by its worse direction, and close to the interferer the relay also hears the next one worse. So
-//! a row may have a maximum on each side of the interferer, and each is searched from even samples.
+//! a row may have several maxima on each side of the interferer: smooth ones, and narrow ones where the SIRs of both hops are equal.
+//! Each side is sampled evenly. The best sample is improved by steps that halve, and equal SIRs are found by bisection.
 //!
 //! Accuracy and effect: `host-tests/tests/adjust.rs`.
 
@@ -38,7 +39,7 @@ const ROUNDING: f32 = 3e-7;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
     /// Search from coarse to fine altitudes. At most 1080 evaluations of both hops; for traffic in both directions
-    /// 4770.
+    /// 8730.
     #[default]
     Fine,
     /// Search on the paper's grid of positions: `columns` by `rows` evaluations of both hops.
@@ -222,6 +223,8 @@ pub struct LocalSearch {
     found: Option<Placement>,
     /// Linear SIR of the worse hop at the position found, or at the current position if none is better.
     best_sir: f32,
+    /// Number of evaluations at the current altitude, counted for traffic in both directions only.
+    evaluations: u16,
 }
 
 impl LocalSearch {
@@ -246,11 +249,12 @@ impl LocalSearch {
             best_row: (at.altitude_m.max(low_m).min(high_m), -1.0),
             found: None,
             best_sir: hops.worse(at),
+            evaluations: 0,
         }
     }
 
     /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. An altitude
-    /// takes 24 evaluations, for traffic in both directions 106.
+    /// takes 24 evaluations, for traffic in both directions 194.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -271,10 +275,14 @@ impl LocalSearch {
     /// Records `at` as the best position if it is allowed and better than all before. Returns the SIR of its worse
     /// hop, or -1 if it is not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
+        self.record(at, self.hops.worse(at))
+    }
+
+    /// Records `at`, whose worse hop has the SIR `sir`, as [`weigh`](Self::weigh) does.
+    fn record(&mut self, at: Placement, sir: f32) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
         }
-        let sir = self.hops.worse(at);
         if sir > self.best_sir {
             self.best_sir = sir;
             self.found = Some(at);
@@ -303,6 +311,7 @@ impl LocalSearch {
         if self.round >= ROUNDS {
             return None;
         }
+        self.evaluations = 0;
         let part = f32::from(self.row) / f32::from(ROWS - 1);
         let altitude_m = self.altitude(part);
         let sir = self.crossing(altitude_m);
@@ -311,7 +320,7 @@ impl LocalSearch {
         }
         self.row += 1;
         Some(if self.hops.is_both_ways() {
-            2 * (2 * u16::from(HALVINGS) + u16::from(SAMPLES) + 1)
+            self.evaluations.max(1)
         } else {
             u16::from(HALVINGS) + 4
         })
@@ -353,30 +362,57 @@ impl LocalSearch {
 
     /// Returns the best SIR of the worse hop for x in `low` to `high`, for traffic in both directions.
     ///
-    /// The best of evenly spaced x is improved by steps that halve. The result is the maximum if there is a single
-    /// maximum around that x.
+    /// The best of evenly spaced x is improved by steps that halve. A maximum where the SIRs of both hops are equal may
+    /// be narrower than the spacing, so the first two such x are searched by bisection.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
             return -1.0;
         }
+        let place = |x_m: f32| Placement::on_line(x_m.max(low).min(high), altitude_m);
         let (mut best, mut top) = (-1.0, low);
-        let mut try_at = |search: &mut Self, x_m: f32| {
-            let x_m = x_m.max(low).min(high);
-            let sir = search.weigh(Placement::on_line(x_m, altitude_m));
+        let mut crossings = [None; 2];
+        let mut before = None;
+        for at in 0..=SAMPLES {
+            let x_m = low + step * f32::from(at);
+            let (incoming, outgoing) = self.hops.both(place(x_m));
+            let sir = self.record(place(x_m), incoming.min(outgoing));
             if sir > best {
                 (best, top) = (sir, x_m);
             }
-            top
-        };
-        let mut from = low;
-        for at in 0..=SAMPLES {
-            from = try_at(self, low + step * f32::from(at));
+            let sign = incoming > outgoing;
+            if before.is_some_and(|before| before != sign)
+                && let Some(crossing) = crossings.iter_mut().find(|one| one.is_none())
+            {
+                *crossing = Some((x_m - step, x_m, sign));
+            }
+            before = Some(sign);
         }
         for _ in 0..HALVINGS {
             step *= 0.5;
-            _ = try_at(self, from - step);
-            from = try_at(self, from + step);
+            let from = top;
+            for x_m in [from - step, from + step] {
+                let sir = self.weigh(place(x_m));
+                if sir > best {
+                    (best, top) = (sir, x_m);
+                }
+            }
+        }
+        self.evaluations += u16::from(SAMPLES) + 1 + 2 * u16::from(HALVINGS);
+        for (mut left, mut right, sign) in crossings.into_iter().flatten() {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (left + right);
+                let (incoming, outgoing) = self.hops.both(place(middle));
+                if (incoming > outgoing) == sign {
+                    right = middle;
+                } else {
+                    left = middle;
+                }
+            }
+            best = best
+                .max(self.weigh(place(left)))
+                .max(self.weigh(place(right)));
+            self.evaluations += u16::from(HALVINGS) + 2;
         }
         best
     }

@@ -22,9 +22,9 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 
-/// Maximum number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. A call also completes
-/// the current row of the search grid, which is up to 24 more.
-pub(super) const PLACES_AT_ONCE: u16 = 600;
+/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2, for traffic in one and in both
+/// directions. A call also completes the current altitude: at most 24 or 194 positions more.
+pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 /// True if the feature `altitude` (joint method) is on. Without it the code of the joint method is unreachable.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");

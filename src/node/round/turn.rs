@@ -73,7 +73,9 @@ impl Computation {
         let PassKind::Turn(turn_pass) = &mut self.pass else {
             return Action::Stale;
         };
-        match turn_pass.step(PLACES_AT_ONCE) {
+        let [one_way, both_ways] = PLACES_AT_ONCE;
+        let is_one_way = !(context.mission().reverse() > 0.0);
+        match turn_pass.step(if is_one_way { one_way } else { both_ways }) {
             Poll::Pending => Action::Work,
             Poll::Ready(None) => self.forward_turn(context),
             Poll::Ready(Some(place)) => {
