@@ -22,8 +22,10 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 
-/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2, for traffic in one and in both
-/// directions. A call also completes the current altitude: at most 24 or 194 positions more.
+/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2.
+///
+/// The second value is for traffic in both directions. A call also completes the current altitude, which is at most
+/// 24 or 194 positions more.
 pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 /// True if the feature `altitude` (joint method) is on. Without it the code of the joint method is unreachable.
