@@ -39,14 +39,14 @@ pub enum Event {
         node: u16,
     },
     /// A node has reported eight times in a row that it does not receive this relay. The node therefore cannot be a
-    /// neighbour. Raised once until the node receives this relay. An operator checks this transmitter and that
-    /// receiver: antenna, power, channel.
+    /// neighbour. Not raised again before the node has received this relay. An operator checks this transmitter and
+    /// that receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node has another mission, or one that this relay cannot obtain; the node's messages are ignored. An operator
-    /// loads both with the same mission before take-off. Raised once a minute for each node.
+    /// A node's mission differs from this relay's, or this relay cannot obtain it. The node's messages are ignored.
+    /// An operator loads both with the same mission before take-off. Raised once a minute for each node.
     MissionMismatch {
         /// Index of the node with the other mission.
         node: u16,
@@ -80,11 +80,12 @@ pub enum Event {
     /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all relays of
-    /// the view use the last agreement. Raised once until a view is agreed on.
+    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all
+    /// relays of the view use the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its positions.
-    /// Raised once until a view is agreed on. Bring the missing relays back into range, or land this part.
+    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
+    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land this
+    /// part.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,

@@ -278,10 +278,10 @@ impl Search {
     }
 }
 
-/// Lowers two targets so that traffic from Rx to Tx is included, and returns them.
+/// Lowers the targets `start` and `met` to include the traffic from Rx to Tx, and returns both.
 ///
-/// `start` is the upper bound of the search; the result is at most the maximum SIR of the hop received at Tx. `met`
-/// is a feasible target; the result is one that this hop and the hop from Rx also meet.
+/// `start`, the upper bound of the search, becomes at most the maximum SIR of the backward hop to Tx. `met`, a
+/// feasible target, becomes one that this hop and the backward hop from Rx meet, too.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..

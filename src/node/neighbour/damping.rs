@@ -219,8 +219,8 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Sets the losses of every link at least to those of the link that was lost last. All links of a side cross the
-    /// same gap in the chain, so they were lost together.
+    /// Raises the loss count of every link on this side to that of the link that was lost last. All links of a side
+    /// cross the same gap in the chain, so they were lost together. Higher counts stay.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

@@ -55,8 +55,8 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time before which a newly selected node causes no request for a new view. The node's neighbour on its far side
-    /// may be about to select it, too, and one view change is enough.
+    /// Time before which a newly selected node causes no request for a new view. Another relay, on the far side of
+    /// that node, may be about to select the node, too, and one view change for both is enough.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
