@@ -71,7 +71,7 @@ pub enum Event {
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
     /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of
-    /// the two nodes and gives it the right index. Raised once until the other node has been silent for twice
+    /// the two nodes and gives it the right index. Not raised again before the other node has been silent for twice
     /// `dead_after`. With signed frames, an attacker without the key can raise it, but cause nothing else.
     DuplicateIndex {
         /// Index that two nodes use.

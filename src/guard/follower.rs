@@ -219,8 +219,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the least possible distance along x to the neighbour upstream, m. Infinite stands for the separation.
-    /// The limits on the downstream side are computed from it.
+    /// Returns the least possible distance along x to the neighbour upstream, m. Infinity stands for the separation.
+    /// The limits toward the neighbour downstream are computed from this distance.
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0

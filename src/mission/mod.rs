@@ -721,8 +721,8 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, if no separation is kept for the relays after it. After
-    /// means in the order of computation. Farthest means toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest allowed x of relay `index`, m, without a separation of the relays after it. After means
+    /// in the order of computation. Farthest means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }

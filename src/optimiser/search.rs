@@ -86,7 +86,8 @@ pub struct Search {
     ladder: Ladder,
     tried: u32,
     /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule
-    /// has only such passes. They are also used after a relay could not take the x short of it that was required.
+    /// has only such passes. They are also used after a relay could not take the x, short of its farthest, that
+    /// another relay required.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
     most: Option<f32>,

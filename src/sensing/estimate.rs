@@ -106,12 +106,14 @@ const WORTH: f64 = 1e-5;
 /// adopted if it is based on more information. A larger change may mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum change of an estimate, over its variance, for its adoption if the interferer is stationary.
+/// Minimum ratio of an estimate's mean square change to that due to chance, for a stationary source. With a smaller
+/// ratio the estimate is not adopted.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum change of an estimate, over its variance, for its adoption if the interferer moves.
+/// Minimum ratio of an estimate's mean square change to that due to chance, for a moving source. With a smaller ratio
+/// the estimate is not adopted.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum change of an estimate, over its variance, for its adoption by a chain that has settled. So large a change
+/// Minimum ratio of an estimate's mean square change to that due to chance, in a settled chain. So large a change
 /// means another interferer, so the count of refinements starts again.
 const ANOTHER: f64 = 64.0;
 

@@ -31,8 +31,8 @@ const CATCH_UP_PER_S: f32 = 1.25;
 /// overshoots the speed of its target.
 const CARROT_PART: f32 = 0.96;
 
-/// Ratio of the moving target's acceleration to its maximum speed less its present speed, 1/s. It applies near the
-/// maximum speed.
+/// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the
+/// difference of maximum speed and present speed.
 ///
 /// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
 const TOP_PER_S: f32 = 0.5;

@@ -63,7 +63,7 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
     dropped: u16,
-    /// Previous neighbour, if the selected node has replaced it because it is nearer; 0 for none.
+    /// Previous neighbour, if the selected node has replaced it as the nearer one; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
@@ -715,8 +715,8 @@ impl Neighbour {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat: destination, number of its request, number of its reply. It can request a
-    /// heartbeat, answer the neighbour's request of that number, or both; 0 means none.
+    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is that of a
+    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {

@@ -214,8 +214,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. `most` is its maximum, and
-/// stands for an unknown time.
+/// Returns the time until positions of the next view may be used, in tenths of a second. The maximum is `most`, which
+/// also stands for an unknown time.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };

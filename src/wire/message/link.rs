@@ -7,8 +7,8 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// Hello message: the sender's neighbour, connected relays, view and mission. It reports them for the side of the
-/// sender on which the destination is.
+/// Hello message: the sender's neighbour, received nodes, connected relays, view and mission. Neighbour and received
+/// nodes are those on the side to which the message is sent.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "seven flags of the wire format"
