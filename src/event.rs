@@ -46,7 +46,7 @@ pub enum Event {
         node: u16,
     },
     /// A node's mission differs from this relay's, or this relay cannot obtain it. The node's messages are ignored.
-    /// An operator loads both with the same mission before take-off. Raised once a minute for each node.
+    /// An operator loads the same mission into both nodes before take-off. Raised once a minute for each node.
     MissionMismatch {
         /// Index of the node with the other mission.
         node: u16,
@@ -90,9 +90,9 @@ pub enum Event {
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
     /// A newer mission was rejected, and this relay keeps its present one. The new mission's distance does not fit
-    /// its Tx and Rx positions on earth, or it exceeds this relay's own geofence. The ground station is informed.
-    /// Raised once for each such mission. Upload one whose Tx and Rx positions are as far apart as its distance, and
-    /// within the geofence.
+    /// its Tx and Rx positions on earth, or the mission exceeds this relay's own geofence. The ground station is
+    /// informed. Raised once for each such mission. Upload one whose Tx and Rx positions are as far apart as its
+    /// distance, and within the geofence.
     UploadRefused {
         /// Reason for which the mission was rejected.
         why: LineError,

@@ -191,10 +191,11 @@ impl Guard {
         }
     }
 
-    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. It is `true` at the start.
+    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. `flown` is true at the
+    /// start.
     ///
-    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere. Flown again,
-    /// the relay begins as after a start, with the next reported position.
+    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere.
+    /// Flown again, the relay begins as after a start, with the next reported position.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
         if flown == self.flown {
             return false;

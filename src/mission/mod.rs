@@ -711,8 +711,8 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m. It leaves the relays that are computed after it their
-    /// minimum separation.
+    /// Returns the farthest allowed x of relay `index`, m. At this x the relays that are computed after relay `index`
+    /// can still keep their minimum separation.
     ///
     /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the maximum squared
     /// distance across the line (in y and altitude) between two neighbours among those relays, m^2; it reduces the

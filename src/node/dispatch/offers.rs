@@ -56,8 +56,8 @@ impl Node {
         true
     }
 
-    /// Returns the next message for the ground station at `side`, and its node number. It is a hello, or the uploaded
-    /// mission that the station has requested; `None` if neither is pending.
+    /// Returns the next message for the ground station at `side`, and the station's node number. The message is a
+    /// hello, or the uploaded mission that the station has requested; `None` if neither is pending.
     pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
         let to = match side {
             Side::Upstream => 0,

@@ -48,8 +48,8 @@ pub(super) struct JointPlace {
     pub(super) cross_section: CrossSection,
     /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation.
     pub(super) end_m: f32,
-    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of it to help the next
-    /// hop.
+    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of that x to help the
+    /// next hop.
     pub(super) plain: bool,
 }
 
