@@ -69,7 +69,7 @@ pub struct Link<'a> {
     /// of that x for the sake of the next relay.
     pub plain: bool,
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
-    /// computes it; `None` with other methods.
+    /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
 }
 
