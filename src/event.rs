@@ -39,14 +39,14 @@ pub enum Event {
         node: u16,
     },
     /// A node has reported eight times in a row that it does not receive this relay. The node therefore cannot be a
-    /// neighbour. Raised once until the node receives this relay. An operator checks this transmitter and that
-    /// receiver: antenna, power, channel.
+    /// neighbour. Not raised again before the node has received this relay. An operator checks this transmitter and
+    /// that receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node has another mission, or one that this relay cannot obtain; the node's messages are ignored. An operator
-    /// loads both with the same mission before take-off. Raised once a minute for each node.
+    /// A node's mission differs from this relay's, or this relay cannot obtain it. The node's messages are ignored.
+    /// An operator loads the same mission into both nodes before take-off. Raised once a minute for each node.
     MissionMismatch {
         /// Index of the node with the other mission.
         node: u16,
@@ -71,7 +71,7 @@ pub enum Event {
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
     /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of
-    /// the two nodes and gives it the right index. Raised once until the other node has been silent for twice
+    /// the two nodes and gives it the right index. Not raised again before the other node has been silent for twice
     /// `dead_after`. With signed frames, an attacker without the key can raise it, but cause nothing else.
     DuplicateIndex {
         /// Index that two nodes use.
@@ -80,18 +80,19 @@ pub enum Event {
     /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all relays of
-    /// the view use the last agreement. Raised once until a view is agreed on.
+    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all
+    /// relays of the view use the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its positions.
-    /// Raised once until a view is agreed on. Bring the missing relays back into range, or land this part.
+    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
+    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land this
+    /// part.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
     /// A newer mission was rejected, and this relay keeps its present one. The new mission's distance does not fit
-    /// its Tx and Rx positions on earth, or it exceeds this relay's own geofence. The ground station is informed.
-    /// Raised once for each such mission. Upload one whose Tx and Rx positions are as far apart as its distance, and
-    /// within the geofence.
+    /// its Tx and Rx positions on earth, or the mission exceeds this relay's own geofence. The ground station is
+    /// informed. Raised once for each such mission. Upload one whose Tx and Rx positions are as far apart as its
+    /// distance, and within the geofence.
     UploadRefused {
         /// Reason for which the mission was rejected.
         why: LineError,

@@ -150,9 +150,9 @@ pub struct Settings {
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
     /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An
-    /// uploaded mission without such positions is then rejected if its distance differs from theirs. Set it on all
-    /// relays of a chain, or on none.
+    /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
+    /// mission without such positions is then rejected if its distance differs from that of the surveyed positions.
+    /// Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 

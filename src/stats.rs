@@ -40,7 +40,8 @@ pub struct Stats {
     pub foreign: u32,
     /// Intact frames from a node that is no neighbour, or, on a point-to-point link, for another node.
     pub misaddressed: u32,
-    /// Messages from the wrong side: messages along the chain against their direction, or replies along it.
+    /// Messages from the wrong neighbour. They are messages along the chain from the next relay, and replies from the
+    /// previous relay.
     pub misdirected: u32,
     /// Messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and

@@ -16,7 +16,8 @@ use crate::lines::LONGEST;
 /// Maximum number of connections that one call accepts.
 const ANSWERS: usize = 4;
 
-/// Maximum number of clients whose request is not complete. Of any more, the oldest are answered at once.
+/// Maximum number of clients whose request is not complete. If there are more, the oldest of them are answered at
+/// once.
 const CLIENTS: usize = 16;
 
 const PATIENCE: Duration = Duration::from_millis(200);

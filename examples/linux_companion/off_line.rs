@@ -17,7 +17,7 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// Maximum distance of a drone outside its geofence that is not reported, m.
+/// Distance from the geofence up to which a drone outside of it is not reported, m.
 const FENCE_M: f64 = 100.0;
 
 /// Ratio of a drone's distances from the given line and the line with latitude and longitude swapped. From this ratio

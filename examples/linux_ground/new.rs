@@ -65,8 +65,8 @@ pub(crate) struct NewOptions {
 /// companion's default position error.
 const ORDER_M: f32 = 2.0;
 
-/// Maximum distance of a new line Tx to Rx from the present one, m. The new line's own length is added to it. A line
-/// farther away is rejected.
+/// Maximum distance of a new line Tx to Rx from the present one, m, besides the new line's own length. A line farther
+/// away is rejected.
 const FAR_M: f64 = 100_000.0;
 
 /// Mission that supplies the values which the `--new-` options do not give.

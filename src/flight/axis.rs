@@ -104,7 +104,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Maximum distance from the line of a position in its coordinates, m: beside, before and beyond it.
+    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. It applies sideways, upward,
+    /// before Tx and beyond Rx.
     pub const AROUND_M: f32 = 5_000.0;
 
     /// Creates the line from a transmitter at `tx` to a receiver at `rx`, both on the ground.

@@ -561,13 +561,15 @@ pub enum Progress {
         by: u16,
         /// Latest view (agreed members of the chain) that the reporting relay knows.
         view: ViewId,
-        /// Number of relays that fly the mission: the reporting relay, and those of its view beyond it.
+        /// Number of relays that fly the mission. They are the relay `by`, and the relays of its view that are
+        /// farther from the station.
         relays: u16,
     },
     /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the positions of Tx and
     /// Rx, or that relay's geofence.
     Refused {
-        /// Node number of the relay that reports the refusal, which is its own or that of a relay beyond it.
+        /// Node number of the relay that reports the refusal. It refuses the mission itself, or a relay farther from
+        /// the station does.
         by: u16,
     },
     /// The upload is outdated, because a relay has stored a newer mission.

@@ -230,8 +230,8 @@ impl Association {
         known
     }
 
-    /// Returns a message of this association (session) about the fence, a limit of x between two relays. Its number,
-    /// x and distance are 0, for the caller to fill in.
+    /// Returns a message of this association (session) about the fence, a limit of x between two relays. The
+    /// message's fence number, x and distance are 0, for the caller to fill in.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own_number,
@@ -263,9 +263,8 @@ impl Association {
         self.open_sent = opens;
     }
 
-    /// Stores a request of the neighbour to halt the chain, or ends it if its message contains none. Only a message
-    /// with a valid position (`is_placed`) ends a request, because a rebooted neighbour does not know its earlier
-    /// one.
+    /// Stores the halt request in the neighbour's message. A message without a request ends an earlier one, but only
+    /// if the message has a valid position (`is_placed`): a rebooted neighbour does not know its earlier request.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -326,8 +325,8 @@ impl Association {
 pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m.
     lost: Option<(u16, f32)>,
-    /// x at which this relay is the separation away from a lost relay nearby, m; NaN if none is nearby. Before it
-    /// gets there, perhaps only lateral offset and altitude separate the two.
+    /// x at which this relay has the separation from a lost relay nearby, m; NaN if no lost relay is near. Until this
+    /// relay has reached that x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
     /// True if a lost relay was last reported on the wrong side of this one along x.
     disordered: bool,
@@ -360,7 +359,8 @@ impl KeepOut {
         });
     }
 
-    /// Removes obstacles after a message from `node`: it, and nodes farther away on `side`, are not lost.
+    /// Removes lost relays as obstacles after a message from `node`. They are that node, and nodes farther away on
+    /// `side`.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -410,10 +410,10 @@ impl KeepOut {
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
-    /// Returns the last position on the path from `from` to `to` that keeps clear of an obstacle. The obstacle is a
-    /// drone that does not fly to setpoints, and the path keeps the separation from it. If `from` is closer, the path
-    /// comes no nearer. Along x the path ends before that drone, unless lateral offset and altitude separate the two.
-    /// Within the separation along x only moves to the side, or up or down, away from the drone remain.
+    /// Returns the last position on the path from `from` to `to` that is the separation away from a drone. The drone
+    /// does not fly to setpoints. If `from` is closer, the path comes no nearer. Along x the path ends before that
+    /// drone, unless lateral offset and altitude separate the two. Within the separation along x only moves to the
+    /// side, or up or down, away from the drone remain.
     pub(super) fn path_end(
         &self,
         from: Placement,
@@ -442,10 +442,9 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits this relay's x to its first setpoint `x_m`, because of relays that were lost before it.
+    /// Limits this relay's x to `x_m`, the x of its first setpoint, because some relays were never heard.
     ///
-    /// They were never heard and may hover anywhere beyond `x_m`. At `near_m` this relay is the separation away from
-    /// them.
+    /// These may hover anywhere beyond `x_m`. At `near_m` this relay has the separation from them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -469,8 +468,9 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) if this relay is the separation away from the lost relay. `is_beyond` returns
-    /// true if this relay has passed an x. The x passed then becomes the limit of this relay's x.
+    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, which then limits its x. There it
+    /// has the separation from the lost relay. `is_beyond` returns true if this relay has passed the x that it is
+    /// given.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -523,10 +523,9 @@ pub struct Fence {
     /// Number of the fence, the plane x = constant between the two relays; 0 before the first. The relay upstream
     /// (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
     pub number: u16,
-    /// x of the fence, m, from the relay upstream, or the lowest x that the relay downstream may reach.
+    /// x of the fence, m, from the relay upstream; from the relay downstream, its lowest possible x, m.
     ///
-    /// The sender decides which one it is. Before the first fence the relay upstream sends the highest x that it may
-    /// reach. -1e7 to 1e7.
+    /// Before the first fence the relay upstream sends its highest possible x. -1e7 to 1e7.
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
@@ -594,12 +593,12 @@ impl Fence {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
-    /// Hold reason: messages have not confirmed yet that the two relays are in the right order along x.
+    /// Hold reason: messages have not confirmed yet that this relay and the neighbour are in order along x.
     Unheard,
     /// Hold reason: the neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
     Order,
-    /// Hold reason: the two agreed positions are too close along x. Lateral offsets and altitudes do not keep the
-    /// relays the separation apart.
+    /// Hold reason: the agreed positions of this relay and the neighbour are too close along x. Lateral offsets and
+    /// altitudes do not keep the two the separation apart.
     Close,
     /// Hold reason: a lost relay may still hover between this relay and its agreed position.
     Lost,

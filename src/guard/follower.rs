@@ -106,8 +106,9 @@ impl FenceFollower {
         };
     }
 
-    /// Handles a notice that the neighbour upstream does not fly to setpoints any more. This relay comes no nearer to
-    /// it. If the two were in the right order along x, no other limit of x remains.
+    /// Handles the notice that the neighbour upstream no longer flies to setpoints. This relay then comes no nearer
+    /// to that neighbour. If the two were in the right order along x, the neighbour limits this relay's x in no other
+    /// way.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -195,8 +196,9 @@ impl FenceFollower {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true if the neighbour upstream may be closer than the separation because it started there. It has
-    /// announced a fence (limit of x), but this relay is not yet known to be beyond one.
+    /// Returns true if this relay and its neighbour upstream may still be as close as at the start. That may be
+    /// closer than the separation. The neighbour has announced a fence (limit of x), but this relay is not yet known
+    /// to be beyond one.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
@@ -207,8 +209,8 @@ impl FenceFollower {
     }
 
     /// Agrees to the distance along x that the neighbour upstream requests, unless that is too small. This relay's
-    /// two neighbours must stay the separation apart, so the requested distance and `downstream_m`, the distance to
-    /// the neighbour downstream, must add up to at least that.
+    /// two neighbours must stay the separation apart: the requested distance plus `downstream_m`, the distance to the
+    /// neighbour downstream, must be at least the separation.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -217,8 +219,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the least possible distance along x to the neighbour upstream, m. Infinite stands for the separation.
-    /// The limits on the downstream side are computed from it.
+    /// Returns the least possible distance along x to the neighbour upstream, m. Infinity stands for the separation.
+    /// The limits toward the neighbour downstream are computed from this distance.
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
@@ -230,8 +232,8 @@ impl FenceFollower {
     /// Returns true if this relay is known to be beyond its neighbour upstream along x. Also true if that neighbour
     /// does not fly to setpoints, or the chain ends here.
     ///
-    /// The neighbour announces a fence (limit of x) once it has found this relay beyond it. False while a lost relay
-    /// may be on the wrong side.
+    /// The neighbour's fence (limit of x) shows it: the neighbour announces one only after it has found this relay to
+    /// be beyond. False while a lost relay may be on the wrong side.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.has_fence())

@@ -191,10 +191,11 @@ impl Guard {
         }
     }
 
-    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. It is `true` at the start.
+    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. `flown` is true at the
+    /// start.
     ///
-    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere. Flown again,
-    /// the relay begins as after a start, with the next reported position.
+    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere.
+    /// Flown again, the relay begins as after a start, with the next reported position.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
         if flown == self.flown {
             return false;
@@ -382,8 +383,8 @@ impl Guard {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. The two neighbours
-    /// alone may show it: within the errors of the reports, each may seem to be on the right side of this relay.
+    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. This is so if one
+    /// neighbour is on the wrong side of this relay, or if the upstream neighbour is beyond the downstream one.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -507,8 +508,9 @@ impl Guard {
     /// Returns the reason on the given side that keeps this relay from its agreed position. `None` if there is none,
     /// or no agreed position.
     ///
-    /// While a new agreement spreads it may refer to positions of the previous one. While the drone does not fly to
-    /// setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that does.
+    /// Shortly after a new agreement the reason may still refer to the previous agreed positions. While the drone
+    /// does not fly to setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a
+    /// neighbour that does.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         if !self.flown {
@@ -541,8 +543,8 @@ impl Guard {
         }
     }
 
-    /// Returns the reason if a move toward `side` has waited for five reminders, else `None`. There is one reminder
-    /// per second.
+    /// Returns the hold reason for a move toward `side` that has waited for five reminders; else `None`. There is one
+    /// reminder per second. The reason is `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {

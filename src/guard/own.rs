@@ -186,8 +186,9 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the position from which the relay's next path starts. It is `setpoint` once the relay is there.
-    /// Before, the relay may stop on its way, so its x is at most the error of the report away from the reported x.
+    /// Returns the position from which the relay's next path starts. It is `setpoint` once the relay has arrived
+    /// there. Before, the relay may stop on its way. The x returned is then at most the error of the position report
+    /// away from the reported x.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {

@@ -103,8 +103,9 @@ impl FenceOwner {
         };
     }
 
-    /// Handles a notice that the neighbour downstream does not fly to setpoints any more. This relay comes no nearer
-    /// to it. If the two were in the right order along x, no other limit of x remains.
+    /// Handles the notice that the neighbour downstream no longer flies to setpoints. This relay then comes no nearer
+    /// to that neighbour. If the two were in the right order along x, the neighbour limits this relay's x in no other
+    /// way.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -274,8 +275,9 @@ impl FenceOwner {
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the neighbour downstream may be closer than the separation because it started there. It has
-    /// answered, but has not reported yet that it is beyond a fence (limit of x).
+    /// Returns true if this relay and its neighbour downstream may still be as close as at the start. That may be
+    /// closer than the separation. The neighbour has answered, but has not reported yet that it is beyond a fence
+    /// (limit of x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }

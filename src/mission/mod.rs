@@ -711,8 +711,8 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index`, m, with enough space for the separation of later relays. Later is in
-    /// the order of computation.
+    /// Returns the farthest allowed x of relay `index`, m. At this x the relays that are computed after relay `index`
+    /// can still keep their minimum separation.
     ///
     /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the maximum squared
     /// distance across the line (in y and altitude) between two neighbours among those relays, m^2; it reduces the
@@ -721,8 +721,8 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index`, m, if later relays need no separation. Later is in the order of
-    /// computation. Farthest means toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest allowed x of relay `index`, m, without a separation of the relays after it. After means
+    /// in the order of computation. Farthest means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }

@@ -160,8 +160,8 @@ impl<'a> Context<'a> {
 /// Remaining leases of other relays, as far as this relay knows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Longest remaining lease, among the members of this relay's view, that this relay has made possible. A lease is
-    /// granted only after all members have taken part in a renewal.
+    /// Longest remaining lease that members of this relay's view can have because of this relay. A lease is granted
+    /// only after all members, and so this relay, have taken part in a renewal.
     pub(crate) lease_left: Duration,
     /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,

@@ -108,8 +108,8 @@ impl Lease {
         }
     }
 
-    /// Assumes that other members may rely on this relay for a whole lease longer than before. A lease from before
-    /// this relay's restart may still run at these members.
+    /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. A lease
+    /// from before this relay's restart may still run at these members.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }

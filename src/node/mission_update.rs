@@ -92,7 +92,7 @@ pub(crate) enum Offered {
 
 /// Time until the first repetition of a mission offer, in hop times.
 const OFFER_HOPS: u32 = 4;
-/// Number of mission offers at one interval. The interval doubles after each such number of offers.
+/// Number of mission offers after which the interval between offers doubles.
 const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;

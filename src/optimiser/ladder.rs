@@ -29,7 +29,7 @@ pub struct Ladder {
     /// `growth` / 16 times the next one toward the middle.
     growth: u8,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of it for the sake of the next one.
+    /// of that x for the sake of the next relay.
     plain: bool,
 }
 

@@ -66,10 +66,10 @@ pub struct Link<'a> {
     /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the mission's interference field.
     pub measured_per_w: Option<f32>,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of it for the sake of the next one.
+    /// of that x for the sake of the next relay.
     pub plain: bool,
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
-    /// computes it; `None` with other methods.
+    /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
 }
 
@@ -308,9 +308,9 @@ impl<'a> Link<'a> {
 
     /// Returns the x that the previous relay must take to meet `target` if this relay is at x = `place`.
     ///
-    /// `from_m` is the farthest x of the previous relay. `None` if it has no such position. The search assumes that
-    /// its possible positions are an interval, although there may be holes. Bounded by two reaches, in an
-    /// interference field by three for each of its points.
+    /// `from_m` is the farthest x of the previous relay. `None` if the previous relay has no such position. The
+    /// search assumes that its possible positions are an interval, although there may be holes. Bounded by two
+    /// reaches, in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -493,8 +493,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             }) || self.place(0).is_some())
     }
 
-    /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. With the
-    /// index 0, which no relay has, only `Some` or `None` counts.
+    /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. The index 0
+    /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = Self {
             plain: true,
@@ -538,8 +538,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. With the index 0,
-    /// which no relay has, only `Some` or `None` counts.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
+    /// to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     pub(crate) fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

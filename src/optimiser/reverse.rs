@@ -326,8 +326,8 @@ mod tests {
         assert!(found > 12, "{found}");
     }
 
-    /// Checks that the last relay moves away from a strong interferer until it receives Rx well enough. It begins 100
-    /// m beyond the interferer, as seen from Rx.
+    /// Checks that the last relay moves back toward Tx until it receives Rx well enough. It begins at x = 650 m,
+    /// beside a strong interferer at x = 700 m; Rx is at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

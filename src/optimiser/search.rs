@@ -86,7 +86,8 @@ pub struct Search {
     ladder: Ladder,
     tried: u32,
     /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule
-    /// has only such passes. They are also used after a relay could not take the x short of it that was required.
+    /// has only such passes. They are also used after a relay could not take the x, short of its farthest, that
+    /// another relay required.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
     most: Option<f32>,
@@ -278,10 +279,10 @@ impl Search {
     }
 }
 
-/// Lowers two targets so that traffic from Rx to Tx is included, and returns them.
+/// Lowers the targets `start` and `met` to include the traffic from Rx to Tx, and returns both.
 ///
-/// `start` is the upper bound of the search; the result is at most the maximum SIR of the hop received at Tx. `met`
-/// is a feasible target; the result is one that this hop and the hop from Rx also meet.
+/// `start`, the upper bound of the search, becomes at most the maximum SIR of the backward hop to Tx. `met`, a
+/// feasible target, becomes one that this hop and the backward hop from Rx meet, too.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..

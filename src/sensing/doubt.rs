@@ -45,8 +45,8 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of measurements that count as consistent, relative to the operator's expectation. Above it the
-/// search for a faulty relay starts.
+/// Maximum variance of the measurements' errors, in units of the variance that the operator expects. With a larger
+/// variance the search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
 /// Minimum fall of the fit's residual by which the exclusion of a relay shows that it is faulty. It is a squared
@@ -62,7 +62,7 @@ const LEAST: f64 = 0.02;
 /// variance of a fit that excludes one relay. With a smaller ratio it remains unknown which relay is faulty.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of the relative errors for measurements to count as consistent (some 1.5 dB).
+/// Maximum variance of relative errors for measurements to count as consistent; some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
@@ -101,15 +101,16 @@ pub(crate) struct Trial {
     stage: Stage,
     /// Number of sensing passes (collections of measurements) until the next search may start.
     cooldown: u8,
-    /// Node whose exclusion gave the best fit to the other nodes' measurements so far.
+    /// Node whose exclusion has given the fit with the smallest variance so far.
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
-    /// Residual of the fit that excludes the node `best`, the sum of squared relative errors.
+    /// Residual of the fit without the node `best`: the sum of the squared relative errors.
     seen_best: f32,
-    /// Variance of the relative errors in the fit that excludes the node `best`, the smallest so far.
+    /// Smallest variance of the relative errors among the fits that each exclude one node. It belongs to the fit that
+    /// excludes the node `best`.
     least: f32,
-    /// Second smallest variance of the relative errors among the fits that exclude one node.
+    /// Second smallest variance of the relative errors among the fits that each exclude one node.
     second: f32,
 }
 
@@ -259,7 +260,7 @@ pub(crate) fn is_absurd(
 
 /// Returns true if the measurement of an excluded relay still does not fit the other relays.
 ///
-/// It is v = 1e-12 W / I at `place`, and is compared with the value e that the fit to the other relays' sums,
+/// The measurement v = 1e-12 W / I at `place` is compared with the value e that the fit to the other relays' sums,
 /// `others`, gives there. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the
 /// current estimate; it sets the measurement's weight.
 pub(crate) fn is_off(

@@ -106,12 +106,14 @@ const WORTH: f64 = 1e-5;
 /// adopted if it is based on more information. A larger change may mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum change of an estimate, over its variance, for its adoption if the interferer is stationary.
+/// Minimum ratio of an estimate's mean square change to that due to chance, for a stationary source. With a smaller
+/// ratio the estimate is not adopted.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum change of an estimate, over its variance, for its adoption if the interferer moves.
+/// Minimum ratio of an estimate's mean square change to that due to chance, for a moving source. With a smaller ratio
+/// the estimate is not adopted.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum change of an estimate, over its variance, for its adoption by a chain that has settled. So large a change
+/// Minimum ratio of an estimate's mean square change to that due to chance, in a settled chain. So large a change
 /// means another interferer, so the count of refinements starts again.
 const ANOTHER: f64 = 64.0;
 
@@ -122,8 +124,8 @@ const LOUDER: f64 = 0.025;
 /// the track is discarded, and the interferer's position is not predicted.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth, as a factor, of the measurements' information that is worth a refined estimate. Information is the
-/// number of measured positions over the variance of one.
+/// Minimum factor by which the measurements' information must grow to be worth a refined estimate. Information is the
+/// number of measured positions, divided by the variance of a single position's error.
 const LEARNED: f64 = 1.1;
 /// Number of refined estimates of a stationary interferer after which the chain counts as settled. It then gets no
 /// new estimate unless the interference changes.
@@ -144,7 +146,7 @@ const GUESSED: f64 = 16.0;
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information (certainty) of the measurements: number of positions over the variance of one.
+    /// Information (certainty) of the measurements: number of positions over the variance of a single one.
     information: f64,
     /// Mean square relative error that the current estimate is expected to have.
     chance: f64,
@@ -174,8 +176,8 @@ pub(crate) struct Review {
 
 /// Decides if the measurements give a new estimate that replaces the current `estimate`.
 ///
-/// `mission` is based on the current one. `sums` has the relays' measurements, and `levels` those of transmitter and
-/// receiver. `before` is the quality of the current estimate when it was adopted.
+/// `mission` is based on the current estimate. `sums` has the relays' measurements, and `levels` those of transmitter
+/// and receiver. `before` is the quality of the current estimate when it was adopted.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -357,9 +359,9 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it. It is the mean, weighted
-/// by the variances, of the measured level and of the source's power over the ground. If the two differ too much, it
-/// is the measured level.
+/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it. It is the mean of two
+/// powers, weighted by their variances: the power measured at Rx, and the power computed for Rx from `source` and the
+/// path loss. If the two differ too much, the measured power is returned.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,

@@ -28,7 +28,8 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error in the estimated variance: that of four measured positions.
+/// Weight of the operator's expected error when the variance is estimated. It counts as much as four measured
+/// positions.
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D over the measured positions. With less, they do not show on which side of the line Tx
@@ -246,7 +247,7 @@ impl Fit {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Information (certainty) of the measurements: number of positions over the variance of one.
+    /// Information (certainty) of the measurements: number of positions over the variance of a single one.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }

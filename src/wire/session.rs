@@ -48,15 +48,16 @@ struct Peer {
     node: u16,
     /// True if a handshake to this node is due.
     handshake: bool,
-    /// True if the next handshake to this node requests a reply in any case. Otherwise only a handshake to an
-    /// unproven node does.
+    /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only while
+    /// the node is unproven.
     requests_reply: bool,
-    /// True if this node has repeated this relay's nonce. This proves that it is present, and that both know each
-    /// other's nonce.
+    /// True if the node has repeated this relay's nonce. That proves that the node is present, and that both nodes
+    /// know each other's nonce.
     proven: bool,
     /// Value of `Session::clock` when this entry was used last.
     used: u32,
-    /// Time of the last frame that proved this node present, or of the first one with a larger nonce.
+    /// Time of the last frame that proved the node present. A handshake with a larger nonce than all before counts,
+    /// too.
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,

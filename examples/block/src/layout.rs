@@ -133,9 +133,9 @@ impl Layout {
         }
     }
 
-    /// Returns the interference that the block gives. If the block has points of a distribution along x, it is that,
-    /// with the points stored in `storage`. Otherwise it is the block's interferer. If all numbers of the interferer
-    /// are 0 and `listens` is true, the interferer is unknown, and the relays estimate it.
+    /// Returns the interference that the block gives. It is a distribution along x if the block has points of one;
+    /// these are stored in `storage`. Otherwise it is the block's interferer. If all numbers of the interferer are 0
+    /// and `listens` is true, the interferer is unknown, and the relays estimate it.
     pub(super) fn interference(
         &self,
         listens: bool,

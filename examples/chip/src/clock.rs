@@ -90,7 +90,7 @@ const PLL_INPUT_HZ: u32 = 2_000_000;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Pll {
     over_drive: bool,
-    /// Multiplier PLLN of the PLL. The core's frequency is this number times 1 MHz, half the PLL's input.
+    /// Multiplier PLLN of the PLL. The core's frequency is this number times 1 MHz; the PLL's input has 2 MHz.
     plln: u32,
     /// Divisor PLLQ for the PLL's USB clock, which may be 48 MHz or less.
     pllq: u32,

@@ -85,7 +85,7 @@ struct CannotSign;
 /// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 ///
 /// If the flash can not be written, as in an emulator, the epoch is still larger than all stored ones, and at least
-/// that of the block, but it may not increase from this start to the next.
+/// that of the block; but the next start may then have the same epoch.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {

@@ -31,8 +31,8 @@ const CATCH_UP_PER_S: f32 = 1.25;
 /// overshoots the speed of its target.
 const CARROT_PART: f32 = 0.96;
 
-/// Ratio of the moving target's acceleration to the speed that it still lacks, 1/s. It applies near the maximum
-/// speed.
+/// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the
+/// difference of maximum speed and present speed.
 ///
 /// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
 const TOP_PER_S: f32 = 0.5;
@@ -41,7 +41,8 @@ const TOP_PER_S: f32 = 0.5;
 /// behind, but never stops for good.
 const LEAST_PART: f32 = 0.1;
 
-/// Ratio of the target's deceleration across the direction of a new setpoint to its acceleration.
+/// Factor on the acceleration limit for motion across the direction to a new setpoint. The moving target loses its
+/// speed across that direction with twice the acceleration of [`Pace`].
 ///
 /// The target does not turn at once, because the drone would overshoot it and come back. Its velocity in other
 /// directions is gone within [`Pace::stopping_time`].
@@ -62,8 +63,8 @@ const HALVES_MS: u64 = 1_387;
 /// distance, to [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
-/// Maximum age of a drone's position that is compared with the moving target's position at that time. The comparison
-/// gives the drone's lag behind its target.
+/// Maximum age of a drone's position from which the drone's lag behind the moving target is computed. The drone's
+/// position is compared with the target's position of the same time.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
 /// Maximum time step of the moving target. After a longer gap it continues from its last position, without a jump.

@@ -40,7 +40,7 @@ pub(super) struct Clearance {
     downstream: LostSide,
     /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers.
     accepted: Option<(Address, RelayNumbers)>,
-    /// Answer to a command that has not been sent yet: its addressee, and its `MAV_RESULT`.
+    /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without one.
     answer: Option<(Address, u8)>,
     /// Side whose lost relays have landed; `None` once this is passed to the relay.
     cleared: Option<Side>,

@@ -38,7 +38,7 @@ const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Delay of a due target after which a PX4 may have entered its failsafe.
+/// Maximum delay in sending a target to a PX4. After a longer one the PX4 may have entered its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
 /// Time for which positions must be received regularly before [`State::Blind`] (position lost) ends.
@@ -48,7 +48,7 @@ const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from a mode change to the report of the fence breach that caused it, by an ArduCopter.
+/// Maximum time from an ArduCopter's mode change to its report of the fence breach that was the cause.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
 /// Time for which a reason not to control the drone must last before the operator is told.
@@ -720,9 +720,9 @@ impl Autopilot {
         OffLine::new(at, &self.axis)
     }
 
-    /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. It is meant for
-    /// `Relay::handle_sample`. It is the newest measurement since the last call that was taken in the air. Without
-    /// the feature `sensing` there is none.
+    /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. The caller passes them to
+    /// `Relay::handle_sample`. The measurement is the newest one that was taken in the air. `None` if there is no new
+    /// one since the last call, or without the feature `sensing`.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.noise.take()
     }

@@ -236,8 +236,7 @@ impl Vehicle {
         }
     }
 
-    /// Withdraws the right to control the drone if the autopilot may change its mode by itself. It may also have done
-    /// so before.
+    /// Withdraws the right to control the drone if the autopilot may have changed its mode by itself.
     ///
     /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its
     /// failsafe after a second without one. A PX4 is therefore sent targets only after it has reported a mode other
@@ -639,7 +638,7 @@ impl OffLineDetector {
         true
     }
 
-    /// Records a position near the line Tx to Rx, which ends the report of a drone far from the line.
+    /// Records that the drone's position is near the line Tx to Rx, so that it is not reported as far off.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;

@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Reports the relay at `place`, long after its last setpoint.
+    /// Tells the guard that its relay is reported at `place`, long after the guard's last setpoint.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);
@@ -330,7 +330,7 @@ fn an_unflown_relay_reports_that_it_is_out_of_order() {
 }
 
 /// Checks that a relay that starts beside a silent relay moves away along x before it changes altitude. It then keeps
-/// the separation along x until an operator reports the silent relay as gone, and names the lost relay as the reason.
+/// the separation along x until an operator reports the silent relay as gone. Its hold reason is the lost relay.
 #[test]
 fn a_relay_moves_away_from_a_silent_one_before_across() {
     let mut one = One {

@@ -66,7 +66,7 @@ impl One {
         one
     }
 
-    /// Reports the relay at `x_m`, long after the last setpoint.
+    /// Tells the guard that its relay is reported at `x_m`, long after the guard's last setpoint.
     fn is_at(&mut self, x_m: f32) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, at(x_m));

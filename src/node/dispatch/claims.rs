@@ -47,9 +47,10 @@ impl Node {
         }
     }
 
-    /// Handles a claim of node `from` to its node number. The claim is sent back to its sender as an echo. An echo is
-    /// a claim to this relay's own number, and is compared with this relay's claim. Returns false if signed frames
-    /// replace claims.
+    /// Handles a claim message from node `from`. Returns false if signed frames replace claims.
+    ///
+    /// A claim of that node to its own node number is sent back to it as an echo. An echo shows a claim to this
+    /// relay's node number; it is compared with this relay's own claim.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;

@@ -98,10 +98,11 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay could be inserted between node `other` (at `side`) and its neighbour.
+    /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`. Node `other`
+    /// is at `side`.
     ///
-    /// This relay and the neighbour of `other` must receive each other, or a nearer linked neighbour of this relay is
-    /// inserted with it.
+    /// This relay and that neighbour must receive each other. Otherwise this relay must be linked to a node nearer
+    /// than that neighbour, and this node is inserted together with this relay.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self

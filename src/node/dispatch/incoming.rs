@@ -14,8 +14,8 @@ use crate::wire::message::Message;
 use crate::wire::upload::UPLOAD;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`. Returns false if this node may not send such a message.
-    /// Work: at most the positions for 16 target SIRs.
+    /// Handles an intact message from node `from` at `side`. Returns false if node `from` may not send such a
+    /// message. Work: at most the positions for 16 target SIRs.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,

@@ -56,8 +56,8 @@ impl Node {
         true
     }
 
-    /// Returns the next message for the ground station at `side`, and its node number. It is a hello, or the uploaded
-    /// mission that the station has requested; `None` if neither is pending.
+    /// Returns the next message for the ground station at `side`, and the station's node number. The message is a
+    /// hello, or the uploaded mission that the station has requested; `None` if neither is pending.
     pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
         let to = match side {
             Side::Upstream => 0,
@@ -174,7 +174,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles the neighbour's report that the mission `refused` is refused, by it or a relay beyond it.
+    /// Handles a neighbour's report that the mission `refused` is refused. That neighbour refuses it, or a relay
+    /// beyond.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {

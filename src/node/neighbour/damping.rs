@@ -113,7 +113,7 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link, which had `losses` before. The number grows only if `counted` is true.
+    /// Records a loss of the link, whose loss count was `losses` before. The count grows only if `counted` is true.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -162,9 +162,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the link to the node `distance` relays away. `counts` is false on a channel that loses
-    /// many frames; the loss then counts only for a flapping link. The link also takes over the losses of a flapping
-    /// link on this side, because all links of a side cross the same gap in the chain.
+    /// Records the loss of the link to the node `distance` relays away. On a channel that loses many frames (`counts`
+    /// is false) only the loss of a flapping link counts. If another link on this side flaps, this link takes over
+    /// its loss count, because all links of a side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -219,8 +219,8 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Sets the losses of every link at least to those of the link that was lost last. All links of a side cross the
-    /// same gap in the chain, so they were lost together.
+    /// Raises the loss count of every link on this side to that of the link that was lost last. All links of a side
+    /// cross the same gap in the chain, so they were lost together. Higher counts stay.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

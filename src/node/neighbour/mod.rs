@@ -88,8 +88,8 @@ impl Neighbours {
         self.downstream.refuse();
     }
 
-    /// Returns the next pending heartbeat: side, destination, number of its request, number of its reply. It can
-    /// request a heartbeat, answer the neighbour's request of that number, or both; 0 means none.
+    /// Returns the next pending heartbeat: its side, its destination, and two numbers; 0 means none. The first number
+    /// is that of a request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

@@ -55,15 +55,15 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time before which a newly selected node causes no request for a new view. The node's neighbour on its far side
-    /// may be about to select it, too, and one view change is enough.
+    /// Time before which a newly selected node causes no request for a new view. Another relay, on the far side of
+    /// that node, may be about to select the node, too, and one view change for both is enough.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
     /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
     dropped: u16,
-    /// Previous neighbour, if the selected node has replaced it because it is nearer; 0 for none.
+    /// Previous neighbour, if the selected node has replaced it as the nearer one; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
@@ -715,8 +715,8 @@ impl Neighbour {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat: destination, number of its request, number of its reply. It can request a
-    /// heartbeat, answer the neighbour's request of that number, or both; 0 means none.
+    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is that of a
+    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {

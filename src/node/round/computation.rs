@@ -48,10 +48,11 @@ pub(super) enum PassKind {
 pub(super) struct JointPlace {
     /// Lateral offset and altitude of the position.
     pub(super) cross_section: CrossSection,
-    /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation.
+    /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
+    /// used in an interference field.
     pub(super) end_m: f32,
-    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of it to help the next
-    /// hop.
+    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of that x to help the
+    /// next hop.
     pub(super) plain: bool,
 }
 

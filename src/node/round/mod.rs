@@ -222,8 +222,8 @@ impl Round {
         self.work_at = None;
     }
 
-    /// Starts a new view at `now`. `leads` is true at its leader; `works` is true if this relay must compute in any
-    /// case.
+    /// Starts a new view at `now`; `leads` is true at the view's leader. `works` is true if this relay must compute
+    /// without waiting for a message, as every relay does in the joint method.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {

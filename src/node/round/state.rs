@@ -93,8 +93,8 @@ impl Arrival {
 /// ahead of the next one, is foreign: its leader has restarted, or this relay has missed passes.
 const STRAGGLERS: u16 = 32;
 
-/// Step between the numbers of first passes. The first pass of a view, or after a leader's start, has a multiple of
-/// it as its number; other passes skip multiples. A relay can join a first pass without knowledge of earlier passes.
+/// Divisor of the numbers of first passes. The first pass of a view, or after a leader's start, has a multiple of 64
+/// as its number; no other pass has. A relay can join a first pass without knowledge of earlier passes.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.
@@ -223,7 +223,8 @@ impl RoundState {
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass has been received since the state `before`, in which a result was known.
+    /// Returns true if a new pass was received after the state `before`. In that state the result of its pass was
+    /// known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }

@@ -192,7 +192,7 @@ pub(crate) struct SweepPass {
     pub(crate) verdict: Verdict,
     /// x that this relay takes for the committed target, m; `None` without a committed target.
     place: Option<f32>,
-    /// Required x of the previous relay for the committed target, m; `None` for its own farthest x.
+    /// Required x of the previous relay for the committed target, m. `None` if that relay takes its farthest x.
     required_x_m: Option<f32>,
 }
 

@@ -181,9 +181,10 @@ impl TurnPass {
         self.search.is_some()
     }
 
-    /// Continues the search by `budget` evaluations of positions, and to the end of a grid row.
+    /// Continues the search: evaluates `budget` positions, and then the rest of the last grid row.
     ///
-    /// Returns `Ready` at the end of the search, with the better position, or `None` if there is none.
+    /// Returns `Ready` at the end of the search: with a position that is better than the relay's present one, or with
+    /// `None` if there is none.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);

@@ -139,7 +139,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of `node`, this relay, is not enough for a quorum on `proposal`. It does not vote.
+    /// Returns true if the vote of `node`, this relay, is not enough for a quorum on `proposal`. Casts no vote.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -152,7 +152,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view `proposal`. A full list keeps its older half, and loses one of the newer votes.
+    /// Records the vote on the view `proposal` in the list of votes. If the list is full, one of its newer votes is
+    /// dropped, and the older half stays.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -213,8 +214,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. `most` is its maximum, and
-/// stands for an unknown time.
+/// Returns the time until positions of the next view may be used, in tenths of a second. The maximum is `most`, which
+/// also stands for an unknown time.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };

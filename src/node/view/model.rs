@@ -379,7 +379,7 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// Puts the pending messages of relay `at` into the air, and records the decision in `effects`, if any.
+    /// Adds the pending messages of relay `at` to the frames under way. Records the decision in `effects`, if any.
     pub(super) fn apply_effects(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
@@ -542,8 +542,8 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay takes for agreed is agreed on. It must also have no more members than
-    /// its size.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, no more
+    /// relays may count as members of such a view than it has.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
             || chain.relays.iter().all(|unit| {

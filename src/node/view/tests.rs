@@ -304,7 +304,7 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Checks that a refusal names the agreed view. Without it, relays near the leader that do not know the newest view
+/// Checks that a refusal names the agreed view. From it, relays near the leader learn the newest view; otherwise they
 /// would be refused for ever.
 #[test]
 fn a_refusal_names_the_agreed_view() {

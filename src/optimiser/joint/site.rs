@@ -319,8 +319,8 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point on the line from `best` to `wanted` at which it leaves a circle. `middle` is the centre, and
-/// `rim` the squared radius, m^2. `None` if `best` is outside.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. `middle` is the circle's centre, and
+/// `rim` its squared radius, m^2. `None` if `best` is outside.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -425,7 +425,7 @@ impl Room {
 }
 
 /// Factor on the maximum SIR of the first or last hop, which gives the upper bound of the chain's SIR. The margin
-/// leaves the relay there a choice of position.
+/// leaves the first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
 /// Number of bisection steps for the optimum of a first hop with noise.
@@ -514,8 +514,8 @@ const STIFFNESS: f32 = 100.0;
 /// Distance from a limit of its allowed range at which a relay counts as at that limit, in units of D.
 const EDGE: f32 = 2e-6;
 
-/// Relative margin of squared length up to which a hop to the x of Rx counts as fully stretched. With a larger margin
-/// such a hop does not restrict the move of its receiver.
+/// Maximum unused part of a hop's squared length for which the hop counts as fully stretched. It applies to hops that
+/// end at the x of Rx. A hop with a larger unused part does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {

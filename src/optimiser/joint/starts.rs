@@ -17,7 +17,8 @@ pub(super) enum Start {
     /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and height of its middle,
     /// in units of D / 2.
     Arch { aside: f32, up: f32 },
-    /// Initial chain on a spiral about the interferer, by way of a position right above or beside it to Rx.
+    /// Initial chain on a spiral about the interferer. It leads from Tx to Rx through a position right above or
+    /// beside the interferer.
     ///
     /// `aside` and `up` are the direction of that position from the interferer; `far` is its distance, relative to
     /// the geometric mean of the distances of Tx and Rx.
@@ -300,7 +301,7 @@ impl Seek {
     /// Records the result of the current target; returns true if there is another one to try.
     ///
     /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
-    /// position. `Some(true)`: it is met only if some relays stay short of it.
+    /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),

@@ -50,7 +50,8 @@ pub struct Most {
 /// Lowest target searched by [`Most::of`], as a fraction of the highest possible SIR of the first hop.
 const DEPTH: f32 = 1e-20;
 
-/// Number of bisection steps in [`Most::of`]. Its range of ln(target) is 46 wide, so it is found to 1e-8.
+/// Number of bisection steps in [`Most::of`]. The search covers a range of 46 in ln(target), so the target is found
+/// to 1e-8 relative.
 const HALVINGS: u8 = 32;
 
 impl Fewest {

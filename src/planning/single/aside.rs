@@ -125,9 +125,9 @@ impl AsideCase {
 /// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The
 /// position is in [0, D] and in the allowed lateral range.
 ///
-/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the
-/// optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral range some 23
-/// 000 more.
+/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64; with noise each of them takes 48
+/// more. If the optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral
+/// range some 23 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
@@ -135,8 +135,8 @@ pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)
 /// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The
 /// position is in [0, D] and in the allowed ranges of altitudes and lateral offsets.
 ///
-/// Work: 48 bisection steps in f64, with noise as many for each. If the optimum without limits is not allowed, some
-/// 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
+/// Work: 48 bisection steps in f64; with noise each of them takes 48 more. If the optimum without limits is not
+/// allowed, some 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }

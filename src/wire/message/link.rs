@@ -7,8 +7,8 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// Hello message: the sender's neighbour, connected relays, view and mission. It reports them for the side of the
-/// sender on which the destination is.
+/// Hello message: the sender's neighbour, received nodes, connected relays, view and mission. Neighbour and received
+/// nodes are those on the side to which the message is sent.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "seven flags of the wire format"
@@ -20,7 +20,7 @@ pub struct Hello {
     pub mission: u16,
     /// Identifier of the latest view known to the sender.
     pub latest_view: ViewId,
-    /// Node number of the neighbour that the sender has selected on the destination's side; 0 for none.
+    /// Node number of the sender's neighbour on the side to which this message is sent; 0 for none.
     pub neighbour: u16,
     /// True to request a hello in return.
     pub requests_reply: bool,
@@ -28,14 +28,14 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could be inserted between the destination and its neighbour on this side. This requires
-    /// that the sender and that neighbour receive each other.
+    /// True if the sender could be inserted between the destination and the destination's neighbour. That is the
+    /// neighbour on the side of the sender; the sender and that neighbour must receive each other.
     pub ready: bool,
     /// Number of connected relays from the sender to the end of the chain away from the destination. It includes the
     /// sender: 1 to 1000.
     pub behind: u16,
-    /// Bit set of the nodes that the sender receives on the destination's side. Bit i, 0 to 3, stands for the node
-    /// whose number differs from the sender's by i + 1.
+    /// Bit set of the nodes that the sender receives, on the side to which this message is sent. Bit i, 0 to 3,
+    /// stands for the node whose number differs from the sender's by i + 1.
     pub hears: u8,
     /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,
@@ -43,7 +43,8 @@ pub struct Hello {
     pub active: bool,
     /// True if all relays of the sender's view use `latest_mission`, a mission uploaded in flight.
     pub active_in_view: bool,
-    /// True if the mission `latest_mission` is refused, by the sender or by a relay beyond it.
+    /// True if the mission `latest_mission` is refused. The sender refuses it, or a relay farther from the
+    /// destination.
     pub refused: bool,
     /// Number that the reply to this hello must repeat if it is a mission offer. 0 if the sender accepts no offer.
     pub offer_number: u16,

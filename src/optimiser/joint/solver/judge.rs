@@ -20,7 +20,7 @@ pub(super) const JUDGED: f32 = 4e-6;
 /// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Margin of the first limit of a chain's target above the upper bound of its SIR, in ln(SIR).
+/// Difference between the first limit on a chain's target and the upper bound of its SIR, in ln(SIR).
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -70,7 +70,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Records the result of one target, and selects the next piece of work.
     ///
     /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
-    /// position. `Some(true)`: it is met only if some relays stay short of it.
+    /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
     pub(super) fn tried(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -34,9 +34,9 @@ pub use chain::Seat;
 struct ForwardPass {
     /// Number of relays that the forward pass has completed.
     done: u16,
-    /// New position of the relay that this forward pass has computed last.
+    /// New position of the last relay that this forward pass has moved.
     from: Placement,
-    /// Position before this forward pass of the relay that the pass has computed last.
+    /// Position that the last relay moved by this forward pass had before the pass.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -101,18 +101,18 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the improvement of the best chain so far had reached, in ln(SIR). The improvement of another chain
-    /// is stopped once it is predicted to stay below.
+    /// Target SIR that the improvement of the best chain reached, in ln(SIR). The improvement of another chain is
+    /// stopped once it is predicted to end below this target.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: [Cell; RELAYS],
-    /// Target from which the search for the best chain's highest target started, in ln(SIR). With it the stored best
-    /// chain can be used, and its improvement is not repeated. `None` if a repetition would give another chain.
+    /// Start value of the search for the highest target SIR that the best chain meets, in ln(SIR). With it the stored
+    /// best chain can be used, and its improvement is not repeated. `None` if a repetition would give another chain.
     best_judged: Option<f32>,
-    /// Target from which the search for the current chain's highest target started, in ln(SIR).
+    /// Start value of the search for the highest target SIR that the current chain meets, in ln(SIR).
     judged_at: Option<f32>,
-    /// True while the comparison with the best chain has not shortened the improvement of the current one. A
-    /// repetition would then give the same chain.
+    /// True if no comparison with the best chain has cut the current chain's improvement short. A repetition of the
+    /// improvement would then give the same chain.
     is_whole: bool,
     /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
     /// relays try other positions.
@@ -128,7 +128,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     moving: u16,
     /// Number of trial moves of single relays that were accepted at the end of the solution.
     moved: u8,
-    /// Lateral offset and altitude that the relay of the current trial move had before it.
+    /// Lateral offset and altitude that a relay had before its current trial move.
     kept: Cell,
     /// Segment of the chain whose policies (relays' moves) are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
