@@ -74,7 +74,7 @@ pub struct MissionOptions {
     /// Left limit of the places that `joint` chooses, facing the receiver, as y in m, -1e5 to 0
     #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(LEFT_M))]
     pub lateral_min: f32,
-    /// Right limit of these places, as y in m, 0 to 1e5
+    /// Right limit of the places that `joint` chooses, facing the receiver, as y in m, 0 to 1e5
     #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(RIGHT_M))]
     pub lateral_max: f32,
     /// Power of the transmitter, W, 1e-6 to 1e6
@@ -90,10 +90,10 @@ pub struct MissionOptions {
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W))]
     pub noise: f32,
-    /// SIR that a hop needs on the way back from the receiver, relative to that on the way there, 0 to 1. 0 is one direction
+    /// SIR that a hop needs toward the transmitter, relative to its SIR toward the receiver, 0 to 1. 0 is one direction only
     #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(REVERSE))]
     pub reverse: f32,
-    /// Power of the receiver on the way back, W, 1e-6 to 1e6; default: --tx-power
+    /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub rx_power: Option<f32>,
     /// Minimum distance between two relays, m, 0 to 1e5

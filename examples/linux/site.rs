@@ -6,7 +6,7 @@ use clap::Args;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Sites};
 
-/// Options of the two ends of the line.
+/// Options for the positions of the transmitter and the receiver on earth.
 #[derive(Args, Debug)]
 pub struct SiteOptions {
     /// Position of the transmitter. Latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m

@@ -85,7 +85,7 @@ pub(crate) struct Options {
         conflicts_with = "positions"
     )]
     autopilot: Option<String>,
-    /// Bit rate of its tty, bit/s, 1200 to 4000000
+    /// Bit rate of the tty to the autopilot, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
     autopilot_baud: u32,
     /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits. Frames to it are signed, and unsigned ones from it are
@@ -101,7 +101,8 @@ pub(crate) struct Options {
     antenna: Option<Antenna>,
     #[command(flatten)]
     sites: SiteOptions,
-    /// Maximum position error of a hovering drone, m, 0 to 1000. Drones may come closer to each other by as much
+    /// Maximum position error of a hovering drone, m, 0 to 1000. Two drones may come closer to each other than the separation by twice
+    /// this error
     #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number([0.0, 1_000.0]))]
     position_error: f32,
     #[command(flatten)]
@@ -109,8 +110,8 @@ pub(crate) struct Options {
     /// Method of finding positions; with --field only `align`. The first relay's setting counts, with --field the last relay's
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
-    /// Interference field instead of --interferer. Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the
-    /// receiver (m, -1e7 to 1e7), X rising
+    /// Interference as a function of the position along the line, instead of --interferer. Each point has X (m, -1e7 to 1e7, in
+    /// ascending order) and Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32)
     #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
     field: Option<Field>,
     #[command(flatten)]

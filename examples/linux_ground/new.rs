@@ -40,7 +40,7 @@ pub(crate) struct NewOptions {
     /// New left limit of the relays' positions, facing the receiver, as y in m, -1e5 to 0
     #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = number(LEFT_M))]
     new_lateral_min: Option<f32>,
-    /// New right limit, as y in m, 0 to 1e5
+    /// New right limit of the relays' positions, facing the receiver, as y in m, 0 to 1e5
     #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = number(RIGHT_M))]
     new_lateral_max: Option<f32>,
     /// New power of the transmitter, W, 1e-6 to 1e6
