@@ -35,8 +35,9 @@ fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Returns a copy of the autopilot link that received the relay's outputs again. An equal copy shows that the link
-/// had received all of them.
+/// Returns a copy of the autopilot link `link` to which the relay's outputs were passed once more.
+///
+/// If the copy equals `link`, then `link` already had the newest outputs of the relay.
 fn with_repeated_outputs(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     let mut link = link.clone();
     link.handle_ready(now, relay.is_ready());

@@ -232,7 +232,7 @@ impl Link {
         }
     }
 
-    /// Delivers a heartbeat of a PX4, an ArduCopter or another system, in any mode.
+    /// Delivers a heartbeat to the link, from a PX4, an ArduCopter or another system, in any flight mode.
     fn heartbeat(&mut self, input: &mut Input<'_>) {
         let autopilot = match input.below(8) {
             0..=3 => 12,
@@ -279,7 +279,7 @@ impl Link {
         self.deliver_frame(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
-    /// Delivers the drone's position, perhaps with a delayed or wrong time stamp.
+    /// Delivers the drone's position to the link, perhaps with a delayed or wrong time stamp.
     fn position(&mut self, input: &mut Input<'_>, place: Placement) {
         let clock = input.byte();
         let Some(point) = self.axis.point(place) else {

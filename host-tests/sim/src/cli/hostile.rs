@@ -17,7 +17,7 @@ use crate::simulator::fleet::{FleetSpec, Takeover, somewhere};
 use crate::simulator::medium::Access;
 use crate::simulator::setup::{Partition, Setup};
 
-/// Command-line options for events in the air.
+/// Command-line options for failures and reboots of relays, partitions of the chain, and radio attacks.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Hostile air")]
 #[expect(

@@ -302,9 +302,9 @@ impl<'a> Stages<'a> {
         best.is_some_and(|x| self.line.first_sir(x) >= self.target)
     }
 
-    /// Returns the x of each relay, m, in a chain that meets the target if [`Stages::is_met`].
+    /// Returns the x of each relay, m, in a chain that meets the target SIR. [`Stages::is_met`] must be true.
     ///
-    /// They rise from Tx to Rx. Each relay divides the rest of the line among the remaining hops as evenly as the
+    /// The x rise from Tx to Rx. Each relay divides the rest of the line among the remaining hops as evenly as the
     /// target allows. `None` if the feasible positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
@@ -343,9 +343,9 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the feasible hops from a relay to the next one, which may be anywhere in `spans`.
+/// Returns the feasible hops from a relay whose next relay may be anywhere in `spans`, intervals of x.
 ///
-/// `reach` has the hop ranges. Each hop is at least `apart` metres long.
+/// `reach` has the hop ranges at which the next relay meets the target SIR. Each hop is at least `apart` metres long.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
