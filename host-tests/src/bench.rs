@@ -196,7 +196,7 @@ impl Bench {
         }
     }
 
-    /// Lets all relays and ground stations handle their timers, and puts the frames they send in transit.
+    /// Lets all relays and ground stations handle their timers, and puts their pending frames in transit.
     fn drain(&mut self) {
         let (now, last) = (self.now, self.relays.len() + 1);
         for at in 0..self.relays.len() {

@@ -56,7 +56,8 @@ fn lost_and_found_relays_are_reported_by_index() {
 
 /// Checks that a relay learns which neighbour does not receive it.
 ///
-/// Relay 3 does not receive relay 2, but relay 2 receives relay 3. It must learn why they are no neighbours.
+/// Relay 3 does not receive relay 2, but relay 2 receives relay 3. Relay 2 must report that relay 3 does not receive
+/// it.
 #[test]
 fn a_relay_that_is_not_received_is_reported() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));

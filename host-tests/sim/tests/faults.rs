@@ -446,8 +446,8 @@ fn random_faults_let_at_most_one_group_fly() {
 
 /// Checks a run in which, before a fix, two groups of relays flew by separate agreements.
 ///
-/// Only the last relay had accepted a view. The next view was then formed without the relays that had voted for that
-/// view and relied on its lease.
+/// Only the last relay had accepted a view A. Then view B was formed without the relays that had voted for A and
+/// relied on the lease of A.
 #[test]
 fn an_unheard_decision_ends_no_lease() {
     let mut sequence = sequence(6_450);

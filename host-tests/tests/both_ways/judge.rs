@@ -155,7 +155,7 @@ impl Chain {
         points
     }
 
-    /// Improves positions by searches in windows around them, which shrink when they no longer help.
+    /// Improves positions by searches in a window around each. The windows shrink when they no longer help.
     ///
     /// Returns the two-way SIR of the worst hop, which counts the worse direction of each hop, and the positions.
     pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {

@@ -253,7 +253,8 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     seed
 }
 
-/// Exchanges all pending frames. Appends those to relay `own` (from 0) to `seed`, and returns their number.
+/// Exchanges all pending frames. Appends the frames that relay `own` (from 0) receives to `seed`, and returns the
+/// number of these frames.
 fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) -> usize {
     let (mut heard, mut said) = (0, true);
     let mut buffer = [0; MAX_FRAME];

@@ -328,7 +328,7 @@ impl World {
         }
     }
 
-    /// Prints the positions and goals of the drones for debugging.
+    /// Prints the time, and each drone's position, setpoint and reasons to wait, for debugging.
     fn exchange_fences(&self) {
         let each = self.drones.iter().map(|drone| {
             let at = drone.line.along(drone.at);

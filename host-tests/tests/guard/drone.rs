@@ -21,7 +21,7 @@ pub(crate) fn length([dx, dy, dh]: Point) -> f64 {
     dx.hypot(dy).hypot(dh)
 }
 
-/// Returns the point that is the fraction `share` of the vector `way` away from `at`.
+/// Returns the point `at` + `share` * `way`.
 pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
     [0, 1, 2].map(|part| at[part] + share * way[part])
 }

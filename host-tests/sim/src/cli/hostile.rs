@@ -323,7 +323,7 @@ impl Air {
         self.deaf.iter().map(name)
     }
 
-    /// Returns the time when each `--deaf` failure ends, or starts if it is permanent, and a `--soak` ends.
+    /// Returns the end of each `--deaf` failure (its start if permanent), and the end of a `--soak`.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
             .iter()

@@ -50,7 +50,9 @@ pub struct ChainReport {
     /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best possible linear SIR, 0, if no placement gives every hop a SIR above 0. Absent in all other cases.
+    /// Linear SIR of the best possible placement if it is 0; absent in all other cases.
+    ///
+    /// It is 0 if no placement gives every hop an SIR above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
     /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
@@ -540,7 +542,7 @@ pub struct AvailabilityReport {
 }
 
 impl AvailabilityReport {
-    /// Creates the report of the statistics `watched`.
+    /// Creates the report of the availability from the statistics `watched` of a run.
     pub fn of(watched: Watched) -> Self {
         let longest = watched.longest_wrong;
         Self {

@@ -29,7 +29,7 @@ pub struct BelievedReport {
 /// Quality of the relays' interference estimate, and of the positions chosen with it.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct SensingReport {
-    /// Estimated interferer of relay 1 at the end; absent without an estimate.
+    /// Interferer as relay 1 estimates it at the end of the run; absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed: Option<BelievedReport>,
     /// Number of times that the relays agreed on new positions, including the first.

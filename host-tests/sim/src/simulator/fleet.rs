@@ -149,9 +149,10 @@ pub(super) struct Vehicle {
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Time until which position targets that the autopilot may not receive are no error of the relay.
+    /// Time until which forbidden position targets of the relay do not count as errors.
     ///
-    /// The autopilot has changed its mode or state, and the relay may not know yet.
+    /// The autopilot has changed its mode or state, so that it no longer accepts targets, and the relay may not know
+    /// yet.
     unknown_until: Instant,
     pub(super) strays: u64,
     rng: ChaCha8Rng,
@@ -500,7 +501,7 @@ const NEXT_MS: u64 = 500;
 
 /// Delay before a pilot hands the drone to its relay, s, after the climb and after a failed attempt.
 const LOOKS_S: u64 = 2;
-/// Delay, s, before a pilot hands the drone to its relay again, from a restart of autopilot or relay.
+/// Delay from a restart of autopilot or relay to the pilot's next hand-over to the relay, s.
 const RECOVERS_S: u64 = 10;
 
 /// Flight mode of a drone: who controls it.

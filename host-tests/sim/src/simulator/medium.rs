@@ -44,8 +44,9 @@ pub struct Sent {
 enum Reception {
     Clean,
     Collided,
-    /// The node does not receive the frame, because its own radio sends or turns to sending. Also if the sender is
-    /// switched off.
+    /// The node does not receive the frame, because its own radio sends or turns to sending.
+    ///
+    /// Frames whose sender is switched off meanwhile count here, too.
     Unheard,
 }
 

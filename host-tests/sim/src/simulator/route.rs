@@ -95,7 +95,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Records the state of relay `relay` (from 0) at the time `at`, if it differs from the last one.
+    /// Records the state of relay `relay` (from 0) at time `at`, unless it is like the last recorded one.
     pub fn see(&mut self, at: Instant, relay: usize, state: RelayState) {
         let known = self.latest.get(&relay);
         if known.is_none_or(|known| !known.is_like(&state)) {
@@ -104,7 +104,9 @@ impl Track {
         }
     }
 
-    /// Returns this record with each relay at its position in `places`, m, whenever it has a position.
+    /// Returns this record with other positions: each position of relay k becomes `places[k]`, m.
+    ///
+    /// States in which a relay has no position keep none.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -242,7 +244,7 @@ impl Window {
         self.elapsed(until) - self.elapsed(from)
     }
 
-    /// Returns the end of a transmission that goes on at `from` and needs `duration` of slot time, above 0.
+    /// Returns the end of a transmission that needs `duration` of slot time, above 0, from `from` on.
     pub fn ends(&self, from: Ps, duration: Ps) -> Ps {
         let due = u128::from(self.elapsed(from)) + u128::from(duration) - 1;
         let open_for = u128::from(self.open_for);
@@ -580,7 +582,7 @@ pub fn route(
 }
 
 impl Route {
-    /// Adds `stage` with the hops between `members`, unless the relays have not agreed on positions yet.
+    /// Adds `stage`, with the hops between `members`, to the route, unless there is no agreement yet.
     fn add(
         &mut self,
         mut stage: Stage,

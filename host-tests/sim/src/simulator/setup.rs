@@ -49,7 +49,7 @@ pub struct UploadSpec {
 pub struct Channel {
     /// Data rate of the link or the channel, bit/s.
     pub baud: u32,
-    /// Largest number of relays that receive each other at one point, including the relay itself.
+    /// Largest number of relays in radio range of one relay, which is counted, too.
     ///
     /// It is 1 for separate lines.
     pub in_range: usize,
@@ -206,7 +206,7 @@ impl Setup {
         }
     }
 
-    /// Returns the number of relays that share the channel at one point, and the overhead of a frame.
+    /// Returns the number of relays in radio range of one relay, which is counted, and a frame's overhead.
     ///
     /// `None` if senders do not interfere with each other: on separate lines and on an ideal channel.
     pub fn load(&self) -> Option<ChannelLoad> {
