@@ -196,7 +196,7 @@ fn formed(wiring: u8) -> Vec<u8> {
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
 
-/// Returns an input: a relay with a key receives a frame of another mission, and one without a tag.
+/// Returns an input: a relay with a key receives a frame of another mission, and a frame without a tag.
 fn refused() -> Vec<u8> {
     let head = [0, 3, 0, 1, 8, 0, 0, 0, 0, 1, 0];
     let other = [9, 0, 3, 255, 0, 0];

@@ -125,7 +125,8 @@ fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
 
 /// Checks the first target SIR of the paper's fixed-step search for an interferer behind Tx.
 ///
-/// It must be the best SIR of the first hop, which that hop has with the relay farther along, and not above Tx.
+/// The first target must be the best SIR of the first hop. The first hop has this SIR with relay 1 some way beyond
+/// Tx, not straight above Tx.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Relay {

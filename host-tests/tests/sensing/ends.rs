@@ -14,7 +14,7 @@ use crate::count;
 
 const RELAYS: u16 = 5;
 
-/// Factor on the path loss on the ground that the mission does not know: Rx is behind a hill.
+/// Factor by which the true path loss on the ground exceeds that in the mission: Rx is behind a hill.
 const HILL: f64 = 8.0;
 
 /// Returns two results of each random scene: the error of relay 1's power estimate at Rx, and the SIR.

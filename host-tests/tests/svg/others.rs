@@ -37,7 +37,7 @@ fn the_interferer_of_the_previous_mission_is_faint() {
     }
 }
 
-/// Checks that other interferers that would spoil the picture are not drawn.
+/// Checks that earlier or estimated interferers that would spoil the picture are not drawn.
 ///
 /// Such an interferer is at the position of one that is drawn already, far away, or at an undefined position.
 #[test]

@@ -162,7 +162,7 @@ pub const LAST: usize = 8;
 /// Each list has one ratio for each random experiment.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// Simulates `scenes` random experiments; returns each chain's SIR over the best possible one.
+/// Simulates `scenes` random experiments; returns the ratios of the chains' SIRs to the best possible.
 ///
 /// There is a ratio after each agreement on positions. `setup` returns the simulation of an experiment.
 pub fn shares(

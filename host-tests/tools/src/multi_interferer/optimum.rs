@@ -519,7 +519,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the positions of the crossings in `turns` at which the function falls below the level.
+/// Returns the positions of those crossings in `turns` at which the function falls below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

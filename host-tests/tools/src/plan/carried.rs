@@ -23,9 +23,10 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
 
-/// Largest relative excess of the time per bit on the coarse grid at which positions are still refined.
+/// Largest relative excess of a chain's time per bit on the coarse grid for which it is still refined.
 ///
-/// It is relative to the number of relays with the least time. For a larger excess no refinement can make up.
+/// The excess is over the number of relays with the least time per bit. A precise search for positions cannot make up
+/// for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.

@@ -429,7 +429,7 @@ impl Table {
 
     /// Returns the largest number of relays whose time per bit on the grid is near the least one.
     ///
-    /// It is at most 1 + `loss` times the least time of all numbers of relays. Returns 0 if no time is finite.
+    /// The time is at most 1 + `loss` times the least time of all numbers of relays. Returns 0 if no time is finite.
     pub fn largest_within(&self, loss: f64) -> u16 {
         let times = || self.starts.iter().map(|(time, _)| *time);
         let best = times().fold(f64::INFINITY, f64::min);

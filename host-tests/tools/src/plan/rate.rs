@@ -36,7 +36,7 @@ const LEAST_LISTED: u16 = 10;
 pub enum Rate {
     /// Rate from Tx to Rx, bit/s, of a chain that carries data only in that direction.
     There(f64),
-    /// Rates to Rx and to Tx at the same time, bit/s, of a chain planned for both directions.
+    /// Rates to Rx and to Tx, bit/s, of a chain that carries data in both directions.
     Both([f64; 2]),
 }
 

@@ -56,7 +56,9 @@ pub(crate) struct Step {
 pub(crate) enum Lane {
     /// The step runs after the previous step of this lane.
     Main,
-    /// The step starts after the previous step of the main lane, which does not wait for its end. It mostly waits for the wall clock.
+    /// The step starts after the previous step of the main lane.
+    ///
+    /// The main lane does not wait for the end of this step, because the step mostly waits for the wall clock.
     Waiting,
     /// The step runs at low priority after the previous step of this lane. It has a target folder of its own.
     Background,
