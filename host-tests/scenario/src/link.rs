@@ -109,7 +109,9 @@ impl RateModel {
         }
     }
 
-    /// Returns the lowest SINR (linear) that carries `bits_per_hz` bit/s/Hz, above 0. `None` if none does.
+    /// Returns the lowest SINR (linear) that carries `bits_per_hz` bit/s/Hz. `None` if no SINR does.
+    ///
+    /// `bits_per_hz` must be above 0.
     pub fn sinr(&self, bits_per_hz: f64) -> Option<f64> {
         match self {
             Self::Shannon { gap_db } => {

@@ -563,7 +563,7 @@ fn begin_upload(air: &mut Air, base: &Mission, epoch: u32) {
 
 /// Checks that relays refuse an attacker's replay of withheld offers after the upload was given up.
 ///
-/// They accept a new upload afterwards.
+/// The relays accept a new upload afterwards.
 #[test]
 fn a_withheld_offer_is_refused_and_the_new_one_flown() {
     let after = Settings::default().dead_after.times(2).as_micros() / 1_000_000;

@@ -134,7 +134,8 @@ fn a_tag_for_other_nonces_counts_as_forged() {
 
 /// Checks what the documentation of `Auth::epoch` warns of: a relay must not start with a used epoch.
 ///
-/// Its neighbour then ignores its frames as replayed, and the relay accepts old frames of the neighbour.
+/// If it does, its neighbour ignores the relay's frames as replayed, and the relay accepts old frames of the
+/// neighbour.
 #[test]
 fn a_reused_epoch_is_not_accepted_as_a_restart() {
     let mut link = Link::new();

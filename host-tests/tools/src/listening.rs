@@ -99,7 +99,7 @@ impl RandomScene {
 
     /// Simulates a chain that knows the interferer, and returns the positions of its relays.
     ///
-    /// If there are several, it knows the paper's hypothetical interferer instead of them.
+    /// If there are several interferers, the chain knows the paper's hypothetical interferer instead of them.
     pub fn known_positions(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
@@ -205,7 +205,7 @@ pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
 
 /// Returns a simulation without measurements, whose relays know the interferer.
 ///
-/// For several interferers they know the paper's hypothetical one instead.
+/// If there are several interferers, the relays know the paper's hypothetical interferer instead of them.
 pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     (setup.mission, _) = mission(&wild.scenario, wild.relays, 1e-4)?;
@@ -229,9 +229,9 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
 /// Time after the start of a run from which its SIRs count, s.
 const BEGUN_S: u32 = 60;
 
-/// Mean ratios of the SIR to the best possible one while the interferer moves, one for each experiment.
+/// Mean ratios of the SIR to the best possible SIR at the same moment, one for each experiment.
 ///
-/// The first minute of a run does not count. The best possible SIR is that of the same moment.
+/// The interferer moves. The first minute of a run does not count.
 #[derive(Clone, Debug, Default)]
 pub struct MovingShares {
     /// Mean ratios of chains that track the interferer, one for each experiment.

@@ -25,9 +25,9 @@ const MAX_OPERATIONS: usize = 256;
 /// named values.
 const MAX_FRAMES: usize = 26;
 
-/// Maximum distance of a flight target from the line Tx-Rx, m: 5 km.
+/// Maximum distance of a flight target from the line Tx-Rx, m: 5 km, and 40 m of error.
 ///
-/// It includes the error of a flat earth at that distance, 40 m.
+/// The error comes from the assumption of a flat earth.
 const AROUND_M: f64 = 5_040.0;
 
 /// Surveyed position of Tx: latitude and longitude in degrees, height in m above the sea.

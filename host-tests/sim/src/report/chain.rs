@@ -50,9 +50,9 @@ pub struct ChainReport {
     /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Linear SIR of the best possible placement if it is 0; absent in all other cases.
+    /// Linear SIR of the best possible placement; present only if this SIR is 0.
     ///
-    /// It is 0 if no placement gives every hop an SIR above 0.
+    /// Then no placement gives every hop an SIR above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
     /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
@@ -669,14 +669,16 @@ pub struct AllInterferersReport {
     pub all_sir: f64,
     /// SIR of the worst hop with all interferers of the scenario, dB.
     pub all_sir_db: f64,
-    /// Relative loss of SIR by the assumption of a single interferer: 1 - `all_sir` / SIR with that one.
+    /// Relative loss of SIR by the assumption of a single interferer.
     ///
-    /// It is negative if the SIR with all interferers is higher.
+    /// It is 1 - `all_sir` / SIR with the single interferer. It is negative if the SIR with all interferers is
+    /// higher.
     pub all_loss: f64,
 }
 
 impl AllInterferersReport {
-    /// Computes the SIR of `relays` with all interferers. `sir` is the SIR with the single one that they assume.
+    /// Computes the SIR of `relays` with all interferers. `sir` is the SIR with the single interferer that the relays
+    /// assume.
     ///
     /// `None` if the scenario has a single interferer or a random field.
     pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {

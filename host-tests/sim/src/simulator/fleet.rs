@@ -272,7 +272,8 @@ impl Vehicle {
         self.pilot.schedule_hand_over_after_restart(now);
     }
 
-    /// Restarts the relay's side of the MAVLink connection, as after a reboot of the relay. Its state is lost.
+    /// Restarts the relay's side of the MAVLink connection, as after a reboot of the relay. The state of the
+    /// connection is lost.
     pub(super) fn boot(&mut self, now: Instant) {
         self.link = Autopilot::new(self.spec.axis, Pace::default(), now);
         self.sites = None;

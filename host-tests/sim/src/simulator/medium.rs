@@ -310,7 +310,7 @@ pub const HEADER: usize = 6;
 
 /// Time in which a radio turns from receiving to sending, in bytes: `aTurnaroundTime`, 12 symbols.
 ///
-/// It neither sends nor receives meanwhile.
+/// The radio neither sends nor receives meanwhile.
 pub const TURNAROUND: usize = 6;
 
 /// Time on the air that a frame takes in addition to its bytes, as a number of bytes.

@@ -39,7 +39,7 @@ pub enum TimelineEvent {
     },
     /// The relay found that too few relays reach each other for a quorum, so no view can form.
     NoQuorum,
-    /// The relay's lease expired: it may no longer rely on the last agreement.
+    /// The relay's lease expired: the relay may no longer rely on the last agreement.
     LeaseLapsed,
     /// Another node reports that it does not receive the relay.
     NotHeard,

@@ -117,7 +117,7 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
 
 /// Number of intervals into which the range of altitudes is divided for the scan.
 ///
-/// It is divided twice: into intervals of equal length, and into intervals of equal ratio.
+/// The range is divided twice: into intervals of equal length, and into intervals of equal ratio.
 const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;

@@ -82,8 +82,8 @@ impl<'a> Carried<'a> {
 
     /// Returns the largest number of relays for which a precise search for positions is worthwhile.
     ///
-    /// It is used for time slots as long as each hop needs. With more relays, one bit needs over 5 % more time on the
-    /// coarse grid than with the best number, which a precise search cannot make up for.
+    /// Such a search is used for time slots as long as each hop needs. With more relays, one bit needs over 5 % more
+    /// time on the coarse grid than with the best number, which a precise search cannot make up for.
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }

@@ -117,7 +117,7 @@ fn alone(
 
 /// Tolerated difference of a coordinate, m, between the file's plan and the recomputed one.
 ///
-/// They differ if the plan was made on another machine, which rounds differently.
+/// The two plans differ if the file's plan was made on another machine, which rounds differently.
 const SAME_M: f64 = 0.1;
 /// Tolerated difference of the SIR, dB, between the file's plan and the recomputed one.
 const SAME_DB: f64 = 0.01;

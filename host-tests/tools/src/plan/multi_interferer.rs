@@ -193,8 +193,8 @@ impl Planner<'_> {
         variants
     }
 
-    /// Returns the plan with the fewest relays that give every hop the SIR `target`. It assumes that more relays do
-    /// no worse.
+    /// Returns the plan with the fewest relays that give every hop the SIR `target`. The search assumes that more
+    /// relays do no worse.
     fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
         let mut most: f64 = 0.0;
         let mut meets = |relays: u16| -> Result<Option<Candidates>, NoPlan> {

@@ -81,8 +81,9 @@ pub struct RateReport {
 }
 
 impl RateReport {
-    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are those to list. Without a
-    /// plan the report has only these.
+    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are those to list.
+    ///
+    /// Without a plan the report has only `best` and `rates`.
     pub fn new(
         plan: Option<&Plan>,
         (scenario, radio): (&Scenario, &Radio),

@@ -213,7 +213,7 @@ const WAITING_TEST: &str = "companion";
 
 /// Number of test functions of [`WAITING_TEST`] that run at a time.
 ///
-/// It exceeds the number of cores, because each of them uses a few per cent of one.
+/// It may exceed the number of cores, because each of the test functions uses a few per cent of a core.
 const WAITING_TESTS: &str = "6";
 
 /// Returns the steps that run all tests of the workspace.
