@@ -67,7 +67,7 @@ struct TestFrame {
     counter: ExpectedCounter,
 }
 
-/// Counter of the relay that must count a frame.
+/// Statistics counter in which the tested relay must count a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum ExpectedCounter {
     Counted,

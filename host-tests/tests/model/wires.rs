@@ -56,7 +56,7 @@ pub(crate) struct Wires {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pass {
     pub(crate) number: u16,
-    /// Digest of the mission, plus what the membership view adds to it.
+    /// Sum of the mission's digest and a number that depends on the membership view.
     pub(crate) digest: u16,
     /// True if Algorithm 2 moves relays by this pass (a message that travels along the chain).
     pub(crate) moves: bool,

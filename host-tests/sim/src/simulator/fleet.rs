@@ -139,7 +139,7 @@ pub(super) struct Vehicle {
     goal: Point,
     /// Height at which the pilot first hands the drone to its relay, m.
     climbs_to_m: f64,
-    /// True while the pilot sees no other drone moving near this one.
+    /// True while the pilot of this drone sees no other drone moving nearby.
     pub(super) is_clear: bool,
     last_target_at: Option<Instant>,
     /// True while a PX4 is in its failsafe. It resumes OFFBOARD once it receives a stream of targets again.

@@ -287,7 +287,7 @@ pub enum ChainState {
 /// the promised rates.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Period {
-    /// Start of the period, ps. It ends where the next one starts.
+    /// Start of the period, ps. The period ends where the next period starts.
     pub from: Ps,
     /// Number of relays in the view (membership of the chain).
     pub relays: u16,

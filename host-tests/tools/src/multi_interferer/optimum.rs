@@ -221,7 +221,7 @@ pub(super) fn golden(
 // d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
 // target can be bisected.
 
-/// Group of feasible hops from one relay to the next, as an interval of x for each of the two.
+/// Group of feasible hops from one relay to the next, as an interval of x for each of the two relays.
 ///
 /// A sender at any x in `from` has at least one x in `to` at which the next relay meets the target SIR.
 #[derive(Debug, Clone, Copy)]
