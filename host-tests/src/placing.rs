@@ -239,8 +239,8 @@ pub struct Reaches {
 
 /// Checks the farthest positions at which `count` random hops meet a target SIR.
 ///
-/// Each must lie between the exact ones of a target 1e-6 lower and 1e-6 higher (relative), with a tolerance of two
-/// f32 steps. `target` draws the target of a hop.
+/// Each position must lie between the exact positions for two targets: 1e-6 (relative) below and above the target,
+/// with a tolerance of two f32 steps. `target` draws the target of a hop.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,

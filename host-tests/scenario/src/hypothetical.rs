@@ -115,14 +115,15 @@ pub struct Fit {
     pub x_m: f64,
     /// Lateral distance y_H of the hypothetical interferer from the line, m, >= 0.
     pub y_m: f64,
-    /// Best power of an interferer at this position, and the error that remains with it.
+    /// Best power of an interferer at this position, and the remaining error.
     pub best_power: BestPower,
 }
 
 /// Returns the single interferer that best replaces all interferers of `scene`; `None` if it has none.
 ///
 /// The search usually evaluates about 1 500 positions with 400 quadrature points, 600 with 4 000 and one with 60 000.
-/// The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in `host-tests/tests/several`).
+/// The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in
+/// `host-tests/tests/multi_interferer`).
 pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     let found = fit(scene, &Raster::graded(scene, None, FINE))?;
     let place = (found.x_m, found.y_m);

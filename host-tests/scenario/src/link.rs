@@ -150,7 +150,7 @@ pub struct Link {
 /// Data link of a chain with a known bandwidth. It computes data rates from SIRs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radio {
-    /// Medium access and spectral efficiency. The bandwidth of this `Link` is not used, but `bandwidth_hz`.
+    /// Medium access and spectral efficiency. `bandwidth_hz` is used in place of the bandwidth in this `Link`.
     pub link: Link,
     /// Bandwidth of one frequency, Hz, 1 to 1e12.
     pub bandwidth_hz: f64,

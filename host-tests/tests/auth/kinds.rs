@@ -213,7 +213,7 @@ impl Attacker {
         })
     }
 
-    /// Returns an attack's frame, and the counter that it increments if its addresses are valid.
+    /// Returns an attack's frame, and the counter that this frame increments if its addresses are valid.
     fn frame(
         &mut self,
         net: &Net,

@@ -6,7 +6,7 @@ use uav_relay::{Adjust, Local, Method, Settings};
 use crate::hand::{Chain, LOW, WIDE, is_stop};
 use host_tests::bench::Bench;
 
-/// Checks that a message of the leader from before its reboot does not spoil the agreement after it.
+/// Checks that a message of the leader from before its reboot does not spoil the next agreement.
 ///
 /// The message starts a round along the chain, is delayed, and arrives in the last round of the new agreement, by
 /// Algorithm 2. No relay may act on the message.

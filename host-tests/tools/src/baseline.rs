@@ -108,7 +108,7 @@ struct Hops<'a> {
 impl Hops<'_> {
     /// Returns the largest power, W, that both the first and the last hop can receive.
     ///
-    /// Each receives most if its relay is right above Tx or Rx.
+    /// These hops receive most with their relays right above Tx and Rx.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)

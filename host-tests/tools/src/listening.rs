@@ -157,12 +157,12 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
 /// Largest number of agreements, based on measurements, after which the figure shows the SIR.
 pub const LAST: usize = 8;
 
-/// Ratios of the SIR to the best possible one, after 0, 1, 2 and more agreements that use measurements.
+/// Ratios of the SIR to the best possible SIR, after 0, 1, 2 and more agreements that use measurements.
 ///
 /// Each list has one ratio for each random experiment.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// Simulates `scenes` random experiments; returns the ratios of the chains' SIRs to the best possible.
+/// Simulates `scenes` random experiments; returns ratios of the chains' SIRs to the best possible SIRs.
 ///
 /// There is a ratio after each agreement on positions. `setup` returns the simulation of an experiment.
 pub fn shares(
@@ -243,7 +243,7 @@ pub struct MovingShares {
 
 /// Simulates `scenes` experiments in which an interferer moves past the line Tx-Rx, 300 m away from it.
 ///
-/// Returns the mean ratios of the SIR to the best possible one, for chains that track the interferer and for chains
+/// Returns the mean ratios of the SIR to the best possible SIR, for chains that track the interferer and for chains
 /// that do not move.
 pub fn moving_shares(
     scenes: u64,

@@ -319,8 +319,8 @@ impl Vehicle {
 
     /// Updates the flight mode and the flight state, which the pilot and the autopilot decide.
     ///
-    /// After a change, position targets of the relay count as allowed for some time, until it must have learned of
-    /// the change.
+    /// After a change, position targets of the relay count as allowed for some time, until the relay must have
+    /// learned of the change.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);

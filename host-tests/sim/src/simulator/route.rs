@@ -232,7 +232,7 @@ impl Window {
         self.anchor + since.div_ceil(self.frame) * self.frame
     }
 
-    /// Returns the slot time, ps, from the first TDMA frame to `at`: the total duration of slots in it.
+    /// Returns the slot time, ps, until `at`: the total duration of slots since the first TDMA frame.
     fn elapsed(&self, at: Ps) -> Ps {
         let since = at.saturating_sub(self.anchor);
         let (frames, into) = (since / self.frame, since % self.frame);

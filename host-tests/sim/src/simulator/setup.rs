@@ -117,7 +117,7 @@ pub struct Setup {
     ///
     /// With a fixed end, the run measures the availability of the chain.
     pub soak: Option<Instant>,
-    /// Time from which links cause no more faults; `None` if they do to the end.
+    /// Time from which links cause no more faults; `None` if they cause faults to the end.
     pub faults_end: Option<Instant>,
     /// True to record all frames, for [`Chain::frames`](super::chain::Chain::frames).
     pub record: bool,

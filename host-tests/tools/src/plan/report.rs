@@ -37,7 +37,7 @@ pub struct HypotheticalReport {
     /// SIR that the hypothetical interferer's positions lose, as a fraction of the plan's SIR; 0 if kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// SIR that the plan gains over the hypothetical interferer's positions, as a fraction of theirs.
+    /// SIR that the plan gains over the hypothetical interferer's positions, as a fraction of their SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
 }
@@ -344,7 +344,7 @@ pub struct PlanReport {
     /// Hypothetical interferer in place of several; absent unless there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
-    /// True if relays may leave the line sideways: the table then has a column for that distance.
+    /// True if relays may leave the line sideways: the table then has a column for y.
     #[serde(skip)]
     pub room: bool,
     /// Unit in which the table shows SIRs: that of the user's request.
