@@ -274,7 +274,7 @@ fn adjusting_ends_in_a_local_optimum() {
     }
 }
 
-/// Checks that both local searches keep the least separation where a smaller one would raise the SIR.
+/// Checks that both local searches keep the least separation, even if a smaller one gave more SIR.
 #[test]
 fn relays_keep_their_separation_where_it_costs_sir() {
     for local in [

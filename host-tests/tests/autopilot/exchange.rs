@@ -188,7 +188,7 @@ fn exchange_passes_the_radios_noise_to_the_relay() {
 /// Exchanges frames between two neighbouring relays with motion guards.
 ///
 /// If `is_silent` is true, the second relay neither receives nor sends frames. The second relay's drone starts at x =
-/// `start_m` and flies to its setpoints at once.
+/// `start_m`, and is always at its setpoint once it has one.
 fn exchange_fences(
     first: &mut Relay,
     second: &mut Relay,

@@ -75,7 +75,7 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     assert_eq!(chain.bench.setpoints(), before);
 }
 
-/// Checks that a relay requests a membership view when a neighbour reports a newer one.
+/// Checks that a relay requests a membership view when a neighbour reports a newer view.
 ///
 /// The neighbour refuses the relay's messages because they belong to the older view.
 #[test]

@@ -20,8 +20,8 @@ const FIRST: u16 = 64;
 
 /// Number of passes (rounds of messages along the chain) before the last one that count as late.
 ///
-/// A pass with an older number counts as one from before a reboot. A leader's next pass has a number that is at most
-/// this much larger.
+/// A pass with an older number counts as a pass from before a reboot. A leader's next pass has a number that is at
+/// most this much larger.
 const NEAR: u16 = 32;
 
 /// Returns the number that messages along the chain add to the mission digest in a membership view.

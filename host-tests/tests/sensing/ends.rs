@@ -19,7 +19,7 @@ const HILL: f64 = 8.0;
 
 /// Returns two results of each random scene: the error of relay 1's power estimate at Rx, and the SIR.
 ///
-/// The error is relative, and `None` without an estimate. The SIR is the linear one of the chain's worst hop, by the
+/// The error is relative, and `None` without an estimate. The SIR is that of the chain's worst hop, linear, with the
 /// true interference.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {

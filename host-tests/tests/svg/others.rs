@@ -39,7 +39,7 @@ fn the_interferer_of_the_previous_mission_is_faint() {
 
 /// Checks that earlier or estimated interferers that would spoil the picture are not drawn.
 ///
-/// Such an interferer is at the position of one that is drawn already, far away, or at an undefined position.
+/// Such an interferer is at the position of another drawn interferer, far away, or at an undefined position.
 #[test]
 fn a_previous_interferer_under_a_present_one_is_left_out() {
     let same = level(8).interferers;

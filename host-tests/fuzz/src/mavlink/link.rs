@@ -351,9 +351,9 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// Checks a frame sent by the link, from which the signature was removed.
+    /// Checks a frame sent by the link, after the removal of the frame's signature.
     ///
-    /// `covered_flags` are the flags that its checksum covers.
+    /// `covered_flags` are the flags that the frame's checksum covers.
     fn check_frame(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()

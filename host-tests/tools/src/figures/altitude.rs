@@ -27,7 +27,7 @@ struct Row {
     sir_linear: f64,
     /// SIR of the worst hop, linear, if the target falls by the paper's fixed step of 0.1.
     ///
-    /// Only for altitudes near the paper's best one, otherwise `None`.
+    /// Only for altitudes near the paper's best altitude, otherwise `None`.
     sir_by_step_linear: Option<f64>,
 }
 

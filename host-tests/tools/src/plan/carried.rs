@@ -23,10 +23,10 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
 
-/// Largest relative excess of a chain's time per bit on the coarse grid for which it is still refined.
+/// Largest relative excess of time per bit for which a number of relays gets a precise search.
 ///
-/// The excess is over the number of relays with the least time per bit. A precise search for positions cannot make up
-/// for a larger excess.
+/// The excess is that on the coarse grid, over the number of relays with the least time per bit. A precise search for
+/// positions cannot make up for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.

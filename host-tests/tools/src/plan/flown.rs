@@ -22,7 +22,7 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// Returns the SIR that the relays' positions lose against the best ones, as a fraction of the best.
+    /// Returns the loss of SIR by the relays' positions, as a fraction of the best SIR.
     pub fn loss(&self) -> f64 {
         (1.0 - self.plan.sir() / self.best_sir).max(0.0)
     }

@@ -228,7 +228,7 @@ const RISE: f64 = 1e-4;
 /// Largest number of relays for which [`carry_no_more`] looks for a proof.
 const MOST_PROVEN: u16 = MOST_FAST;
 
-/// Returns true if it is proven that no tried number of relays carries more than the best one.
+/// Returns true if it is proven that no number of relays up to `tried_uavs` carries more than `best`.
 ///
 /// Used for both directions, in equal slots or with a frequency for each hop.
 fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
