@@ -112,7 +112,7 @@ impl Bench {
         Self::new((1..=mission.relays()).map(relay).collect(), Instant::ZERO)
     }
 
-    /// Adds a relay that starts now, for example a copy with the index of another one.
+    /// Adds a relay that starts now, for example a copy with the index of another relay.
     pub fn switch_on(&mut self, relay: Relay) {
         self.places.push(usize::from(relay.index()));
         self.relays.push(relay);

@@ -16,7 +16,7 @@ use uav_relay_sim::simulator::outcome::Outcome;
 /// Relative spacing of f32 numbers: the machine epsilon, 2^-23.
 pub const SINGLE: f64 = f32::EPSILON as f64;
 
-/// Returns the profile of relay `index`: its entry in `own` if any, otherwise the mission's common one.
+/// Returns the profile of relay `index`: its entry in `own` if any, else the mission's common one.
 pub fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile {
     own.iter()
         .find(|(of, _)| *of == index)

@@ -17,7 +17,7 @@ const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
 
-/// Maximum number of frames in transit to one relay. One more displaces the oldest.
+/// Maximum number of frames in transit to one relay. A further frame displaces the oldest one.
 const MAX_IN_TRANSIT: usize = 24;
 
 /// Maximum number of rounds in one operation. A round delivers a frame to each relay.

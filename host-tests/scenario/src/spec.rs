@@ -193,7 +193,7 @@ pub enum AirGround {
 /// Interference in a scenario: known transmitters, or a random field along x.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Interference {
-    /// Known interfering transmitters. The list is empty only if the relays have to locate an unknown one.
+    /// Known interfering transmitters. The list is empty only if the relays have to locate an unknown interferer.
     Sources(Vec<Source>),
     /// Interference power of which only the probability distribution at each x is known.
     Field(Field),

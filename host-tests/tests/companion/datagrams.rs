@@ -135,7 +135,7 @@ fn an_autopilot_that_restarts_is_found_again() {
     relay.stopped();
 }
 
-/// Checks that the error line names the occupied local port and the option to choose another one.
+/// Checks that the error line names the occupied local port and the option to choose another port.
 #[test]
 fn an_unavailable_local_port_is_named() {
     let ports = Ports::apart(1_000);

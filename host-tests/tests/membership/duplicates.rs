@@ -80,9 +80,9 @@ struct Durations {
     ///
     /// The frame is the first one that goes from one duplicate to the other.
     both: u64,
-    /// Longest time in which both duplicates have setpoints, from the start of the second one.
+    /// Longest time in which both duplicates have setpoints, from the start of the second duplicate.
     both_at_all: u64,
-    /// Total time in which neither duplicate has a setpoint, from the start of the second one.
+    /// Total time in which neither duplicate has a setpoint, from the start of the second duplicate.
     neither: u64,
     /// Time from the second duplicate's start until the whole chain has setpoints for good. One duplicate is a part
     /// of the chain then.

@@ -49,7 +49,7 @@ pub(crate) enum Operation {
     /// of a link) and the frame.
     Replay(u8, u8),
     /// Operation: a relay measures interference. The fields are the relay, and the power in per cent of the agreed
-    /// one.
+    /// power.
     Measure(u8, u8),
 }
 

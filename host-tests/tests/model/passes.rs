@@ -45,7 +45,7 @@ pub(crate) enum PassClass {
     Again,
     /// Classification: a pass (a message along the chain) that arrives late and is over already.
     Late,
-    /// Classification: a pass (a message along the chain) that does not continue the known ones.
+    /// Classification: a pass (a message along the chain) that does not continue the known passes.
     ///
     /// The pass is of another membership view, or from before the leader's reboot, or the relay has missed the pass
     /// before it.

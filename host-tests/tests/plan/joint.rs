@@ -64,7 +64,7 @@ fn agreed(scenario: &Scenario, relays: u16) -> f64 {
     sirs.into_iter().reduce(f64::min).unwrap()
 }
 
-/// Returns the scenario of a link within `corridor`, with every relay like the first one.
+/// Returns the scenario of a link within `corridor`, with every relay like the first relay.
 fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     const LIGHT_M_PER_S: f64 = 299_792_458.0;
     let waves = link.mu_los.sqrt();

@@ -57,7 +57,7 @@ fn a_previous_interferer_under_a_present_one_is_left_out() {
     }
 }
 
-/// Checks that an estimated interferer is drawn even next to the true one.
+/// Checks that an estimated interferer is drawn even next to the true interferer.
 #[test]
 fn the_estimated_interferer_is_drawn_beside_the_true_one() {
     for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {

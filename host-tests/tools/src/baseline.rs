@@ -72,7 +72,7 @@ const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m from Tx, that maximise the weakest received signal, without interference.
 ///
-/// All relays get the altitude and power of the first one. Empty without relays. The cost is that of computing the
+/// All relays get the altitude and power of the first relay. Empty without relays. The cost is that of computing the
 /// length of a chain 200 times.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {

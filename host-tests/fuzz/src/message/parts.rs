@@ -100,7 +100,7 @@ impl Body<'_, '_> {
 
     /// Appends a sequence number to the message: mostly 0 (none) to 11.
     ///
-    /// It is the number of a heartbeat's request or reply, or a similar one.
+    /// It is the number of a heartbeat's request or reply, or a similar number.
     pub(super) fn request_number(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
@@ -109,7 +109,7 @@ impl Body<'_, '_> {
         self.word(number);
     }
 
-    /// Appends the duration of a lease in tenths of a second to the message, mostly a short one.
+    /// Appends the duration of a lease, mostly short, to the message. The unit is a tenth of a second.
     pub(super) fn lease(&mut self) {
         let tenths = match self.input.byte() {
             few @ 0..240 => u16::from(few),

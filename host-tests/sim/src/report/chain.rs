@@ -419,8 +419,8 @@ pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
         .unwrap_or(setup.mission)
 }
 
-/// Returns the version of the mission that the chain flies at the end. If the relays' versions differ, it is the
-/// newest one.
+/// Returns the version of the mission that the chain flies at the end. If the relays' versions differ, returns the
+/// newest version.
 pub(super) fn version(outcome: &Outcome) -> u16 {
     let chain = left(outcome);
     let versions = chain.iter().map(|(_, relay)| relay.version);

@@ -19,7 +19,8 @@ pub struct Takeover {
     pub from: Instant,
     /// End of the takeover; `None` if it is permanent.
     ///
-    /// At the end the pilot hands the drone back to its relay, as soon as it hovers and no other drone moves near it.
+    /// At the end the pilot hands the drone back to its relay, as soon as the drone hovers and no other drone moves
+    /// nearby.
     pub until: Option<Instant>,
     /// Position to which the pilot flies the drone: along the run's line, to its right and up, m.
     ///

@@ -24,7 +24,7 @@ pub enum TimelineEvent {
     Booted,
     /// The relay lost its neighbour at this side, toward Tx or toward Rx.
     Lost(Side),
-    /// The relay receives a new neighbour at this side (toward Tx or toward Rx), or again a lost one.
+    /// The relay receives a new neighbour at this side (toward Tx or Rx), or a lost neighbour again.
     Found(Side),
     /// The relay accepted a new view: a new membership of the chain.
     ViewAccepted {

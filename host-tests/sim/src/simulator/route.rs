@@ -329,7 +329,7 @@ pub struct Route {
 struct Members {
     view: ViewId,
     version: u16,
-    /// Number (from 0) and state of each relay in the view, in the order of the indices in it.
+    /// Number (from 0) and state of each relay in the view, in the order of the view's indices.
     ///
     /// `None` for a relay that is off or has not accepted the view.
     relays: Vec<Option<(usize, RelayState)>>,

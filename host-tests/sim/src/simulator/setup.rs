@@ -109,7 +109,7 @@ pub struct Setup {
     ///
     /// Otherwise it is at least [`Bursts::shortest`](super::faults::Bursts::shortest).
     pub burst: f64,
-    /// One-way link failures: periods in which one relay does not receive another one.
+    /// One-way link failures: periods in which one relay does not receive another relay.
     pub deaf: Vec<OneWayFailure>,
     /// True interferers, which relays measure and have to locate; `None` if relays do not measure them.
     pub true_interference: Option<TrueInterference>,

@@ -37,7 +37,7 @@ pub enum Kind {
     Even,
 }
 
-/// Table row: expected SIR of a chain after one pass of messages along it.
+/// Table row: expected SIR of a chain after one pass of messages along the chain.
 ///
 /// The interference is random; its distribution is known along the line Tx-Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]

@@ -124,7 +124,7 @@ const TOPS: usize = 3;
 
 /// Number of golden-section steps that refine a maximum over altitude.
 ///
-/// They reduce the interval to 6e-6 of its length; the loss in SIR falls with the square of that.
+/// They reduce the interval to 6e-6 of its length; the loss in SIR falls with the square of the interval's length.
 const STEPS: u32 = 25;
 
 const COMMON_TOLERANCE: f64 = 1e-11;

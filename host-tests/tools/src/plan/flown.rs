@@ -115,11 +115,11 @@ fn alone(
     })
 }
 
-/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed one.
+/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed plan.
 ///
 /// The two plans differ if the file's plan was made on another machine, which rounds differently.
 const SAME_M: f64 = 0.1;
-/// Tolerated difference of the SIR, dB, between the file's plan and the recomputed one.
+/// Tolerated difference of the SIR, dB, between the file's plan and the recomputed plan.
 const SAME_DB: f64 = 0.01;
 
 /// Returns the section `[plan]` of a scenario file for the relays' agreed positions `flown`.

@@ -133,8 +133,8 @@ pub struct Theorem {
 pub struct Fitted {
     /// Power, position and error of the hypothetical interferer.
     pub hypothetical: Hypothetical,
-    /// SIR, linear, against all interferers, at the best positions for the hypothetical one. `None` if no positions
-    /// were found for the hypothetical interferer.
+    /// SIR, linear, against all interferers, at the best positions for the hypothetical interferer. `None` if no such
+    /// positions were found.
     pub sir: Option<f64>,
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
     /// against all interferers.

@@ -27,8 +27,8 @@ pub struct HypotheticalReport {
     pub mean_abs_error_w: f64,
     /// Mean absolute error divided by the mean interference power.
     pub relative_error: f64,
-    /// SIR, linear, against all interferers, at the best positions for the hypothetical one. Absent if no positions
-    /// were found for the hypothetical interferer.
+    /// SIR, linear, against all interferers, at the best positions for the hypothetical interferer. Absent if no such
+    /// positions were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
