@@ -29,7 +29,7 @@ const MOST_EVENTS: usize = 14;
 /// Length on the wire, bytes, of the shortest frame whose CRC is computed: header, no body, CRC.
 const LEAST_CHECKED: usize = 16;
 
-/// Length on the wire, bytes, of the shortest frame with a message, a Busy.
+/// Length on the wire, bytes, of the shortest frame with a message. The message is a Busy.
 const LEAST_MESSAGE: usize = 19;
 
 /// Frame sent by a relay.

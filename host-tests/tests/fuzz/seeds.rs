@@ -180,7 +180,7 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns an input: the last of four relays receives membership views, a fence and late frames.
+/// Returns an input: the last of four relays receives views, a guard message and late frames.
 ///
 /// The relay has a motion guard and a position. `wiring` is the byte of the input that selects the wiring.
 fn formed(wiring: u8) -> Vec<u8> {

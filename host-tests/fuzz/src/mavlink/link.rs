@@ -252,7 +252,7 @@ impl Link {
         self.deliver_frame(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
-    /// Reports a lost relay to the link, and delivers an operator's command to clear that relay or others.
+    /// Reports a lost relay to the link, and delivers an operator's command that lost drones are gone.
     fn clear_lost_relay(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {

@@ -460,7 +460,7 @@ impl DataLink {
         self.radio.link.access == Access::Fitted && self.reverse > 0.0
     }
 
-    /// Returns the time slots of each direction's hops, from `anchor` on, for the linear SIRs of the hops.
+    /// Returns the time slots of each direction's hops, from time `anchor` on, for the hops' linear SIRs.
     fn windows(&self, anchor: Ps, sirs: &[Vec<f64>]) -> Vec<Vec<Window>> {
         let packets: Vec<Vec<Option<Ps>>> = sirs
             .iter()
