@@ -397,7 +397,7 @@ pub(super) struct Line<'a> {
     tops: Vec<f64>,
 }
 
-/// Factor of the hop range for a target SIR and sender's power: range, m, over (I + N)^(-1/2).
+/// Ratio of a hop's range, m, to (I + N)^(-1/2), for a target SIR and a sender's power.
 ///
 /// I and N are the powers of interference and noise at the hop's receiver, W.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -320,10 +320,10 @@ fn most_between(scenario: &Scenario) -> [f64; 2] {
     ]
 }
 
-/// Returns an upper bound on the SIR (linear) at Rx for any number of relays, from that of `plan`.
+/// Returns an upper bound on the SIR (linear) at Rx for any number of relays, derived from `plan`.
 ///
-/// The interference at Rx does not depend on the relays; the signal is largest from right above, at the lowest altitude and with
-/// the largest power.
+/// The interference at Rx does not depend on the relays; the signal is largest from right above, at the lowest
+/// altitude and with the largest power.
 fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
     let (Some((last, profile)), Some(sir)) = (plan.places.last(), plan.sirs.last()) else {
         return f64::INFINITY;
