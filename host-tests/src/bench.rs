@@ -112,7 +112,7 @@ impl Bench {
         Self::new((1..=mission.relays()).map(relay).collect(), Instant::ZERO)
     }
 
-    /// Adds a relay that starts now, for example a copy with the index of another one.
+    /// Adds a relay that starts now, for example a copy with the index of another relay.
     pub fn switch_on(&mut self, relay: Relay) {
         self.places.push(usize::from(relay.index()));
         self.relays.push(relay);
@@ -127,7 +127,7 @@ impl Bench {
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Processes the next event: delivers a frame that has arrived, or advances the time to the next one.
+    /// Processes the next event: delivers a frame that has arrived, or advances the time to the next event.
     ///
     /// Then all nodes handle their timers and send. Returns false if nothing is left to do up to `until`.
     pub fn step(&mut self, until: Instant) -> bool {
@@ -196,7 +196,7 @@ impl Bench {
         }
     }
 
-    /// Lets all relays and ground stations handle their timers, and puts the frames they send in transit.
+    /// Lets all relays and ground stations handle their timers, and puts their pending frames in transit.
     fn drain(&mut self) {
         let (now, last) = (self.now, self.relays.len() + 1);
         for at in 0..self.relays.len() {

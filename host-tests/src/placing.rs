@@ -16,7 +16,7 @@ use uav_relay_sim::simulator::outcome::Outcome;
 /// Relative spacing of f32 numbers: the machine epsilon, 2^-23.
 pub const SINGLE: f64 = f32::EPSILON as f64;
 
-/// Returns the profile of relay `index`: its entry in `own` if any, otherwise the mission's common one.
+/// Returns the profile of relay `index`: its entry in `own` if any, else the mission's common one.
 pub fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile {
     own.iter()
         .find(|(of, _)| *of == index)
@@ -50,7 +50,7 @@ pub fn setpoints(outcome: &Outcome) -> Vec<Placement> {
     relays.map(|relay| relay.setpoint.unwrap()).collect()
 }
 
-/// Converts a position of the crate, f32, to one of the f64 reference model.
+/// Converts a position of the crate, in f32, to a position of the f64 reference model.
 pub fn reference(at: Placement) -> Place {
     Place {
         x_m: f64::from(at.x_m),
@@ -141,7 +141,7 @@ pub struct Mixed {
     pub solved: u32,
     /// Number of chains whose SIR is at most 2e-4 (relative) below the optimum of the reference.
     pub best: u32,
-    /// Largest number of passes of messages along the chain that one of the chains needed.
+    /// Largest number of passes of messages along a chain, over all chains.
     pub sweeps: u32,
 }
 
@@ -231,7 +231,7 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
 pub struct Reaches {
     /// Number of hops whose farthest position is before Rx, so that the target limits it.
     pub inside: u32,
-    /// Number of hops whose farthest position is beyond the interferer, while nearer ones miss the target.
+    /// Number of hops whose farthest position is beyond the interferer, while nearer positions fail.
     pub leaps: u32,
     /// Number of hops whose target SIR no position meets.
     pub infeasible: u32,
@@ -239,8 +239,8 @@ pub struct Reaches {
 
 /// Checks the farthest positions at which `count` random hops meet a target SIR.
 ///
-/// Each must lie between the exact ones of a target 1e-6 lower and 1e-6 higher (relative), with a tolerance of two
-/// f32 steps. `target` draws the target of a hop.
+/// Each position must lie between the exact positions for two targets: 1e-6 (relative) below and above the target,
+/// with a tolerance of two f32 steps. `target` draws the target of a hop.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,

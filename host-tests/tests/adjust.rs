@@ -48,7 +48,7 @@ fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     (sir(link, &places).unwrap(), apart)
 }
 
-/// Runs a local search to its end. Returns the better position that it finds, or `None`.
+/// Runs a local search to its end. Returns a position that is better than the relay's present one, if found.
 fn searched(mut search: LocalSearch) -> Option<Placement> {
     loop {
         if let Poll::Ready(found) = search.step(500) {
@@ -229,7 +229,8 @@ fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
     Hops::new(mission, mission.interferer().unwrap(), before, 1.0, after)
 }
 
-/// Checks that no relay has a better position when Algorithm 2 ends before its last permitted round.
+/// Checks that no single relay could improve its position when Algorithm 2 ends. The algorithm must end before its
+/// last permitted round.
 #[test]
 fn adjusting_ends_in_a_local_optimum() {
     let local = Local::Grid {
@@ -273,7 +274,7 @@ fn adjusting_ends_in_a_local_optimum() {
     }
 }
 
-/// Checks that both local searches keep the least separation where a smaller one would raise the SIR.
+/// Checks that both local searches keep the least separation, even if a smaller one gave more SIR.
 #[test]
 fn relays_keep_their_separation_where_it_costs_sir() {
     for local in [

@@ -120,7 +120,8 @@ fn no_grid_has_a_stronger_weakest_signal() {
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Checks that one relay more than needed is placed above Rx. All other hops are shortened in proportion.
+/// Checks that the last relay is placed above Rx if there are more relays than needed. All other hops are shortened
+/// by the same factor.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);

@@ -111,7 +111,7 @@ fn random_links_settle_at_their_optimum() {
 
 /// Checks the number of targets that the paper's fixed-step search tries, and the last target.
 ///
-/// Each target takes one sweep (a round of messages along the chain), and is 0.1 below the one before.
+/// Each target takes one sweep (a round of messages along the chain), and is 0.1 below the target before.
 #[test]
 fn the_fixed_step_takes_the_papers_ten_thousand_sweeps() {
     for (relays, targets, last) in [

@@ -24,7 +24,7 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
     );
 }
 
-/// Returns the recorded optima with positions of the tests whose name begins with `set`.
+/// Returns the recorded problems whose optimum has positions, of tests whose name begins with `set`.
 fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     let wanted = move |record: &&Record| record.set.starts_with(set);
     let placed = |record: &'static Record| {

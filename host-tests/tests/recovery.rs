@@ -100,7 +100,7 @@ fn detected(report: &ChainReport) -> f64 {
     lost.unwrap().at_s - AT_S as f64
 }
 
-/// Checks that the remaining chain agrees on exactly the positions of a new chain of that length.
+/// Checks that the remaining chain agrees on exactly the positions of a new chain with as many relays.
 #[test]
 fn the_remaining_chain_is_as_good_as_a_new_one() {
     for (relays, lost) in [(4, 2), (8, 1), (8, 4), (8, 8), (16, 9)] {

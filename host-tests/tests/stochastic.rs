@@ -235,7 +235,7 @@ fn even(relays: usize) -> StochasticLink {
     }
 }
 
-/// Checks that relays whose mission has a wrong field of interference measure the true one. Then they agree again.
+/// Checks that relays whose mission has a wrong field of interference measure the true field. Then they agree again.
 /// The wrong field is constant.
 #[test]
 fn measurements_replace_the_agreed_field() {

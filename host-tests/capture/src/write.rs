@@ -80,7 +80,7 @@ impl<W: Write> std::fmt::Debug for Capture<W> {
 impl<W: Write> Capture<W> {
     /// Starts a capture in `out`, written by `application`. `comment` describes the whole capture, empty for none.
     ///
-    /// Each frame is passed to `out` at once, which may buffer it.
+    /// Each frame is passed at once to `out`, which may buffer the frame.
     ///
     /// # Errors
     /// `out` cannot be written to.

@@ -32,9 +32,10 @@ fn processor() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Clock that measures the processor time of this thread, which excludes other programs.
+/// Clock that measures the processor time of this thread, without that of other programs.
 ///
-/// CPU time as Linux accounts it, to some milliseconds; wall-clock time elsewhere.
+/// On Linux it is the CPU time that the kernel accounts, with a resolution of some milliseconds. On other systems it
+/// is the wall-clock time.
 pub(crate) struct Clock {
     started: Instant,
     on_cpu_s: Option<f64>,

@@ -17,7 +17,7 @@ use crate::machine::Clock;
 use crate::problem::{Choice, Problem};
 use crate::results::{Answer, Mark, Run, Solution};
 
-/// Relative tolerance of the SIR that this crate aims for: that of `cargo chain`.
+/// Relative tolerance of the SIR that this crate aims for, the same as in `cargo chain`.
 const TOLERANCE: f64 = 1e-4;
 
 /// Number of timed batches, of which the median counts.

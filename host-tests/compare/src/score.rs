@@ -7,8 +7,8 @@ use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
 use crate::results::{Mark, Solution};
 
-/// Relative difference from the optimum SIR up to which a chain is good enough. It is the tolerance of the relays'
-/// mission.
+/// Relative difference from the optimum SIR up to which a chain is good enough. The relays' mission has the same
+/// tolerance.
 pub(crate) const GOOD: f64 = 1e-4;
 
 /// Tolerance of a relay's position in the checks, m: 16 times the rounding of an f32 at a kilometre.

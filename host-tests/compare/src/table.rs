@@ -134,7 +134,7 @@ struct Line {
     all: String,
 }
 
-/// Solver's name, with the cells of its table row or the reason why it has none.
+/// Solver's name, with the cells of the table row, or the reason why the row has no cells.
 type Entry<'a> = (&'a str, Result<Line, String>);
 
 fn rows(solved: &Solved) -> Result<String, String> {
@@ -158,7 +158,7 @@ fn rows(solved: &Solved) -> Result<String, String> {
     Ok(text)
 }
 
-/// Returns the table rows of all solvers of one problem. Each has its cells, or the reason why the solver's chain
+/// Returns the table rows of all solvers of one problem. Each row has its cells, or the reason why the solver's chain
 /// does not count.
 fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     let problem = solved.problem;

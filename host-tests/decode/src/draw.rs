@@ -29,7 +29,7 @@ const ORDINARY: [(&str, f64, f64); 13] = [
     ("interferer_y_m", -2e3, 2e3),
 ];
 
-/// Function that chooses a field's value; it returns `None` for a random value.
+/// Function that may choose a field's value. If it returns `None`, the generator draws a random value.
 pub type Hint<'a> = dyn FnMut(&mut Draw<'_>, &Field) -> Option<Value<'static>> + 'a;
 
 /// Generator of random messages, from a source of bytes: a random generator, or the input of a fuzzer.

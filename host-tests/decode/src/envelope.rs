@@ -5,8 +5,8 @@ use uav_relay::wire::frame::Header;
 
 /// Returns the header and body of a frame, without tag and CRC. `flags` is the top nibble of the second word.
 ///
-/// Addresses are not checked: bits above their valid 12 overwrite other header bits, so that invalid frames can be
-/// built.
+/// Node numbers are not checked. Bits beyond their 12 valid ones overwrite other bits of the header, so that tests
+/// can build invalid frames.
 pub fn before(header: Header, flags: u16, body: &[u8]) -> Vec<u8> {
     let first = 0x1000 | header.sender;
     let mut plain = first.to_le_bytes().to_vec();

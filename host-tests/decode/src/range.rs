@@ -122,7 +122,7 @@ impl<'f> Numbers<'_, 'f> {
     }
 }
 
-/// Checks the rules between the fields of a message. Returns the name of the first field that breaks one.
+/// Checks the rules between the fields of a message. Returns the name of the first field that breaks a rule.
 fn check_rules(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
     let get = |name| numbers.get(name);
     let zero = |name| numbers.is_zero(name);

@@ -13,7 +13,7 @@ pub enum Refusal {
     Truncated,
     /// Frame too short for header and CRC, or for the tag. The number is its length without COBS, bytes.
     Short(usize),
-    /// Wrong CRC: the received and the computed one.
+    /// Wrong CRC: the received CRC and the computed CRC.
     Crc(u32, u32),
     /// Unknown version of the frame format, or unknown flags: both values.
     Version(u8, u8),

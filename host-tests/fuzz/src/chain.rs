@@ -17,7 +17,7 @@ const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
 
-/// Maximum number of frames in transit to one relay. One more displaces the oldest.
+/// Maximum number of frames in transit to one relay. A further frame displaces the oldest one.
 const MAX_IN_TRANSIT: usize = 24;
 
 /// Maximum number of rounds in one operation. A round delivers a frame to each relay.
@@ -292,7 +292,7 @@ impl Chain {
         }
     }
 
-    /// Puts the frames that relay `at` sends in transit, and checks its distance from its neighbours.
+    /// Puts the frames of relay `at` in transit, and checks the distance of this relay from its neighbours.
     fn settle(&mut self, at: usize) {
         let now = self.now;
         let Some(member) = self.members.get_mut(at) else {
@@ -307,7 +307,7 @@ impl Chain {
         self.check_separation(at + 1);
     }
 
-    /// Puts a frame of relay `from` in transit: to one neighbour, or on a shared channel to all relays.
+    /// Puts a frame of relay `from` in transit to one neighbour or, on a shared channel, to all relays.
     fn send(&mut self, from: usize, frame: &Sent) {
         for (at, member) in self.members.iter_mut().enumerate() {
             let port = match frame.port {

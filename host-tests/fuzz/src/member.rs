@@ -34,7 +34,7 @@ pub struct Member {
 }
 
 impl Member {
-    /// Creates a neighbour that has received the tested relay's handshake, if `frame` is one.
+    /// Creates a neighbour that has received the tested relay's handshake, if `frame` is a handshake.
     pub fn from_handshake(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;

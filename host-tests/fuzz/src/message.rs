@@ -105,7 +105,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the profiles of up to eight relays, as in a Gather message, mostly with rising indices.
+    /// Appends the profiles of up to eight relays to the message, as in a Gather. Their indices mostly rise.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));
@@ -154,7 +154,9 @@ impl Body<'_, '_> {
         self.small(0, 31);
     }
 
-    /// Appends the first fields of a Proposal or Decision: a mission, a view and a relay's index in it.
+    /// Appends the first fields of a Proposal or Decision to the message.
+    ///
+    /// They are the mission, the view and a relay's index in the view.
     fn call(&mut self) {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);

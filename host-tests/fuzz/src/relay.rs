@@ -15,7 +15,7 @@ use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
 
-/// Maximum number of fuzzed operations in one run, which take some milliseconds of computing.
+/// Maximum number of fuzzed operations in one run. Each takes some milliseconds of computing.
 const MAX_OPERATIONS: usize = 256;
 
 /// Maximum number of relays in the fuzzed mission; but one mission in sixteen has a thousand.
@@ -67,7 +67,7 @@ struct TestFrame {
     counter: ExpectedCounter,
 }
 
-/// Counter of the relay that must count a frame.
+/// Statistics counter in which the tested relay must count a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum ExpectedCounter {
     Counted,
@@ -136,7 +136,7 @@ impl Bench {
         heard.map(|member| member.restarted())
     }
 
-    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream), and delivers its handshake.
+    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream). Delivers its handshake to the relay.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -179,8 +179,8 @@ impl Bench {
         }
     }
 
-    /// Delivers arbitrary bytes. If they contain a recorded handshake, it changes the relay's nonces, so the fuzzer
-    /// then forgets its simulated neighbours.
+    /// Delivers arbitrary bytes to the relay. If they contain a recorded handshake, the relay changes its nonces, so
+    /// the fuzzer then forgets its simulated neighbours.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
@@ -248,7 +248,9 @@ impl Bench {
         self.watched.position(self.now, at, place);
     }
 
-    /// Delivers a message with a valid CRC, mostly from a valid sender at the right port, else from any.
+    /// Delivers a message with a valid CRC to the relay.
+    ///
+    /// Header and port are mostly those of a neighbour; sometimes one of them has another value.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);
@@ -310,8 +312,8 @@ impl Bench {
         self.watched.relay().upload().map_or(loaded, Upload::id)
     }
 
-    /// Delivers a frame and checks that the relay counts it as `counter` says. `counter` is `None` at a port that is not
-    /// connected.
+    /// Delivers a frame to the relay, and checks that the relay counts the frame as `counter` says. `counter` is
+    /// `None` at a port that is not connected.
     fn deliver(&mut self, port: Port, wire: &[u8], counter: Option<ExpectedCounter>) {
         let before = self.watched.relay().clone();
         self.watched.bytes(self.now, port, wire);

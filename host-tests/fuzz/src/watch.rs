@@ -29,7 +29,7 @@ const MOST_EVENTS: usize = 14;
 /// Length on the wire, bytes, of the shortest frame whose CRC is computed: header, no body, CRC.
 const LEAST_CHECKED: usize = 16;
 
-/// Length on the wire, bytes, of the shortest frame with a message, a Busy.
+/// Length on the wire, bytes, of the shortest frame with a message. The message is a Busy.
 const LEAST_MESSAGE: usize = 19;
 
 /// Frame sent by a relay.
@@ -142,8 +142,7 @@ impl Watched {
     /// Delivers bytes to the relay at `port`.
     ///
     /// # Panics
-    /// The relay computes more than one CRC for 16 bytes, or decodes more than one message for 19 bytes, which are
-    /// its bounds on work.
+    /// The relay exceeds its bounds on work: one CRC for each 16 bytes, and one decoded message for each 19 bytes.
     pub fn bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let before = *self.relay.stats();
         heap::without_allocation(|| self.relay.handle_bytes(now, port, bytes));

@@ -9,10 +9,9 @@ use uav_relay_scenario::scene::{self, Corridor, Scene};
 use crate::reference::stochastic::StochasticLink;
 use crate::reference::{Link, Relay};
 
-/// Converts a reference link to a mission, and to the profiles of relays that differ. `None` if a relay would reject
-/// a number.
+/// Converts a reference link to a mission, and to the profiles of relays that differ from the first.
 ///
-/// The first relay's profile is the mission's common one.
+/// The first relay's profile is the common profile of the mission. `None` if a relay would reject a number.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     let channel = Channel::new(

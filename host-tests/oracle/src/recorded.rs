@@ -38,9 +38,10 @@ pub struct Optimum {
 /// Recorded placement problem with its best known chain.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Name of the test that draws this problem, and of the test's random stream.
+    /// Test that draws this problem, and the test's random stream, such as `joint_method own 7`.
     pub set: String,
-    /// Link, and the corridor in which its relays choose positions. In the link they are at the lowest altitude.
+    /// Link, and the corridor in which its relays choose positions. In the link the relays are at the lowest
+    /// altitude.
     pub scene: Scenario,
     /// Best known chain; `None` if no chain has a positive SIR and keeps the minimum separation.
     pub best: Option<Optimum>,
@@ -138,7 +139,7 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a placement problem in f32, by which it is found in the recorded file.
+/// Returns all parameters of a placement problem in f32. They identify the problem in the recorded file.
 ///
 /// The altitudes of `link` are left out, because relays choose their altitudes in these problems.
 fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {

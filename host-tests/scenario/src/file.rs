@@ -682,7 +682,7 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
     })
 }
 
-/// Largest accepted error of the interference, dB, by assuming that an interferer is on the ground.
+/// Largest accepted error of the interference, dB, from treating an interferer as if on the ground.
 ///
 /// An interferer so far above or below the ground that the error is larger is rejected. The error is checked at every
 /// position that relays or Rx may have.
@@ -801,9 +801,9 @@ fn on_earth(
 }
 
 impl RelayArea<'_> {
-    /// Returns the largest error of the interference, dB, by assuming that an interferer is on the ground.
+    /// Returns the largest error of the interference, dB, from treating an interferer as if on the ground.
     ///
-    /// In truth it is at (`x_m`, `y_m`), `above_m` over the ground, m. The error is checked at Rx and, for 65
+    /// The interferer is at (`x_m`, `y_m`), `above_m` over the ground, m. The error is checked at Rx and, for 65
     /// altitudes, at the relay position nearest to the interferer, where it is largest.
     fn height_error_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;

@@ -27,17 +27,17 @@ const ASIDE: u32 = 8;
 /// Approximate number of points at which the reported error of the fitted interferer is evaluated.
 const REPORTED: usize = 60_000;
 
-/// Largest lateral distance y_H at which the search places the interferer, in sizes of the scene.
+/// Largest lateral distance y_H of the interferer in the search, as a multiple of the scene's size.
 ///
 /// At this distance the interference is already the same at all relay positions to a thousandth, so a larger one
-/// would change nothing.
+/// would change nothing. The size of the scene is its largest extent in x, y or altitude.
 const FAR: f64 = 30.0;
 
 /// Grid step of the search for the lateral distance y_H of the interferer. The grid is even in u = asinh(y_H / lowest
 /// altitude), so its steps in y_H grow: far from the line each multiplies y_H by about 1.4.
 const RISE: f64 = 0.35;
 
-/// Largest number of local searches that start at grid points, and that start at true interferers.
+/// Largest number of local searches that start at points of the grid. Up to as many more start at true interferers.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
@@ -115,14 +115,15 @@ pub struct Fit {
     pub x_m: f64,
     /// Lateral distance y_H of the hypothetical interferer from the line, m, >= 0.
     pub y_m: f64,
-    /// Best power of an interferer at this position, and the error that remains with it.
+    /// Best power of an interferer at this position, and the remaining error.
     pub best_power: BestPower,
 }
 
 /// Returns the single interferer that best replaces all interferers of `scene`; `None` if it has none.
 ///
 /// The search usually evaluates about 1 500 positions with 400 quadrature points, 600 with 4 000 and one with 60 000.
-/// The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in `host-tests/tests/several`).
+/// The relative accuracy of the errors is 3e-5 (`the_rasters_are_fine_enough` in
+/// `host-tests/tests/multi_interferer`).
 pub fn hypothetical(scene: &Scene) -> Option<Hypothetical> {
     let found = fit(scene, &Raster::graded(scene, None, FINE))?;
     let place = (found.x_m, found.y_m);

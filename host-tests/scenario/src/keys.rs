@@ -259,7 +259,7 @@ const BETA: Keys = &[
 ];
 
 impl Key {
-    /// Returns true if this key is missing in `table`: `table`, which does not have the key, must have it.
+    /// Returns true if the key is required in `table`. The caller knows that `table` does not have the key.
     pub(super) fn is_missed(&self, table: &Table) -> bool {
         match self.need {
             Need::Always => true,

@@ -109,7 +109,9 @@ impl RateModel {
         }
     }
 
-    /// Returns the lowest SINR (linear) that carries `bits_per_hz` bit/s/Hz, above 0. `None` if none does.
+    /// Returns the lowest SINR (linear) that carries `bits_per_hz` bit/s/Hz. `None` if no SINR does.
+    ///
+    /// `bits_per_hz` must be above 0.
     pub fn sinr(&self, bits_per_hz: f64) -> Option<f64> {
         match self {
             Self::Shannon { gap_db } => {
@@ -148,7 +150,7 @@ pub struct Link {
 /// Data link of a chain with a known bandwidth. It computes data rates from SIRs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Radio {
-    /// Medium access and spectral efficiency. The bandwidth in it is replaced by `bandwidth_hz`.
+    /// Medium access and spectral efficiency. `bandwidth_hz` is used in place of the bandwidth in this `Link`.
     pub link: Link,
     /// Bandwidth of one frequency, Hz, 1 to 1e12.
     pub bandwidth_hz: f64,
@@ -226,9 +228,9 @@ impl Radio {
 
     /// Returns the data rates to Rx and back to Tx, bit/s, of a chain that sends in both directions.
     ///
-    /// `there` and `back` are the linear SIRs of the hops in these directions. `reverse` above 0 is the planned ratio
-    /// of both rates; with fitted slots the slots then have this ratio. In all other cases each direction has half of
-    /// the time.
+    /// `there` and `back` are the linear SIRs of the hops in these directions. `reverse` above 0 is the planned rate
+    /// to Tx as a fraction of the rate to Rx; with fitted slots the rates then have this ratio. In all other cases
+    /// each direction has half of the time.
     pub fn both_bps(&self, there: &[f64], back: &[f64], reverse: f64) -> [f64; 2] {
         if reverse > 0.0 && self.link.access == Access::Fitted {
             let time = |sirs| match self.chain_bps(sirs) {

@@ -182,8 +182,8 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
 
 /// Returns the mission as known before the first measurements: equal interference everywhere.
 ///
-/// In a random field, the mean of the inverse interference has its value at Rx everywhere. A mission without a random
-/// field is returned unchanged.
+/// In a random field, the mean of the inverse interference is set everywhere to the value that it has at Rx. A
+/// mission without a random field is returned unchanged.
 #[must_use]
 pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();

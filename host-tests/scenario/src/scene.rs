@@ -149,7 +149,7 @@ impl Scene {
         each.sum()
     }
 
-    /// Returns the interference power at Rx, W; infinite if an interferer is at the same point.
+    /// Returns the interference power at Rx, W; infinite if an interferer is at the same point as Rx.
     pub fn interference_rx_w(&self) -> f64 {
         self.interference_on_ground_w(self.distance_m)
     }
@@ -185,9 +185,8 @@ impl Scene {
 
     /// Returns the linear SIRs of the N + 1 hops from Rx to Tx, with relay k at `places[k - 1]`.
     ///
-    /// Entry k - 1 is the hop from node k to node k - 1, where node 0 is Tx and node N + 1 is Rx. It has the
-    /// interference at the receiver, node k - 1. The list is empty, and a SIR infinite, under the conditions of
-    /// [`Scene::hop_sirs`].
+    /// Entry k - 1 is the SIR of the hop from node k to node k - 1, with the interference at node k - 1. Node 0 is Tx
+    /// and node N + 1 is Rx. The list is empty, and a SIR infinite, under the conditions of [`Scene::hop_sirs`].
     pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
             return Vec::new();

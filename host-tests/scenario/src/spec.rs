@@ -9,10 +9,10 @@ use uav_relay::{Duration, Geodetic, Listen};
 use super::link::Link;
 use super::number::{factor, narrow, watts};
 
-/// Parameters of a flight in a scenario file, in SI units. The coordinate x is the distance from Tx toward Rx, y the
-/// offset to the right of that line.
+/// Parameters of a flight in a scenario file, in SI units.
 ///
-/// Values from [`Scenario::load`] or [`Scenario::parse`] are within the ranges given here.
+/// The coordinate x is the distance from Tx along the line to Rx, y the offset to the right of this line. Values from
+/// [`Scenario::load`] or [`Scenario::parse`] are within the ranges given here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Line from Tx to Rx in geographic coordinates; `None` if the scenario has no `[site]`.
@@ -193,7 +193,7 @@ pub enum AirGround {
 /// Interference in a scenario: known transmitters, or a random field along x.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Interference {
-    /// Known interfering transmitters. The list is empty only if the relays have to locate an unknown one.
+    /// Known interfering transmitters. The list is empty only if the relays have to locate an unknown interferer.
     Sources(Vec<Source>),
     /// Interference power of which only the probability distribution at each x is known.
     Field(Field),

@@ -56,7 +56,8 @@ fn lost_and_found_relays_are_reported_by_index() {
 
 /// Checks that a relay learns which neighbour does not receive it.
 ///
-/// Relay 3 does not receive relay 2, but relay 2 receives relay 3. It must learn why they are no neighbours.
+/// Relay 3 does not receive relay 2, but relay 2 receives relay 3. Relay 2 must report that relay 3 does not receive
+/// it.
 #[test]
 fn a_relay_that_is_not_received_is_reported() {
     let mut setup = Setup::on_shared_channel(mission(4)).soaked(at(300));
@@ -562,7 +563,7 @@ fn begin_upload(air: &mut Air, base: &Mission, epoch: u32) {
 
 /// Checks that relays refuse an attacker's replay of withheld offers after the upload was given up.
 ///
-/// They accept a new upload afterwards.
+/// The relays accept a new upload afterwards.
 #[test]
 fn a_withheld_offer_is_refused_and_the_new_one_flown() {
     let after = Settings::default().dead_after.times(2).as_micros() / 1_000_000;

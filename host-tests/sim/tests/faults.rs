@@ -79,7 +79,7 @@ fn median_and_worst(mut all: Vec<f64>) -> (f64, f64) {
 /// Time at which relay 4 of eight is switched off, s.
 const DIES_S: u64 = 20;
 
-/// Returns the time, s, from the loss of relay 4 in which the chain was not at its best positions.
+/// Returns the time, s, for which the chain was not at its best positions after the loss of relay 4.
 ///
 /// `None` if the relays never agreed, or unless the seven remaining relays are in one view at the end.
 fn recovery(outcome: &Outcome) -> Option<f64> {
@@ -446,8 +446,8 @@ fn random_faults_let_at_most_one_group_fly() {
 
 /// Checks a run in which, before a fix, two groups of relays flew by separate agreements.
 ///
-/// Only the last relay had accepted a view. The next view was then formed without the relays that had voted for that
-/// view and relied on its lease.
+/// Only the last relay had accepted a view A. Then view B was formed without the relays that had voted for A and
+/// relied on the lease of A.
 #[test]
 fn an_unheard_decision_ends_no_lease() {
     let mut sequence = sequence(6_450);

@@ -71,7 +71,8 @@ pub type Sockets = [UnixStream; 4];
 impl Emulator {
     /// Starts a drone with the firmware `image`, its configuration `block`, and flash contents `kept`.
     ///
-    /// Its clock runs at the speed `life`. It creates the folder `name` in `folder` for its files.
+    /// The clock of the drone runs at the speed `life`. The files of the drone are in the new folder `name` in
+    /// `folder`.
     ///
     /// # Errors
     /// [`MISSING`] if QEMU is not installed; otherwise the fault, with QEMU's own messages.

@@ -63,7 +63,7 @@ impl Medium {
         }
     }
 
-    /// Accepts bytes from `sender`. Each complete frame goes to all `receivers`, with faults drawn for each.
+    /// Accepts bytes from `sender`. Each complete frame goes to all `receivers`, with faults drawn for each receiver.
     pub fn send(&mut self, now: Instant, sender: usize, bytes: &[u8], receivers: &[usize]) {
         for &byte in bytes {
             let Some((frame, _)) = self.lines.get_mut(sender) else {

@@ -10,9 +10,9 @@ use super::journal::{BLANK, Flash};
 pub struct Ram {
     /// Content of each flash sector, in words of 32 bits.
     pub sectors: [Vec<u32>; 2],
-    /// Number of word writes and erases after which power fails during the last of them.
+    /// Number of word writes and erases until power fails. Power fails during the last of these.
     ///
-    /// 0 while the power is off; `None` if it does not fail.
+    /// 0 while the power is off; `None` if power does not fail.
     pub power: Option<usize>,
     /// Number of writes that fail from now on, because the flash is worn.
     pub worn: usize,

@@ -239,8 +239,8 @@ impl Scene {
         Self::of(1, tells)
     }
 
-    /// Creates a test scene with relay 1 of `relays`. If `tells` is true, the firmware passes its events to the
-    /// autopilot link.
+    /// Creates a test scene with relay 1 of `relays`. If `tells` is true, the firmware passes the events of relay 1
+    /// to the autopilot link.
     fn of(relays: u16, tells: bool) -> Self {
         let time = Time::default();
         let pool = LocalPool::new();

@@ -42,8 +42,8 @@ impl Link {
         self.deliver(&handshake.signed(&KEY, nonces))
     }
 
-    /// Sends a signed heartbeat with the given frame counter. Returns the only statistics counter that it increments
-    /// at relay 2, if any.
+    /// Sends a signed heartbeat with the given frame counter to relay 2. Returns the name of the only statistics
+    /// counter that the heartbeat increments there, if any.
     fn send_with_counter(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
         frame.0.extend([3, 0, 0, 0, 0, 0, 0]);
@@ -134,7 +134,8 @@ fn a_tag_for_other_nonces_counts_as_forged() {
 
 /// Checks what the documentation of `Auth::epoch` warns of: a relay must not start with a used epoch.
 ///
-/// Its neighbour then ignores its frames as replayed, and the relay accepts old frames of the neighbour.
+/// If it does, its neighbour ignores the relay's frames as replayed, and the relay accepts old frames of the
+/// neighbour.
 #[test]
 fn a_reused_epoch_is_not_accepted_as_a_restart() {
     let mut link = Link::new();

@@ -16,7 +16,7 @@ static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Plain(pub(crate) Vec<u8>);
 
-/// Decodes an intact frame; panics on a damaged one.
+/// Decodes an intact frame; panics on a damaged frame.
 pub(crate) fn plain(wire: &[u8]) -> Plain {
     let mut bytes = cobs::decode_vec(&wire[..wire.len() - 1]).unwrap();
     let checked = bytes.len() - 4;

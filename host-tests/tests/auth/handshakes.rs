@@ -68,7 +68,7 @@ fn replayed_handshakes_change_no_position() {
     }
 }
 
-/// Checks that a booted relay accepts each recorded handshake at most once, and then the genuine one.
+/// Checks that a booted relay accepts each recorded handshake at most once, and then a genuine one.
 #[test]
 fn replayed_handshakes_are_answered_once_and_superseded() {
     let mut net = Net::new(2, Wiring::Pair, &[]);

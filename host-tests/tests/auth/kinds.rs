@@ -105,8 +105,9 @@ pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     ]
 }
 
-/// Returns the name of the only counter that has increased, if by exactly one. Returns `None` otherwise; counters
-/// that are not in `counters` are ignored.
+/// Returns the name of the counter that has increased by one, if no other has changed; else `None`.
+///
+/// Only the counters that the function `counters` lists are considered.
 pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
     let (mut name, mut ups) = (None, 0);
     for ((of, before), (_, after)) in counters(before).into_iter().zip(counters(after)) {
@@ -212,7 +213,7 @@ impl Attacker {
         })
     }
 
-    /// Returns an attack's frame, and the counter that it increments if its addresses are valid.
+    /// Returns an attack's frame, and the counter that this frame increments if its addresses are valid.
     fn frame(
         &mut self,
         net: &Net,

@@ -47,7 +47,7 @@ impl Attacker {
     /// Returns a forged mission offer, or any message that claims to come from the ground station.
     ///
     /// The values are sender, receiver and frame. Returns `None` if the frame would be an unchanged copy of a
-    /// recorded one.
+    /// recorded frame.
     pub(crate) fn pretended(
         &mut self,
         net: &Net,

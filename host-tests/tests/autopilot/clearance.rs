@@ -99,7 +99,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
     }
 }
 
-/// Checks that the second of two commands that arrive at once is ignored until it is repeated. A cable or a router
+/// Checks that the second of two commands that arrive together is ignored until it is repeated. A cable or a router
 /// can deliver two commands together.
 #[test]
 fn simultaneous_commands_are_obeyed_in_sequence() {

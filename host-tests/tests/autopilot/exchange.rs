@@ -35,8 +35,9 @@ fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Returns a copy of the autopilot link that received the relay's outputs again. An equal copy shows that the link
-/// had received all of them.
+/// Returns a copy of the autopilot link `link` to which the relay's outputs were passed once more.
+///
+/// If the copy equals `link`, then `link` already had the newest outputs of the relay.
 fn with_repeated_outputs(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     let mut link = link.clone();
     link.handle_ready(now, relay.is_ready());
@@ -186,8 +187,8 @@ fn exchange_passes_the_radios_noise_to_the_relay() {
 
 /// Exchanges frames between two neighbouring relays with motion guards.
 ///
-/// If `is_silent` is true, the second relay neither receives nor sends frames. Its drone starts at x = `start_m` and
-/// flies to its setpoints at once.
+/// If `is_silent` is true, the second relay neither receives nor sends frames. The second relay's drone starts at x =
+/// `start_m`, and is always at its setpoint once it has one.
 fn exchange_fences(
     first: &mut Relay,
     second: &mut Relay,

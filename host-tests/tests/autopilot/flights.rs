@@ -25,7 +25,7 @@ const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Fault {
     None,
-    /// Fault: the cable keeps all bytes, and delivers them at once when the fault ends.
+    /// Fault: the cable keeps all bytes, and delivers all of them when the fault ends.
     Withhold,
     Cut,
     /// Fault: the cable delays the bytes by the given time in µs.

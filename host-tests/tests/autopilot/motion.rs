@@ -107,7 +107,9 @@ impl Rig {
     }
 }
 
-/// Checks the PX4 model: if a 5 m/s target stops dead, it overshoots by 2.1 to 2.7 m like a real PX4.
+/// Checks that the PX4 model overshoots a target that stops dead from 5 m/s by 2.1 to 2.7 m.
+///
+/// A real PX4 does the same.
 #[test]
 fn the_simulated_px4_overshoots_a_stop_like_a_real_one() {
     let mut body = Body::default();

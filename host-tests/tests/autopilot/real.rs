@@ -125,7 +125,7 @@ pub(crate) struct Real {
     pub(crate) body: Body,
     pub(crate) armed: bool,
     pub(crate) in_air: bool,
-    /// Flight mode that the pilot has chosen; `mode` is the one in effect.
+    /// Flight mode that the pilot has chosen; `mode` is the flight mode in effect.
     pub(crate) chosen: Mode,
     pub(crate) mode: Mode,
     pub(crate) is_critical: bool,

@@ -50,7 +50,7 @@ pub(crate) enum LinkMessage {
         name: String,
         value: f32,
     },
-    /// Answer to a command: its id, its result and the recipient.
+    /// Answer to a command: id and result of the command, and the recipient of the answer.
     Ack {
         command: u32,
         result: u32,

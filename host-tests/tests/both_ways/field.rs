@@ -13,8 +13,8 @@ use super::shares::Shares;
 
 const KINDS: [&str; 3] = ["even", "random points", "interferers"];
 
-/// Checks that the agreed positions in random interference fields equal a reference search in SIR. At least half of
-/// the SIRs must be within 1e-4 of the reference, and all within 1 %.
+/// Checks that positions agreed on in random interference fields are as good as a reference search's. At least half
+/// of their SIRs must be within 1e-4 of the reference, and all within 1 %.
 #[test]
 fn the_best_places_in_a_field_are_found() {
     let mut rng = generator(3321);

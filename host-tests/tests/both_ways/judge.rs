@@ -155,7 +155,7 @@ impl Chain {
         points
     }
 
-    /// Improves positions by searches in windows around them, which shrink when they no longer help.
+    /// Improves positions by searches in a window around each. The windows shrink when they no longer help.
     ///
     /// Returns the two-way SIR of the worst hop, which counts the worse direction of each hop, and the positions.
     pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
@@ -186,7 +186,7 @@ impl Chain {
         (value, x)
     }
 
-    /// Returns the best two-way SIR of a worst hop that the search finds, and the positions for it. The two-way SIR
+    /// Returns the best two-way SIR that the search finds for a chain's worst hop, and the positions. The two-way SIR
     /// counts the worse direction of each hop.
     pub(crate) fn best(&self) -> (f64, Vec<f64>) {
         let grid = self.grid();

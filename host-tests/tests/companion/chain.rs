@@ -68,8 +68,8 @@ impl Chain {
         }
     }
 
-    /// Creates a chain on the shared channel `channel`. Its first `of` ttys are for the relays, none of which is
-    /// started yet.
+    /// Creates a chain on the shared channel `channel`. Its first `of` ttys are for the relays. No relay is started
+    /// yet.
     pub(crate) fn on_channel(of: usize, channel: Medium) -> Self {
         Self {
             is_shared: true,

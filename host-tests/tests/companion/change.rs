@@ -176,7 +176,7 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
 
 /// Checks that an upload with `--from-loaded` shows every earlier change that it reverts.
 ///
-/// Such an upload changes the mission that the relays had before flight, and not the one that they fly.
+/// Such an upload changes the mission that the relays had before flight, and not the mission that they fly.
 #[test]
 fn an_upload_based_on_loaded_values_shows_reverted_keys() {
     let mut bench = Bench::new();

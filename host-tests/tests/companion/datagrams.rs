@@ -28,7 +28,7 @@ impl Ports {
             .expect("one of ten pairs is free")
     }
 
-    /// Returns a free pair of ports, the companion's `apart` above the autopilot's.
+    /// Returns a pair of free ports. The companion's port is `apart` above the autopilot's.
     pub(crate) fn apart(apart: u16) -> Self {
         let mut pairs = (0..100).filter_map(|_| {
             let port = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -135,7 +135,7 @@ fn an_autopilot_that_restarts_is_found_again() {
     relay.stopped();
 }
 
-/// Checks that the error line names the occupied local port and the option to choose another one.
+/// Checks that the error line names the occupied local port and the option to choose another port.
 #[test]
 fn an_unavailable_local_port_is_named() {
     let ports = Ports::apart(1_000);

@@ -176,7 +176,7 @@ fn is_switched_off_and_on(flight: &mut Flight) {
     assert!(flight.targets_for(MOMENT).is_empty(), "it is on the ground");
 }
 
-/// Silences the autopilot for more than 3 s, and checks that the relay reports it and sends no targets.
+/// Silences the autopilot for more than 3 s. Checks that the relay reports the silence and sends no targets.
 fn falls_silent(flight: &mut Flight) {
     flight.drone.order("mute");
     flight
@@ -236,7 +236,8 @@ fn an_arducopter(key: Option<&str>) {
     is_switched_off_and_on(&mut flight);
 }
 
-/// Checks that the relay reports an ArduCopter that refuses a target, as outside its fence.
+/// Checks that the relay reports an ArduCopter that flies to another target than the one sent. The report suggests
+/// that the setpoint is outside of the autopilot's fence.
 #[test]
 fn an_arducopter_that_refuses_targets_is_reported() {
     let mut flight = Flight::found("arducopter", "");

@@ -61,7 +61,7 @@ pub(crate) struct Medium {
     counts: Arc<Counts>,
     stop: Arc<AtomicBool>,
     pump: Option<JoinHandle<()>>,
-    /// Folder with the names of the ttys that can be unplugged, if the ttys of this medium can.
+    /// Folder with the names of the ttys; `None` unless the ttys of this medium can be unplugged.
     _folder: Option<TempDir>,
 }
 

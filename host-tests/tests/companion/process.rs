@@ -55,7 +55,7 @@ impl Relay {
         Self::run(ground(), &words(options), Stdio::piped())
     }
 
-    /// Starts `program`. Its lines can be waited for if its output is piped.
+    /// Starts `program`. Tests can wait for lines of its output if the output is piped.
     pub(crate) fn run(program: &Path, options: &[&str], output: Stdio) -> Self {
         let mut command = Command::new(program);
         command.args(options).stdout(output);

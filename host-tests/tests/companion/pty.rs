@@ -53,7 +53,7 @@ impl Pty {
         }
     }
 
-    /// Writes bytes to the relay. Returns their number, since a tty that is not read overflows.
+    /// Writes bytes to the relay. Returns the number of bytes accepted, since a tty that is not read becomes full.
     pub(crate) fn write(&self, bytes: &[u8]) -> usize {
         match rustix::io::write(&self.wire, bytes) {
             Ok(count) => count,

@@ -58,8 +58,8 @@ fn fifo_lines(scene: &Scene, relay: usize) -> String {
     lines
 }
 
-/// Writes an interference power to a file until the condition holds. A ground station reads the file only when it has
-/// changed.
+/// Writes an interference power to a file again and again until `is_so` returns true. The writing is repeated because
+/// a ground station reads the file only when it has changed.
 fn write_until(level: &str, power_w: f64, mut is_so: impl FnMut() -> bool) {
     let end = Instant::now() + LIMIT;
     while !is_so() {

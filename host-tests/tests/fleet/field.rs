@@ -155,7 +155,7 @@ fn the_fewest_in_a_field_are_those_of_a_grid_search() {
     assert!(same > 300 && none > 20 && fewer > 10 && largest > 30);
 }
 
-/// Checks that the best target SIR of N identical relays in a field of interference is the known one.
+/// Checks that the best target SIR of N identical relays in a field is the known optimum.
 ///
 /// The closed form gives it for a constant field, and Algorithm 4 for other fields.
 #[test]

@@ -11,7 +11,7 @@ fn ends(outcome: &Outcome) -> Vec<f32> {
     places.map(|place| place.x_m).collect()
 }
 
-/// Returns the final setpoints of the same chain without faults, x in m.
+/// Returns the final setpoints, x in m, of the chain of `setup` in a run without faults.
 fn undisturbed(setup: &Setup) -> Vec<f32> {
     let mut clean = Setup::new(setup.mission);
     clean.seed = 1;

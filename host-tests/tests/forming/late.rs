@@ -6,7 +6,7 @@ use uav_relay::{Adjust, Local, Method, Settings};
 use crate::hand::{Chain, LOW, WIDE, is_stop};
 use host_tests::bench::Bench;
 
-/// Checks that a message of the leader from before its reboot does not spoil the agreement after it.
+/// Checks that a message of the leader from before its reboot does not spoil the next agreement.
 ///
 /// The message starts a round along the chain, is delayed, and arrives in the last round of the new agreement, by
 /// Algorithm 2. No relay may act on the message.
@@ -75,7 +75,7 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     assert_eq!(chain.bench.setpoints(), before);
 }
 
-/// Checks that a relay requests a membership view when a neighbour reports a newer one.
+/// Checks that a relay requests a membership view when a neighbour reports a newer view.
 ///
 /// The neighbour refuses the relay's messages because they belong to the older view.
 #[test]

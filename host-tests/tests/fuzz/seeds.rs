@@ -180,7 +180,7 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns an input: the last of four relays receives membership views, a fence and late frames.
+/// Returns an input: the last of four relays receives views, a guard message and late frames.
 ///
 /// The relay has a motion guard and a position. `wiring` is the byte of the input that selects the wiring.
 fn formed(wiring: u8) -> Vec<u8> {
@@ -196,7 +196,7 @@ fn formed(wiring: u8) -> Vec<u8> {
     [&parts.concat()[..], &position, &late, &far, &[3, 60]].concat()
 }
 
-/// Returns an input: a relay with a key receives a frame of another mission, and one without a tag.
+/// Returns an input: a relay with a key receives a frame of another mission, and a frame without a tag.
 fn refused() -> Vec<u8> {
     let head = [0, 3, 0, 1, 8, 0, 0, 0, 0, 1, 0];
     let other = [9, 0, 3, 255, 0, 0];
@@ -253,7 +253,8 @@ fn recorded(prefix: &[u8], index: u16) -> Vec<u8> {
     seed
 }
 
-/// Exchanges all pending frames. Appends those to relay `own` (from 0) to `seed`, and returns their number.
+/// Exchanges all pending frames. Appends the frames that relay `own` (from 0) receives to `seed`, and returns the
+/// number of these frames.
 fn exchange(relays: &mut [Relay], now: Instant, own: usize, seed: &mut Vec<u8>) -> usize {
     let (mut heard, mut said) = (0, true);
     let mut buffer = [0; MAX_FRAME];

@@ -197,7 +197,9 @@ impl World {
         k * self.drones.len() + other
     }
 
-    /// Sets the distances required of drone `k` to its present distances, or the separation if smaller.
+    /// Sets the required distance of drone `k` from each other drone to the distance at present.
+    ///
+    /// The required distance is at most the separation.
     fn begin(&mut self, k: usize) {
         for other in 0..self.drones.len() {
             let apart = length(way(self.drones[k].at, self.drones[other].at));
@@ -328,7 +330,7 @@ impl World {
         }
     }
 
-    /// Prints the positions and goals of the drones for debugging.
+    /// Prints the time, and each drone's position, setpoint and reasons to wait, for debugging.
     fn exchange_fences(&self) {
         let each = self.drones.iter().map(|drone| {
             let at = drone.line.along(drone.at);

@@ -21,7 +21,7 @@ pub(crate) fn length([dx, dy, dh]: Point) -> f64 {
     dx.hypot(dy).hypot(dh)
 }
 
-/// Returns the point that is the fraction `share` of the vector `way` away from `at`.
+/// Returns the point `at` + `share` * `way`.
 pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
     [0, 1, 2].map(|part| at[part] + share * way[part])
 }
@@ -44,7 +44,7 @@ pub(crate) struct Drone {
     pub(crate) latency_s: f64,
     /// Motion guard of the drone; `None` while the relay is switched off.
     pub(crate) guard: Option<Guard>,
-    /// First setpoint of the guard since it last had none; `None` while it has none.
+    /// First setpoint since the guard last had none; `None` while the guard has none.
     begun: Option<Placement>,
     /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],
@@ -55,7 +55,7 @@ pub(crate) struct Drone {
     pub(crate) taken: bool,
     /// True for each side whose neighbour knows that the pilot flies this drone.
     pub(crate) told: [bool; 2],
-    /// Range of x that both neighbours keep clear, since they know that the pilot flies this drone.
+    /// Range of x that both neighbours keep clear, because they know that the pilot flies this drone.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
     /// Session numbers that this drone's guard last sent to the neighbours toward Tx and Rx.

@@ -105,7 +105,7 @@ fn random_config(rng: &mut ChaCha8Rng) -> GuardConfig {
     }
 }
 
-/// Draws the line's length. Returns the guard's configuration with it, and the drones' start positions.
+/// Draws the line's length. Returns the guard's configuration with this length, and the drones' start positions.
 fn line(rng: &mut ChaCha8Rng, mut config: GuardConfig, relays: usize) -> (GuardConfig, Vec<Point>) {
     let taken = f64::from(config.separation_m) * relays as f64;
     let distance = if rng.random_bool(0.4) {

@@ -151,8 +151,9 @@ impl World {
         }
     }
 
-    /// Moves drone `k` up to `most_m` along axis `part`, if this is away from all nearby drones. `part` is 1 for y or
-    /// 2 for altitude; `up` selects the direction.
+    /// Moves drone `k` up to `most_m` along axis `part`, if that is away from all nearby drones.
+    ///
+    /// `part` is 1 for y or 2 for altitude; `up` selects the direction.
     pub(crate) fn aside(&mut self, k: usize, (part, up, most_m): (usize, bool, f64)) {
         let (low, high) = self.drones[k].possible_ranges()[part];
         let near = k.saturating_sub(3)..(k + 4).min(self.drones.len());

@@ -30,7 +30,7 @@ fn setup(link: &Link, corridor: Corridor) -> Option<Setup> {
 /// Asserts that a run took `messages` messages, apart from those by which relays claim their index.
 ///
 /// Such messages are sent at fixed times after the start. At each of these times, a relay may send two of them: its
-/// own claim, and its echo of another one.
+/// own claim, and its echo of another claim.
 fn assert_messages(outcome: &Outcome, relays: u64, messages: u64) {
     let seconds = outcome.ended.as_micros() as f64 * 1e-6;
     let times = [2.25, 2.75, 3.75, 5.75, 9.75, 17.75];

@@ -63,8 +63,8 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     Some((drawn, setup))
 }
 
-/// Checks that chains with different powers or fixed altitudes come near the joint optimum. Their SIR is never below
-/// that at the configured altitudes.
+/// Checks that chains with different powers or fixed altitudes come near the joint optimum. The SIR of a chain is
+/// never below its SIR at the configured altitudes.
 #[test]
 fn different_relays_come_near_the_joint_optimum() {
     let count = count(200);

@@ -18,19 +18,19 @@ const STEP_MS: u64 = 10;
 /// two relays with the same index.
 const LIMIT_MS: u64 = 2_000;
 
-/// Longest time with setpoints at two duplicate relays that receive each other, ms. Few frames are sent in a settled
-/// chain.
+/// Longest permitted time in which both duplicate relays have setpoints, ms. The two receive each other, but few
+/// frames are sent in a settled chain.
 const HEARD_MS: u64 = 10_000;
 
-/// Longest time with setpoints at two duplicate relays on a channel that loses frames, ms. The frames that reveal a
-/// duplicate may be lost.
+/// Longest permitted time in which both duplicate relays have setpoints if frames are lost, ms. The frames that
+/// reveal a duplicate may be lost.
 const HEARD_LOSSY_MS: u64 = 20_000;
 
-/// Longest time with setpoints at two duplicate relays that do not receive each other, ms. Several index claims in a
-/// row may be lost.
+/// Longest permitted time in which both duplicate relays have setpoints, ms. The two do not receive each other, and
+/// several index claims in a row may be lost.
 const HIDDEN_MS: u64 = 40_000;
 
-/// Longest time until the whole chain, with one of the duplicate relays, has setpoints for good, ms.
+/// Longest permitted time until all relays of the chain and one duplicate have setpoints for good, ms.
 const FLIES_MS: u64 = 60_000;
 
 /// Time of observation after the second duplicate relay was switched on, ms.
@@ -76,11 +76,13 @@ struct Case {
 /// Durations measured in one simulated chain, ms.
 #[derive(Clone, Copy, Debug, Default)]
 struct Durations {
-    /// Longest time with setpoints at both duplicates, from `LIMIT_MS` after the first frame between them.
+    /// Longest time in which both duplicates have setpoints, from `LIMIT_MS` after their first frame on.
+    ///
+    /// The frame is the first one that goes from one duplicate to the other.
     both: u64,
-    /// Longest time with setpoints at both duplicates, from the start of the second one.
+    /// Longest time in which both duplicates have setpoints, from the start of the second duplicate.
     both_at_all: u64,
-    /// Total time without a setpoint at either duplicate, from the start of the second one.
+    /// Total time in which neither duplicate has a setpoint, from the start of the second duplicate.
     neither: u64,
     /// Time from the second duplicate's start until the whole chain has setpoints for good. One duplicate is a part
     /// of the chain then.
@@ -291,7 +293,8 @@ impl Meeting {
         }
     }
 
-    /// Returns the longest time with setpoints at both duplicates, ms, and how many have one in the end.
+    /// Returns the longest time in which both duplicates have setpoints after the meeting, ms. Also returns how many
+    /// duplicates have a setpoint in the end.
     fn fly(self) -> (u64, usize) {
         let rng = &mut ChaCha8Rng::seed_from_u64(self.seed);
         let chain = self.first_chain(rng);

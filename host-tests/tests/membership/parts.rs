@@ -64,8 +64,9 @@ fn a_split_chain_heals() {
     }
 }
 
-/// Returns the most membership views that a relay accepts while a link toggles every `half` seconds. The link is
-/// behind relay `after`, and the simulated time is ten minutes.
+/// Returns the largest number of membership views that a relay accepts while a link fails and returns.
+///
+/// The link is behind relay `after`, and toggles every `half` seconds. The simulated time is ten minutes.
 fn flaps(half: u64, after: u16) -> usize {
     let mut setup = paper(8);
     for n in 0..600 / (2 * half) {

@@ -16,8 +16,8 @@ use super::wires::{Ended, Flying, message};
 
 /// Maximum number of frames that a relay sends in one turn of its main loop.
 ///
-/// These are a pass (a message that travels along the chain), `Busy`, a decision, two for a lease renewal, and a
-/// heartbeat and a hello on each side.
+/// These are a pass (a message that travels along the chain), a `Busy`, a decision, two frames for a lease renewal,
+/// and a heartbeat and a hello on each side.
 pub(crate) const MOST_FRAMES: u32 = 9;
 
 /// Model of one relay: its state as observed since it was switched on.

@@ -6,8 +6,8 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Operation on the simulated chain. A line is one direction of a link between neighbours. Its number counts only
-/// lines with a frame in transit.
+/// Operation on the simulated chain. A line is one direction of a link between neighbours. Only lines with a frame in
+/// transit are numbered.
 #[derive(Clone, Debug)]
 pub(crate) enum Operation {
     /// Operation: the next frame on a line (one direction of a link) arrives.
@@ -49,7 +49,7 @@ pub(crate) enum Operation {
     /// of a link) and the frame.
     Replay(u8, u8),
     /// Operation: a relay measures interference. The fields are the relay, and the power in per cent of the agreed
-    /// one.
+    /// power.
     Measure(u8, u8),
 }
 

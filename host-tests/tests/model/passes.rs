@@ -20,8 +20,8 @@ const FIRST: u16 = 64;
 
 /// Number of passes (rounds of messages along the chain) before the last one that count as late.
 ///
-/// A pass with an older number counts as one from before a reboot. A leader's next pass has a number that is at most
-/// this much larger.
+/// A pass with an older number counts as a pass from before a reboot. A leader's next pass has a number that is at
+/// most this much larger.
 const NEAR: u16 = 32;
 
 /// Returns the number that messages along the chain add to the mission digest in a membership view.
@@ -45,7 +45,7 @@ pub(crate) enum PassClass {
     Again,
     /// Classification: a pass (a message along the chain) that arrives late and is over already.
     Late,
-    /// Classification: a pass (a message along the chain) that does not continue the known ones.
+    /// Classification: a pass (a message along the chain) that does not continue the known passes.
     ///
     /// The pass is of another membership view, or from before the leader's reboot, or the relay has missed the pass
     /// before it.

@@ -75,7 +75,8 @@ impl World<'_> {
         Duration::from_micros(calls * probe_after_us)
     }
 
-    /// Checks that Algorithm 2's agreed target equals the SIR of its worst hop. Other methods may leave a margin.
+    /// Checks that the target SIR agreed by Algorithm 2 is the SIR of the chain's worst hop. Other methods may leave
+    /// a margin.
     fn check_stated_target(&self) -> Checked {
         if self.scenario.kind == Kind::Adjust
             && let Some(target) = self.ledgers[0].target

@@ -44,8 +44,10 @@ impl Reference {
         }
     }
 
-    /// Returns the ratio of the SIR at `x_m` with the measured Upsilon = E[1/I] to that with the true one.
-    /// `measured_per_w` is the measured value in 1/W. Returns 1 for a known interferer.
+    /// Returns the SIR at `x_m` by the measured Upsilon, divided by the SIR by the true Upsilon.
+    ///
+    /// Upsilon = E[1/I], with the interference power I. `measured_per_w` is the measured Upsilon in 1/W. Returns 1
+    /// for a known interferer.
     pub(crate) fn sir_ratio(&self, x_m: f64, measured_per_w: f64) -> f64 {
         match self {
             Self::Source { .. } => 1.0,

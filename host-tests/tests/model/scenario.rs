@@ -96,7 +96,7 @@ impl Scenario {
         self.settings.iter().all(|one| one.auth.is_some())
     }
 
-    /// Returns the same mission with signed frames. Without faults, its agreement must equal the unsigned one.
+    /// Returns the same mission with signed frames. Checks that its agreement equals that with unsigned frames.
     fn signed(mut self) -> Self {
         for one in &mut self.settings {
             one.auth = Some(Auth {
@@ -261,7 +261,8 @@ fn joint(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Parts> {
     Some((mission, settings, Reference::Source { link, optimum }))
 }
 
-/// Draws the parameters of Algorithm 2. Moves are up to a fraction of the highest altitude, `most_m`.
+/// Draws the parameters of Algorithm 2. The limit of a relay's change of altitude in one round is 0.02 to 0.5 of
+/// `most_m`, the highest altitude.
 fn turns(rng: &mut ChaCha8Rng, most_m: f32) -> Adjust {
     Adjust {
         rounds: rng.random_range(1..=6),

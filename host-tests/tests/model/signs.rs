@@ -8,8 +8,9 @@ pub(crate) const QUESTIONS: usize = 16;
 /// Number of heartbeat intervals after which a late reply no longer proves that the neighbour is alive.
 const OPEN: u32 = 4;
 
-/// Factor on the largest number of heartbeat requests that were ever unanswered at once. A neighbour with more
-/// unanswered requests than this product must be reported as lost.
+/// Factor on the largest number of heartbeat requests that were ever unanswered at the same time.
+///
+/// A neighbour with more unanswered requests than this product must be reported as lost.
 const MARGIN: usize = 3;
 /// Factor on `dead_after`: the silence after which a neighbour must be reported as lost in any case.
 pub(crate) const LONGEST: u32 = 8;
@@ -29,7 +30,9 @@ pub(crate) struct Signs {
     pub(crate) open: usize,
     /// Number of heartbeat requests since the last possible sign of life.
     pub(crate) open_since_possible: usize,
-    /// Largest number of heartbeat requests that were ever unanswered at once, at least [`QUESTIONS`].
+    /// Largest number of heartbeat requests that were ever unanswered at the same time.
+    ///
+    /// The number is at least [`QUESTIONS`].
     pub(crate) most_open: usize,
     /// True while the relay reports the neighbour as lost.
     pub(crate) missed: bool,

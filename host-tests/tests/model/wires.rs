@@ -56,7 +56,7 @@ pub(crate) struct Wires {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pass {
     pub(crate) number: u16,
-    /// Digest of the mission, plus what the membership view adds to it.
+    /// Sum of the mission's digest and a number that depends on the membership view.
     pub(crate) digest: u16,
     /// True if Algorithm 2 moves relays by this pass (a message that travels along the chain).
     pub(crate) moves: bool,
@@ -147,8 +147,9 @@ impl Wires {
         busy.get(usize::from(pick) % busy.len().max(1)).copied()
     }
 
-    /// Removes and returns a frame in transit on `line`, one direction of a link. It is the one that is `behind`
-    /// frames after the next one, or else the last one.
+    /// Removes and returns a frame in transit on `line`, one direction of a link.
+    ///
+    /// The frame is `behind` frames after the next one. If there are not as many, it is the last frame.
     pub(crate) fn take(&mut self, line: usize, behind: u8) -> Option<Flying> {
         let flying = &mut self.lines[line].flying;
         let last = flying.len().checked_sub(1)?;
@@ -215,7 +216,7 @@ impl Wires {
         }
     }
 
-    /// Releases all delayed frames at once.
+    /// Releases all delayed frames now.
     pub(crate) fn hurry_all(&mut self, now: Instant) {
         let late = self.lines.iter_mut().flat_map(|line| &mut line.late);
         late.for_each(|frame| frame.due = now);

@@ -180,8 +180,8 @@ fn extreme_scenes_have_a_finite_fit() {
     assert_eq!(hypothetical(&nobody), None);
 }
 
-/// Checks that the fitted interferer is on the true ones' side if lateral offsets are permitted. Without lateral
-/// offsets, the y of the fitted interferer is always positive.
+/// Checks that the fitted interferer is on the same side of the line as the true interferers. Lateral offsets are
+/// permitted here. Without these, the y of the fitted interferer is always positive.
 #[test]
 fn with_lateral_range_the_fit_is_on_the_right_side() {
     let source = |x_m: f64, y_m: f64| Source {

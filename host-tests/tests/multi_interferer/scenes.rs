@@ -110,7 +110,7 @@ pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }
 
-/// Returns the scene with its lowest permitted altitude as the only permitted one.
+/// Returns the scene with its lowest permitted altitude as the only permitted altitude.
 pub(crate) fn level(mut scene: Scene) -> Scene {
     scene.band.most_m = scene.band.least_m;
     scene

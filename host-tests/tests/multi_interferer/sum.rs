@@ -10,7 +10,7 @@ use uav_relay_scenario::{Field, Interference, RelayOverride, Scenario, Source};
 use super::above;
 use super::scenes::scene;
 
-/// Checks that the inverse SIR with several sources is the sum of those with each source alone.
+/// Checks that the inverse SIR with several sources is the sum of the inverse SIRs with single sources.
 #[test]
 fn the_inverse_sirs_of_the_sources_add_up() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(71));

@@ -64,7 +64,7 @@ fn agreed(scenario: &Scenario, relays: u16) -> f64 {
     sirs.into_iter().reduce(f64::min).unwrap()
 }
 
-/// Returns the scenario of a link within `corridor`, with every relay like the first one.
+/// Returns the scenario of a link within `corridor`, with every relay like the first relay.
 fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     const LIGHT_M_PER_S: f64 = 299_792_458.0;
     let waves = link.mu_los.sqrt();
@@ -101,7 +101,9 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     }
 }
 
-/// Returns by which fraction a plan's SIR is below the relays' agreement; -inf without an agreement.
+/// Returns the fraction by which a plan's SIR is below the SIR of the relays' agreement.
+///
+/// The result is -inf without an agreement.
 fn short(scenario: &Scenario, relays: u16) -> f64 {
     1.0 - free(scenario, Number::Of(relays)).sir() / agreed(scenario, relays)
 }
@@ -286,7 +288,7 @@ fn the_fewest_for_a_target_use_lateral_offsets() {
     assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
 }
 
-/// Checks that two interferers at one position are equivalent to one with the sum of their powers.
+/// Checks that two interferers at one position act like one interferer with the sum of their powers.
 #[test]
 fn two_interferers_at_one_position_are_one() {
     let scenario = example("side.toml");

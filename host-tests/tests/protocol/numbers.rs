@@ -112,7 +112,7 @@ fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
     assert_eq!(rebooted.setpoint(), None);
 }
 
-/// Checks that a sweep message with the same number but other content counts as another one.
+/// Checks that a sweep message with the same number but other content counts as another message.
 ///
 /// A relay closer to the leader sends such a message if it has rebooted.
 #[test]

@@ -14,7 +14,7 @@ use crate::methods::field;
 
 /// Tolerance for delays of this machine, µs of the drones' clocks. These clocks run 10.5 times too fast.
 ///
-/// `a_silent_relay_is_noticed_by_both_neighbours_...` tests the exact time in simulation.
+/// The test `a_silent_relay_is_noticed_by_both_neighbours_in_time` checks the exact time in simulation.
 const SLACK: u64 = 525_000;
 
 /// Checks that both neighbours of a drone that was switched off report this in time, by their clocks.

@@ -62,9 +62,9 @@ pub(crate) struct Vehicle {
     goal: Option<(Placement, Geodetic)>,
     pub(crate) armed: bool,
     pub(crate) landed: MavLandedState,
-    /// True if the pilot chooses OFFBOARD or GUIDED; false if it flies the drone manually.
+    /// True if the pilot chooses OFFBOARD or GUIDED; false if the pilot flies the drone manually.
     ///
-    /// The pilot also chooses another mode for a while, and then this one again, if the companion asks for that.
+    /// If the companion asks for another mode, the pilot chooses one for a while, and then OFFBOARD or GUIDED again.
     pub(crate) granted: bool,
     /// Time until which the pilot chooses another mode than OFFBOARD or GUIDED, ms.
     elsewhere_until: u64,
@@ -183,7 +183,7 @@ impl Vehicle {
         self.granted && now >= self.elsewhere_until
     }
 
-    /// Reads a status text for the operator. The pilot chooses another mode for a while if it asks for that.
+    /// Reads a status text for the operator. If the text asks for another mode, the pilot chooses one for a while.
     fn read_status_text(&mut self, text: String) {
         if self.granted && text == "relay: waits, choose another mode first" {
             self.elsewhere_until = self.now() + ELSEWHERE;

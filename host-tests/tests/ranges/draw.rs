@@ -9,7 +9,7 @@ use uav_relay::{
     Measure, Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring, WithoutQuorum,
 };
 
-/// Draws a positive number: `usual`, `least`, `most`, or a log-uniform number between the last two.
+/// Draws a positive number: `usual`, `least`, `most`, or a log-uniform number from `least` to `most`.
 pub(crate) fn scaled(rng: &mut impl Rng, usual: f32, least: f32, most: f32) -> f32 {
     match rng.random_range(0..8) {
         0..4 => usual.clamp(least, most),

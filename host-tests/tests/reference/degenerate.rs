@@ -96,8 +96,8 @@ fn degenerate_reaches_are_right() {
 
 /// Checks that the reference finds a chain in which relay 1 must not go as far along as it could.
 ///
-/// At its farthest position, relay 2's altitude would be too near to the interferer. The chain with all relays as far
-/// along as possible has less than a fifth of the best SIR.
+/// With relay 1 at its farthest position, relay 2, which is lower, would have to be too near to the interferer. The
+/// chain with all relays as far along as possible has less than a fifth of the best SIR.
 #[test]
 fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
     let link = Link {
@@ -125,7 +125,8 @@ fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
 
 /// Checks the first target SIR of the paper's fixed-step search for an interferer behind Tx.
 ///
-/// It must be the best SIR of the first hop, which that hop has with the relay farther along, and not above Tx.
+/// The first target must be the best SIR of the first hop. The first hop has this SIR with relay 1 some way beyond
+/// Tx, not straight above Tx.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Relay {

@@ -114,8 +114,8 @@ fn coordinates_off_the_line_are_refused() {
 
 /// Checks that an interferer on a tower is refused if the tower changes the interference by over 1 dB.
 ///
-/// The interferer is the horizontal distance d from the line, the relays' altitude is h, the tower's height t: the
-/// change is (d^2 + h^2) / (d^2 + (h - t)^2).
+/// The change is (d^2 + h^2) / (d^2 + (h - t)^2): d is the interferer's horizontal distance from the line, h the
+/// relays' altitude, and t the tower's height.
 #[test]
 fn an_interferer_on_a_tower_is_refused_if_its_height_matters() {
     let azimuth = "lat_deg = 47.404\nlon_deg = 8.548";

@@ -125,7 +125,8 @@ fn milliwatts(dbm: f64) -> f64 {
 
 /// Checks the crate's SINRs against a link budget.
 ///
-/// Both are equal if all receiving antennas have the same gain. Otherwise the crate's SINRs are not higher.
+/// The crate's SINRs equal those of the link budget if all receiving antennas have the same gain. Otherwise the
+/// crate's SINRs are not higher.
 #[test]
 fn the_chain_has_the_sinrs_of_a_link_budget() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);

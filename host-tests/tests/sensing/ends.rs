@@ -14,12 +14,12 @@ use crate::count;
 
 const RELAYS: u16 = 5;
 
-/// Factor on the path loss on the ground that the mission does not know: Rx is behind a hill.
+/// Factor by which the true path loss on the ground exceeds that in the mission: Rx is behind a hill.
 const HILL: f64 = 8.0;
 
 /// Returns two results of each random scene: the error of relay 1's power estimate at Rx, and the SIR.
 ///
-/// The error is relative, and `None` without an estimate. The SIR is the linear one of the chain's worst hop, by the
+/// The error is relative, and `None` without an estimate. The SIR is that of the chain's worst hop, linear, with the
 /// true interference.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {
@@ -80,8 +80,8 @@ fn measurements_at_rx_reach_all_relays_by_radio() {
     }
 }
 
-/// Checks that the measurements of Tx and Rx raise the SIR, to more than twice in each scene. Without them the last
-/// hop is planned with the mission's wrong path loss on the ground.
+/// Checks that the measurements of Tx and Rx more than double the SIR of each scene. Without them the last hop is
+/// planned with the mission's wrong path loss on the ground.
 #[test]
 fn measurements_of_tx_and_rx_raise_the_sir() {
     let told = flown(|_| {});

@@ -37,9 +37,9 @@ fn the_interferer_of_the_previous_mission_is_faint() {
     }
 }
 
-/// Checks that other interferers that would spoil the picture are not drawn.
+/// Checks that earlier or estimated interferers that would spoil the picture are not drawn.
 ///
-/// Such an interferer is at the position of one that is drawn already, far away, or at an undefined position.
+/// Such an interferer is at the position of another drawn interferer, far away, or at an undefined position.
 #[test]
 fn a_previous_interferer_under_a_present_one_is_left_out() {
     let same = level(8).interferers;
@@ -57,7 +57,7 @@ fn a_previous_interferer_under_a_present_one_is_left_out() {
     }
 }
 
-/// Checks that an estimated interferer is drawn even next to the true one.
+/// Checks that an estimated interferer is drawn even next to the true interferer.
 #[test]
 fn the_estimated_interferer_is_drawn_beside_the_true_one() {
     for (x, y) in [(200.0, -100.0), (500.5, 399.0)] {

@@ -67,8 +67,8 @@ impl Scene {
     }
 }
 
-/// Returns the maximum of `f` over `range` and its position. Samples are denser around `near`; a golden-section
-/// search refines the best.
+/// Returns the maximum of `f` over `range` and its position. Samples are denser around `near`. A golden-section
+/// search then refines the best sample.
 fn along(range: (f64, f64), near: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     let (low, high) = range;
     let mut at = vec![low, high];

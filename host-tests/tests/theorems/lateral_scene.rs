@@ -97,8 +97,8 @@ impl LateralScene {
         [(0.0, self.scene.link.distance_m), self.lateral, band]
     }
 
-    /// Returns the best SIR over a box of x, y and altitude: by a grid, then by random searches. These begin at the
-    /// best points of the grid that are far from each other.
+    /// Returns the best SIR over a box of x, y and altitude: by a grid, then by random searches. The random searches
+    /// begin at the best points of the grid that are far from each other.
     pub(crate) fn brute(&self, ranges: [(f64, f64); 3]) -> f64 {
         let link = &self.scene.link;
         let of = [
@@ -132,8 +132,8 @@ impl LateralScene {
             .fold(0.0, f64::max)
     }
 
-    /// Returns the best SIR that a random search from `at` finds. It moves along all axes at once, because a search
-    /// along one axis at a time would not get along a ridge.
+    /// Returns the best SIR that a random search from `at` finds. The search moves along all axes at the same time,
+    /// because a search along one axis at a time would not get along a ridge.
     pub(crate) fn about(&self, mut at: [f64; 3], ranges: [(f64, f64); 3]) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut most = self.sir(at);

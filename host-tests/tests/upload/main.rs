@@ -58,9 +58,9 @@ fn upload(
 
 /// Checks a run with uploads. Returns the first fault as an error.
 ///
-/// All members of a membership view must use the same mission, which at least as many relays must have received
-/// before. Setpoints must be within limits. A settled chain must use mission `version`, in the positions of a new
-/// chain with `config`.
+/// All members of a membership view must use the same mission. If it is an uploaded one, it must be stored by at
+/// least as many relays as the view has. Setpoints must be within limits. A settled chain must use mission `version`,
+/// in the positions of a new chain with `config`.
 fn judge(
     setup: &Setup,
     outcome: &Outcome,

@@ -200,7 +200,7 @@ fn an_upload_outside_the_geofence_is_refused_and_reported() {
     }
 }
 
-/// Checks that a relay with its own altitude refuses an upload like the others.
+/// Checks that a relay with its own altitude refuses an upload as the other relays do.
 ///
 /// The uploaded altitude is outside the permitted range. It is within that relay's geofence only because the geofence
 /// includes the relay's own altitude.

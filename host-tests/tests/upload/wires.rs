@@ -93,7 +93,7 @@ impl Wires {
         &self.bench.relays[index - 1]
     }
 
-    /// Places the drones by relay index. They follow their setpoints from then on.
+    /// Places the drones by relay index. The drones follow their setpoints from then on.
     pub(crate) fn place_drones(&mut self, place: impl Fn(u16) -> Placement) {
         self.places = (1..)
             .zip(&self.bench.relays)

@@ -31,8 +31,9 @@ pub(crate) struct Kind {
     pub(crate) stranger: Option<(usize, Mission)>,
     /// Relay (from 0) whose epoch goes back at its second start, if any.
     pub(crate) goes_back: Option<usize>,
-    /// Relay (from 0) of which a second drone, the copy, exists, if any. The copy's number follows those of all
-    /// relays.
+    /// Relay (from 0) that has a copy, a second drone with the same index; `None` if no relay has one.
+    ///
+    /// The number of the copy follows the numbers of all relays.
     pub(crate) copied: Option<usize>,
 }
 

@@ -115,8 +115,8 @@ fn a_left_out_relay_attracts_no_other() {
 /// before the other does, and soon after that the link is lost again.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
-/// Checks that one flapping link costs at most a tenth of the time with agreed positions. The periods are 5 s to 300
-/// s.
+/// Checks that one flapping link costs at most a tenth of the time with agreed positions. The link fails and returns
+/// once in each period of 5 s to 300 s.
 #[test]
 fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));

@@ -135,8 +135,8 @@ fn every_schedule_ends_in_one_whole_chain_within_120_s() {
 /// Checks that of a relay and its copy, one loses its setpoint within 2 s.
 ///
 /// The copy is a second drone with the same index. The chain must be whole once one of them is removed. Two
-/// agreements may be in use at once only if a cut separates relay and copy: both of them vote then, so that two parts
-/// may have a quorum.
+/// agreements may be in use at the same time only if a cut separates relay and copy: both of them vote then, so that
+/// two parts may have a quorum.
 #[test]
 fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
@@ -259,7 +259,7 @@ fn a_relay_with_far_later_views_joins_within_120_s() {
 /// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
 /// Returns the number of chains, the results of those that recovered late, and the results of those in which two
-/// agreements were in use at once.
+/// agreements were in use at the same time.
 fn with_steps(forward: bool) -> (u64, Vec<Measured>, Vec<Measured>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);
@@ -298,7 +298,7 @@ fn clocks_that_step_back_leave_one_whole_chain() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks that clocks that step forward seldom let two agreements be in use at once.
+/// Checks that clocks that step forward seldom let two agreements be in use at the same time.
 ///
 /// A relay whose clock steps forward stops waiting for the leases of others too early. Two parts of the chain may
 /// then use different agreements until these leases expire.

@@ -9,7 +9,7 @@ use host_tests::fixtures::mission;
 
 pub(crate) const SECOND: u64 = 1_000_000;
 
-/// Schedule of faults of a chain, with the time of the end of the last one.
+/// Schedule of faults of a chain, and the time at which the last fault ends.
 #[derive(Clone, Debug)]
 pub(crate) struct Schedule {
     pub(crate) kind: Kind,

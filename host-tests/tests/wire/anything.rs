@@ -107,8 +107,8 @@ struct Step {
     right_mission: bool,
     /// Offset of the message's pass number from the expected one.
     ///
-    /// A pass is a round of messages along the chain. The expected number is that of the next pass, or for an answer
-    /// that of the last one.
+    /// A pass is a round of messages along the chain. A message along the chain is expected to have the number of the
+    /// next pass; its answer, the number of the pass sent last.
     off: i16,
     tame: bool,
     /// Time until the next step, ms.
@@ -209,8 +209,9 @@ impl Flight {
     }
 }
 
-/// Sends random messages to relay `own` of eight, and checks its bounds. All statistics counters in `expected` must
-/// occur.
+/// Sends random messages to relay `own` of eight. Checks that its setpoint stays within the mission's limits.
+///
+/// `expected` has the causes of a change of setpoint or view that must occur, each several times.
 fn led_by_anything(mission: MissionConfig, own: u16, expected: &[&str]) {
     let seen: Cell<BTreeMap<&str, u32>> = Cell::new(BTreeMap::new());
     let ports = ways(mission.interference);

@@ -84,7 +84,7 @@ fn a_leader_without_quorum_proposes_at_growing_intervals() {
     }
 }
 
-/// Checks that a hello is answered by a hello only if it requests one.
+/// Checks that a hello is answered by another hello only if it requests an answer.
 ///
 /// If a hello reports a far later membership view, the relay raises the view number in its answer by at most 4096.
 #[test]

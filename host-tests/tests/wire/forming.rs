@@ -87,7 +87,7 @@ fn decided_by(last: &mut Bench, proposal: &WireMessage) -> WireMessage {
 }
 
 /// Checks the quorum: more than half of the earlier view's members, or half of them with its proposer. A view is the
-/// agreed membership of the chain.
+/// agreed membership of the chain. The proposer of the earlier view must be among the half that votes.
 #[test]
 fn a_quorum_is_over_half_or_half_with_the_proposer() {
     for quorum in [true, false] {

@@ -59,8 +59,8 @@ fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Wi
     WireMessage::new(name, &fields)
 }
 
-/// Returns a copy of a collection of relays' profiles (altitude and power), with one more profile. It may also be the
-/// result of a collection.
+/// Returns a copy of a message that collects relays' profiles, or of its result, with one more profile. A profile is
+/// a relay's altitude and power.
 fn with_profile(
     message: &WireMessage,
     name: &str,
@@ -99,7 +99,7 @@ fn a_collection_is_forwarded_and_its_result_returned() {
 
 /// Checks that a relay forwards a full collection of profiles (altitude and power) unchanged.
 ///
-/// The next collection must begin with the relays after the last one in it.
+/// The next collection must begin with the relays that follow the last relay in the full collection.
 #[test]
 fn a_full_roster_is_continued_by_the_next_pass() {
     let config = MissionConfig {

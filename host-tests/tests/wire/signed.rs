@@ -63,7 +63,7 @@ impl DerefMut for SignedBench {
 }
 
 impl SignedBench {
-    /// Creates relay `own` of `mission`, which is idle. It has authenticated the nodes of `peers`, each at its port.
+    /// Creates the idle relay `own` of `mission`. It has authenticated the nodes of `peers`, each at its port.
     pub(crate) fn new(
         mission: Mission,
         own: u16,
@@ -84,7 +84,7 @@ impl SignedBench {
         met
     }
 
-    /// Creates relay 4 of eight in the paper's scenario, which has authenticated both neighbours.
+    /// Creates relay 4 of eight in the paper's scenario. Relay 4 has authenticated both neighbours.
     pub(crate) fn fourth() -> Self {
         Self::fourth_with(settings(Wiring::Pair))
     }

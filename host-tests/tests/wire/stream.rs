@@ -183,7 +183,7 @@ fn empty_frames_are_ignored() {
 }
 
 /// Draws streams of pieces of frames, or of random bytes. One in 64 of the random bytes is a delimiter, and half of
-/// them are small, so that the stream has short runs and frequent zeros.
+/// the random bytes are small, so that the stream has short runs and frequent zeros.
 fn streams() -> impl Strategy<Value = Vec<u8>> {
     let byte = any::<[u8; 2]>().prop_map(|draw| match draw {
         [_, 0..4] => 0,

@@ -11,7 +11,7 @@ use super::offer::{mission_id, upload};
 use super::signed::{NOW, SignedBench, settings};
 use super::votes::*;
 
-/// Returns an offer of version 2 with the interferer at another y.
+/// Returns an offer of version 2 with the interferer at `y_m` in place of its usual y.
 fn offer_with_y(base: u16, y_m: u8) -> WireMessage {
     upload(2, base).with(json!({ "interferer_y_m": y_m }))
 }

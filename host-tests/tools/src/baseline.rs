@@ -72,7 +72,7 @@ const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m from Tx, that maximise the weakest received signal, without interference.
 ///
-/// All relays get the altitude and power of the first one. Empty without relays. The cost is that of computing the
+/// All relays get the altitude and power of the first relay. Empty without relays. The cost is that of computing the
 /// length of a chain 200 times.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
@@ -108,7 +108,7 @@ struct Hops<'a> {
 impl Hops<'_> {
     /// Returns the largest power, W, that both the first and the last hop can receive.
     ///
-    /// Each receives most if its relay is right above Tx or Rx.
+    /// These hops receive most with their relays right above Tx and Rx.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)

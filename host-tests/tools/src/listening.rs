@@ -99,7 +99,7 @@ impl RandomScene {
 
     /// Simulates a chain that knows the interferer, and returns the positions of its relays.
     ///
-    /// If there are several, it knows the paper's hypothetical interferer instead of them.
+    /// If there are several interferers, the chain knows the paper's hypothetical interferer instead of them.
     pub fn known_positions(&self) -> Result<Vec<Placement>, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-6)?;
         let outcome = run(Setup::new(told))?;
@@ -157,12 +157,12 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
 /// Largest number of agreements, based on measurements, after which the figure shows the SIR.
 pub const LAST: usize = 8;
 
-/// Ratios of the SIR to the best possible one, after 0, 1, 2 and more agreements that use measurements.
+/// Ratios of the SIR to the best possible SIR, after 0, 1, 2 and more agreements that use measurements.
 ///
 /// Each list has one ratio for each random experiment.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// Simulates `scenes` random experiments; returns each chain's SIR over the best possible one.
+/// Simulates `scenes` random experiments; returns ratios of the chains' SIRs to the best possible SIRs.
 ///
 /// There is a ratio after each agreement on positions. `setup` returns the simulation of an experiment.
 pub fn shares(
@@ -205,7 +205,7 @@ pub fn shadowed(wild: &RandomScene) -> Result<Setup, FigureError> {
 
 /// Returns a simulation without measurements, whose relays know the interferer.
 ///
-/// For several interferers they know the paper's hypothetical one instead.
+/// If there are several interferers, the relays know the paper's hypothetical interferer instead of them.
 pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     let mut setup = unknown(wild)?;
     (setup.mission, _) = mission(&wild.scenario, wild.relays, 1e-4)?;
@@ -229,9 +229,9 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
 /// Time after the start of a run from which its SIRs count, s.
 const BEGUN_S: u32 = 60;
 
-/// Mean ratios of the SIR to the best possible one while the interferer moves, one for each experiment.
+/// Mean ratios of the SIR to the best possible SIR at the same moment, one for each experiment.
 ///
-/// The first minute of a run does not count. The best possible SIR is that of the same moment.
+/// The interferer moves. The first minute of a run does not count.
 #[derive(Clone, Debug, Default)]
 pub struct MovingShares {
     /// Mean ratios of chains that track the interferer, one for each experiment.
@@ -243,7 +243,7 @@ pub struct MovingShares {
 
 /// Simulates `scenes` experiments in which an interferer moves past the line Tx-Rx, 300 m away from it.
 ///
-/// Returns the mean ratios of the SIR to the best possible one, for chains that track the interferer and for chains
+/// Returns the mean ratios of the SIR to the best possible SIR, for chains that track the interferer and for chains
 /// that do not move.
 pub fn moving_shares(
     scenes: u64,

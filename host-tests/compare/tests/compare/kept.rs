@@ -34,9 +34,9 @@ fn results_contain_the_stored_run() {
 
 /// Checks in the recorded run that SLSQP takes at least 20 times as long as this crate.
 ///
-/// SLSQP is run from its best start alone: the equal spacing from which it reaches this crate's SIR soonest. The
-/// problems have eight and fifty relays with free altitudes. Problems with lateral offsets are not checked, because
-/// this crate itself takes more time there: it tries more than twice as many starts.
+/// SLSQP runs from a single start: of all equally spaced chains, the one from which it reaches this crate's SIR
+/// soonest. The problems have eight and fifty relays with free altitudes. Problems with lateral offsets are not
+/// checked, because this crate itself takes more time there: it tries more than twice as many starts.
 #[test]
 fn slsqp_from_one_start_takes_20_times_our_time() {
     let kept = include_str!("../../rivals/measured.json");

@@ -86,7 +86,7 @@ fn interface(block: &InterfaceDescriptionBlock<'_>) -> Interface {
     interface
 }
 
-/// Passes the frames in a captured packet to `take`. This project's captures have exactly one in each packet.
+/// Passes the frames in a captured packet to `take`. This project's captures have exactly one frame in each packet.
 fn pieces<E>(
     packet: &EnhancedPacketBlock<'_>,
     interface: &Interface,

@@ -6,8 +6,8 @@ use super::{Chain, Member};
 
 /// Limit of the number of rounds until all relays agree; in a round each relay receives one frame.
 ///
-/// It is enough for the slowest agreement: a few minutes of virtual time on probation with frequent hellos, and then
-/// 24 passes of messages along 4 relays.
+/// It is enough for the slowest agreement: a few minutes of virtual time in which links that were lost repeatedly are
+/// not used, and then 24 passes of messages along 4 relays.
 const PATIENCE: usize = 40_000;
 
 impl Chain {

@@ -25,9 +25,9 @@ const MAX_OPERATIONS: usize = 256;
 /// named values.
 const MAX_FRAMES: usize = 26;
 
-/// Maximum distance of a flight target from the line Tx-Rx, m: 5 km.
+/// Maximum distance of a flight target from the line Tx-Rx, m: 5 km, and 40 m of error.
 ///
-/// It includes the error of a flat earth at that distance, 40 m.
+/// The error comes from the assumption of a flat earth.
 const AROUND_M: f64 = 5_040.0;
 
 /// Surveyed position of Tx: latitude and longitude in degrees, height in m above the sea.
@@ -232,7 +232,7 @@ impl Link {
         }
     }
 
-    /// Delivers a heartbeat of a PX4, an ArduCopter or another system, in any mode.
+    /// Delivers a heartbeat to the link, from a PX4, an ArduCopter or another system, in any flight mode.
     fn heartbeat(&mut self, input: &mut Input<'_>) {
         let autopilot = match input.below(8) {
             0..=3 => 12,
@@ -252,7 +252,7 @@ impl Link {
         self.deliver_frame(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
-    /// Reports a lost relay to the link, and delivers an operator's command to clear that relay or others.
+    /// Reports a lost relay to the link, and delivers an operator's command that lost drones are gone.
     fn clear_lost_relay(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {
@@ -279,7 +279,7 @@ impl Link {
         self.deliver_frame(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
-    /// Delivers the drone's position, perhaps with a delayed or wrong time stamp.
+    /// Delivers the drone's position to the link, perhaps with a delayed or wrong time stamp.
     fn position(&mut self, input: &mut Input<'_>, place: Placement) {
         let clock = input.byte();
         let Some(point) = self.axis.point(place) else {
@@ -351,9 +351,9 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// Checks a frame sent by the link, from which the signature was removed.
+    /// Checks a frame sent by the link, after the removal of the frame's signature.
     ///
-    /// `covered_flags` are the flags that its checksum covers.
+    /// `covered_flags` are the flags that the frame's checksum covers.
     fn check_frame(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()

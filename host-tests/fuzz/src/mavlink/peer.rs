@@ -235,7 +235,7 @@ fn read(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(stamp)
 }
 
-/// Returns an unsigned frame with a signature. Its checksum is computed again, because it covers the signed flag.
+/// Signs the unsigned frame `frame`. Its checksum is computed again, because it covers the signed flag.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.truncate(frame.len() - 2);

@@ -39,7 +39,7 @@ impl Body<'_, '_> {
         self.float(|input| input.scaled(1e-30, 1e6));
     }
 
-    /// Appends the interference power that an end of the chain has reported, W; 0 for none.
+    /// Appends to the message the interference power that an end of the chain has reported, W; 0 for none.
     fn level_or_none(&mut self) {
         if self.input.flag() {
             self.float(|input| input.scaled(1e-30, 1e6));

@@ -42,7 +42,7 @@ impl Body<'_, '_> {
         self.answer(choice);
     }
 
-    /// Appends the number of the hello that the offer answers: mostly the relay's last hello.
+    /// Appends to the offer the number of the hello that it answers: mostly the relay's last hello.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
             0..240 => self.state.offer_number,
@@ -65,7 +65,9 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends a mission version: the newest stored by the tested relay, one of the next three, or any.
+    /// Appends a mission version to the offer.
+    ///
+    /// It is the newest version stored by the tested relay, one of the next three, or any.
     fn version(&mut self) {
         let held = self.state.held.version;
         let version = match self.input.byte() {
@@ -75,7 +77,7 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends a number of relays: that of the mission loaded into the tested relay before flight, or any.
+    /// Appends a number of relays to the offer: that of the tested relay's mission before flight, or any.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.state.relays,
@@ -84,7 +86,8 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission with another interferer. It permits ranges of altitude and of lateral position.
+    /// Appends the paper's mission, with another interferer, to the offer. The mission permits ranges of altitude and
+    /// of lateral position.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));
@@ -124,7 +127,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, 1e5));
     }
 
-    /// Appends the three path-loss factors of an offer, rarely with one arbitrary number.
+    /// Appends three path-loss factors to the offer. Rarely one of them is an arbitrary number.
     fn losses(&mut self, mut losses: [f64; 3]) {
         let which = usize::from(self.input.byte());
         if let Some(loss) = losses.get_mut(which) {

@@ -37,8 +37,8 @@ pub(super) struct Body<'a, 'b> {
 }
 
 impl Body<'_, '_> {
-    /// Appends the number of a pass, a round of messages along the chain. It is the next, current or an earlier
-    /// number, or any.
+    /// Appends the number of a pass, a round of messages along the chain, to the message. It is the next, the current
+    /// or an earlier number, or any.
     pub(super) fn number(&mut self) {
         let number = match self.input.byte() {
             0..96 => self.state.number.wrapping_add(1),
@@ -58,7 +58,9 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Appends a pass (message round) number, and the digest of mission and view, rarely of another view.
+    /// Appends the number of a pass (message round) to the message, and the digest of mission and view.
+    ///
+    /// The digest is rarely that of another view.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.state.view);
@@ -70,8 +72,9 @@ impl Body<'_, '_> {
         self.word(self.state.flown.wrapping_add(mark));
     }
 
-    /// Appends the name of a view (membership of the chain). It is the tested relay's, one of the next from a
-    /// possible proposer, an earlier one, or any.
+    /// Appends the name of a view (membership of the chain) to the message.
+    ///
+    /// The view is the tested relay's, one of the next from a possible proposer, an earlier one, or any.
     pub(super) fn view(&mut self) {
         let own = self.state.view;
         let view = match self.input.byte() {
@@ -95,7 +98,9 @@ impl Body<'_, '_> {
         self.relay();
     }
 
-    /// Appends a sequence number, as of a heartbeat's request or reply: mostly 0 (none) to 11.
+    /// Appends a sequence number to the message: mostly 0 (none) to 11.
+    ///
+    /// It is the number of a heartbeat's request or reply, or a similar number.
     pub(super) fn request_number(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
@@ -104,7 +109,7 @@ impl Body<'_, '_> {
         self.word(number);
     }
 
-    /// Appends the duration of a lease in tenths of a second, mostly short.
+    /// Appends the duration of a lease, mostly short, to the message. The unit is a tenth of a second.
     pub(super) fn lease(&mut self) {
         let tenths = match self.input.byte() {
             few @ 0..240 => u16::from(few),
@@ -113,7 +118,7 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// Appends a relay's index: mostly that of a relay in a short chain, 0 to 5, else any.
+    /// Appends a relay's index to the message: mostly that of a relay in a short chain, 0 to 5, else any.
     pub(super) fn relay(&mut self) {
         let relay = match self.input.byte() {
             small @ 0..240 => u16::from(small % 6),
@@ -128,7 +133,7 @@ impl Body<'_, '_> {
         number
     }
 
-    /// Appends a byte from `least` to `most`, rarely any byte; returns it.
+    /// Appends a byte from `least` to `most`, rarely any byte, to the message; returns the byte.
     pub(super) fn small(&mut self, least: u8, most: u8) -> u8 {
         let byte = self.input.byte();
         let small = if byte < 240 {
@@ -162,14 +167,15 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
-    /// Appends a lateral position y, m. Either up to 100 m or up to 1e5 m on either side of the line is possible.
+    /// Appends a lateral position y, m, to the message. Its limit on both sides of the line is 100 m in some draws
+    /// and 1e5 m in others.
     pub(super) fn lateral(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// Appends a list of up to `most` floats with its count. All are the same number, or each is drawn from `low` to
-    /// `high`.
+    /// Appends a list of up to `most` floats, with its count, to the message. All floats are the same number, or each
+    /// is drawn from `low` to `high`.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();
@@ -183,7 +189,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the number of a lease renewal, mostly a small one, and a digest.
+    /// Appends the number of a lease renewal, mostly a small one, and a digest to the message.
     ///
     /// The digest is that of the mission and the view (membership of the chain), rarely a wrong one.
     pub(super) fn pulse_number(&mut self) {
@@ -220,9 +226,9 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the session number of a fence, a message of the collision guard.
+    /// Appends the session number of a fence, a message of the collision guard, to the message.
     ///
-    /// It is that of the tested relay, a small number, or any.
+    /// The number is that of the tested relay, a small number, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),

@@ -13,7 +13,7 @@ const NEAR: u16 = 4;
 /// Network number of every fuzzed relay.
 pub const NETWORK: u16 = 9;
 
-/// Checker of a relay's frames, with the last numbers that they contained.
+/// Checker of the frames of a relay. It keeps the numbers in the relay's last frames.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
     /// Node number of the relay.

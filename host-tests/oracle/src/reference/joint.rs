@@ -11,7 +11,7 @@ use super::link::{Link, received_w};
 /// Limits of the relays' positions across the line Tx-Rx: ranges of altitude and of lateral position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
-    /// Lowest altitude above the ground of Tx, Rx and the interferer, m, > 0.
+    /// Lowest altitude of a relay, m, > 0. All altitudes are above the ground on which Tx, Rx and the interferer are.
     pub least_m: f64,
     /// Highest altitude of a relay, m, >= `least_m`.
     pub most_m: f64,

@@ -3,7 +3,7 @@
 /// Relay in a reference link: altitude and transmit power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relay {
-    /// Altitude above the ground of Tx, Rx and the interferer, m, > 0.
+    /// Altitude of the relay, m, > 0, above the ground on which Tx, Rx and the interferer are.
     pub altitude_m: f64,
     /// Transmit power, W, > 0.
     pub power_w: f64,

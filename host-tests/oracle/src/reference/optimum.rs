@@ -9,11 +9,11 @@ const TOLERANCE: f64 = 1e-13;
 const LEAST_TARGET: f64 = 1e-250;
 
 impl Link {
-    /// Returns the best SIR (linear) of all chains, to 1e-13 relative: the largest target met.
+    /// Returns the best SIR (linear) of all chains: the largest target SIR that a chain meets.
     ///
-    /// `None` without relays, or if every chain has an SIR of zero. If all relays share one altitude, only the chain
-    /// with every relay as far along as possible is tried for a target, otherwise all positions of each relay. About
-    /// 50 to 60 targets are tried.
+    /// The result is accurate to 1e-13 relative. `None` without relays, or if every chain has an SIR of zero. About
+    /// 50 to 60 targets are tried. If all relays share one altitude, a target is tried with one chain only, in which
+    /// every relay is as far along as possible. Otherwise all positions of each relay are considered.
     pub fn optimum(&self) -> Option<f64> {
         let mut heights = self.relays.iter().map(|relay| relay.altitude_m);
         let first = heights.next()?;
@@ -73,8 +73,9 @@ impl Link {
     /// Runs the paper's fixed-step search: lowers the target SIR by `epsilon` until a chain meets it.
     ///
     /// Returns the number of targets tried and the last one (linear). `None` if no target can be met. The first
-    /// target is the lesser of the SIRs above Tx and above Rx; for an interferer behind Tx (X < 0) the first hop's
-    /// best SIR replaces the one above Tx. Each target costs one chain. `epsilon` is linear, > 0.
+    /// target is the smaller of two SIRs: that of the first hop with relay 1 straight above Tx, and that of the last
+    /// hop with relay N straight above Rx. For an interferer behind Tx (X < 0), the first hop's best SIR replaces the
+    /// one above Tx. Each target costs one chain. `epsilon` is linear, > 0.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

@@ -49,7 +49,7 @@ impl Link {
     /// Returns the positions, m, of the greedy chain for a target SIR (linear). Each relay goes as far as `target`
     /// allows.
     ///
-    /// `None` if a relay has no position or Rx is out of the last one's reach. The on-board protocol does the same
+    /// `None` if a relay has no position or Rx is out of reach of the last relay. The on-board protocol does the same
     /// with a target. If all relays share one altitude, `None` proves that no chain meets the target; otherwise see
     /// [`Link::placement`]. N reaches.
     pub fn feasible(&self, target: f64) -> Option<Vec<f64>> {

@@ -11,9 +11,9 @@ impl Link {
     /// Returns the best SIR (linear) of all chains with the minimum separation, by brute force. The grids are nested
     /// and refined.
     ///
-    /// 0 if there is none. `points` (>= 16) is the number of grid points per relay. Never more than the optimum
-    /// except for rounding; the grid may miss part of it. Costs about (4 `points` + 170)^N SIR evaluations: use it
-    /// for N of 1 or 2.
+    /// 0 if there is no such chain. `points` (>= 16) is the number of grid points per relay. The result may be below
+    /// the optimum, because the grid may miss it, but is not above, except for rounding. Costs about (4 `points` +
+    /// 170)^N SIR evaluations: use it for N of 1 or 2.
     pub fn optimum_by_search(&self, points: u32) -> f64 {
         self.best_from(1, 0.0, points)
     }
@@ -34,8 +34,8 @@ impl Link {
         maximum(&self.grid(from, points), worst_hop)
     }
 
-    /// Returns the grid of positions from `from_x` to Rx, m. It is even, and denser near both ends and the
-    /// interferer.
+    /// Returns the grid of positions from `from_x` to Rx, m. It has evenly spaced points, and further points that get
+    /// denser toward both ends and the interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);

@@ -17,7 +17,7 @@ use crate::simulator::fleet::{FleetSpec, Takeover, somewhere};
 use crate::simulator::medium::Access;
 use crate::simulator::setup::{Partition, Setup};
 
-/// Command-line options for events in the air.
+/// Command-line options for failures and reboots of relays, partitions of the chain, and radio attacks.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Hostile air")]
 #[expect(
@@ -323,7 +323,7 @@ impl Air {
         self.deaf.iter().map(name)
     }
 
-    /// Returns the time when each `--deaf` failure ends, or starts if it is permanent, and a `--soak` ends.
+    /// Returns the end of each `--deaf` failure (its start if permanent), and the end of a `--soak`.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.deaf
             .iter()

@@ -219,7 +219,8 @@ impl Listening {
         }
     }
 
-    /// Hides the interferers of `scenario` from the relays, if `--listen` is given. They have to locate them.
+    /// Hides the interferers of `scenario` from the relays, if `--listen` is given. The relays then have to locate
+    /// them.
     ///
     /// `uavs` is the number of relays. Without `--listen`, `setup` stays as it is.
     pub fn prepare(

@@ -40,8 +40,8 @@ pub enum Refused {
     Failed(Failure),
     /// The distance from Tx to Rx is too short for the relays, as the report says.
     ///
-    /// The second value is `Some` for the default scenario, which the user cannot change: it is an error in the
-    /// option `--uavs`.
+    /// The second value is `Some` for the default scenario: the user cannot change that scenario, so the option
+    /// `--uavs` is reported as wrong.
     Reported(Box<ChainReport>, Option<Failure>),
 }
 

@@ -50,7 +50,9 @@ pub struct ChainReport {
     /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best possible linear SIR, 0, if no placement gives every hop a SIR above 0. Absent in all other cases.
+    /// Linear SIR of the best possible placement; present only if this SIR is 0.
+    ///
+    /// Then no placement gives every hop an SIR above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
     /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
@@ -417,8 +419,8 @@ pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
         .unwrap_or(setup.mission)
 }
 
-/// Returns the version of the mission that the chain flies at the end. If the relays' versions differ, it is the
-/// newest one.
+/// Returns the version of the mission that the chain flies at the end. If the relays' versions differ, returns the
+/// newest version.
 pub(super) fn version(outcome: &Outcome) -> u16 {
     let chain = left(outcome);
     let versions = chain.iter().map(|(_, relay)| relay.version);
@@ -540,7 +542,7 @@ pub struct AvailabilityReport {
 }
 
 impl AvailabilityReport {
-    /// Creates the report of the statistics `watched`.
+    /// Creates the report of the availability from the statistics `watched` of a run.
     pub fn of(watched: Watched) -> Self {
         let longest = watched.longest_wrong;
         Self {
@@ -667,14 +669,16 @@ pub struct AllInterferersReport {
     pub all_sir: f64,
     /// SIR of the worst hop with all interferers of the scenario, dB.
     pub all_sir_db: f64,
-    /// Relative loss of SIR by the assumption of a single interferer: 1 - `all_sir` / SIR with that one.
+    /// Relative loss of SIR by the assumption of a single interferer.
     ///
-    /// It is negative if the SIR with all interferers is higher.
+    /// It is 1 - `all_sir` / SIR with the single interferer. It is negative if the SIR with all interferers is
+    /// higher.
     pub all_loss: f64,
 }
 
 impl AllInterferersReport {
-    /// Computes the SIR of `relays` with all interferers. `sir` is the SIR with the single one that they assume.
+    /// Computes the SIR of `relays` with all interferers. `sir` is the SIR with the single interferer that the relays
+    /// assume.
     ///
     /// `None` if the scenario has a single interferer or a random field.
     pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {

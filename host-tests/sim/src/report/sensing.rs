@@ -29,7 +29,7 @@ pub struct BelievedReport {
 /// Quality of the relays' interference estimate, and of the positions chosen with it.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct SensingReport {
-    /// Estimated interferer of relay 1 at the end; absent without an estimate.
+    /// Interferer as relay 1 estimates it at the end of the run; absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed: Option<BelievedReport>,
     /// Number of times that the relays agreed on new positions, including the first.
@@ -37,7 +37,7 @@ pub struct SensingReport {
     /// Linear SIR of the worst hop at the end, with the true interferers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub true_sir: Option<f64>,
-    /// Linear SIR that the same relays reach if they know the interferer; only for a single interferer.
+    /// Linear SIR that the relays reach if they know the interferer; only for a single interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimum_sir: Option<f64>,
     /// Ratio of the true SIR at the end to the SIR with a known interferer: `true_sir` / `optimum_sir`.

@@ -517,7 +517,7 @@ fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant>
     gone.into_iter().chain(come).min()
 }
 
-/// Returns the first log entry in which a relay detects the loss or return of another one.
+/// Returns the first log entry in which a relay detects the loss or return of another relay.
 ///
 /// `lost` and `back` are the numbers of lost and returned relays.
 fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'a Moment> {
@@ -530,7 +530,7 @@ fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'
     })
 }
 
-/// Returns the last entry in which one of `members` accepts a position; `None` unless all accept one.
+/// Returns the last entry in which a member accepts a position; `None` unless every member does.
 fn convergence<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed = |moment: &&Moment| {
         moment.what == TimelineEvent::Converged && members.contains(&moment.relay)

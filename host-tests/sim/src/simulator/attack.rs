@@ -43,9 +43,9 @@ pub enum AttackKind {
 /// Counts of the attacker's frames by how the receiving relays classified them.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct AttackCounts {
-    /// Number of frames by kind, and by the counter in [`Stats`] that each incremented at its receiver.
+    /// Number of frames by kind, and by the counter in [`Stats`] that a frame incremented at its receiver.
     ///
-    /// The counter `received` means that the receiver accepted the frame as one of a neighbour.
+    /// The counter `received` means that the receiver accepted the frame as a frame of a neighbour.
     pub counted: BTreeMap<(AttackKind, &'static str), u64>,
 }
 

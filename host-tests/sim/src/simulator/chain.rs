@@ -30,7 +30,7 @@ use fleet::LANDS_AFTER;
 use ground::{Station, stations};
 use judge::ChangedRelays;
 
-/// Largest number of events in a run, which takes some minutes to compute. It ends runs that never settle.
+/// Largest number of events in a run. The limit ends runs that never settle, after some minutes of computing.
 const MAX_EVENTS: u64 = 400_000_000;
 
 impl Chain {
@@ -408,7 +408,7 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults. The statistics compare the positions of this chain with the positions
+    /// `run` simulates a chain without faults. The statistics compare the positions of the created chain with those
     /// from `run`.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);

@@ -61,7 +61,9 @@ impl FlightSpec {
         }
     }
 
-    /// Creates the parameters of drones with 10 m/s and 3 m/s^2. They report their positions five times a second.
+    /// Creates the parameters of drones with a speed of 10 m/s and an acceleration of 3 m/s^2.
+    ///
+    /// They report their positions five times a second.
     pub fn multicopters(start: Vec<Point>, bias_m: f64, noise_m: f64) -> Self {
         Self {
             speed_mps: vec![10.0; start.len()],

@@ -19,7 +19,8 @@ pub struct Takeover {
     pub from: Instant,
     /// End of the takeover; `None` if it is permanent.
     ///
-    /// At the end the pilot hands the drone back to its relay, as soon as it hovers and no other drone moves near it.
+    /// At the end the pilot hands the drone back to its relay, as soon as the drone hovers and no other drone moves
+    /// nearby.
     pub until: Option<Instant>,
     /// Position to which the pilot flies the drone: along the run's line, to its right and up, m.
     ///
@@ -139,7 +140,7 @@ pub(super) struct Vehicle {
     goal: Point,
     /// Height at which the pilot first hands the drone to its relay, m.
     climbs_to_m: f64,
-    /// True while the pilot sees no other drone moving near this one.
+    /// True while the pilot of this drone sees no other drone moving nearby.
     pub(super) is_clear: bool,
     last_target_at: Option<Instant>,
     /// True while a PX4 is in its failsafe. It resumes OFFBOARD once it receives a stream of targets again.
@@ -149,9 +150,10 @@ pub(super) struct Vehicle {
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Time until which position targets that the autopilot may not receive are no error of the relay.
+    /// Time until which forbidden position targets of the relay do not count as errors.
     ///
-    /// The autopilot has changed its mode or state, and the relay may not know yet.
+    /// The autopilot has changed its mode or state, so that it no longer accepts targets, and the relay may not know
+    /// yet.
     unknown_until: Instant,
     pub(super) strays: u64,
     rng: ChaCha8Rng,
@@ -271,7 +273,8 @@ impl Vehicle {
         self.pilot.schedule_hand_over_after_restart(now);
     }
 
-    /// Restarts the relay's side of the MAVLink connection, as after a reboot of the relay. Its state is lost.
+    /// Restarts the relay's side of the MAVLink connection, as after a reboot of the relay. The state of the
+    /// connection is lost.
     pub(super) fn boot(&mut self, now: Instant) {
         self.link = Autopilot::new(self.spec.axis, Pace::default(), now);
         self.sites = None;
@@ -317,8 +320,8 @@ impl Vehicle {
 
     /// Updates the flight mode and the flight state, which the pilot and the autopilot decide.
     ///
-    /// After a change, position targets of the relay count as allowed for some time, until it must have learned of
-    /// the change.
+    /// After a change, position targets of the relay count as allowed for some time, until the relay must have
+    /// learned of the change.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);
@@ -500,7 +503,7 @@ const NEXT_MS: u64 = 500;
 
 /// Delay before a pilot hands the drone to its relay, s, after the climb and after a failed attempt.
 const LOOKS_S: u64 = 2;
-/// Delay, s, before a pilot hands the drone to its relay again, from a restart of autopilot or relay.
+/// Delay from a restart of autopilot or relay to the pilot's next hand-over to the relay, s.
 const RECOVERS_S: u64 = 10;
 
 /// Flight mode of a drone: who controls it.

@@ -44,8 +44,9 @@ pub struct Sent {
 enum Reception {
     Clean,
     Collided,
-    /// The node does not receive the frame, because its own radio sends or turns to sending. Also if the sender is
-    /// switched off.
+    /// The node does not receive the frame, because its own radio sends or turns to sending.
+    ///
+    /// Frames whose sender is switched off meanwhile count here, too.
     Unheard,
 }
 
@@ -309,7 +310,7 @@ pub const HEADER: usize = 6;
 
 /// Time in which a radio turns from receiving to sending, in bytes: `aTurnaroundTime`, 12 symbols.
 ///
-/// It neither sends nor receives meanwhile.
+/// The radio neither sends nor receives meanwhile.
 pub const TURNAROUND: usize = 6;
 
 /// Time on the air that a frame takes in addition to its bytes, as a number of bytes.

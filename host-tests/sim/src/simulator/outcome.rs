@@ -24,7 +24,7 @@ pub enum TimelineEvent {
     Booted,
     /// The relay lost its neighbour at this side, toward Tx or toward Rx.
     Lost(Side),
-    /// The relay receives a new neighbour at this side (toward Tx or toward Rx), or again a lost one.
+    /// The relay receives a new neighbour at this side (toward Tx or Rx), or a lost neighbour again.
     Found(Side),
     /// The relay accepted a new view: a new membership of the chain.
     ViewAccepted {
@@ -39,7 +39,7 @@ pub enum TimelineEvent {
     },
     /// The relay found that too few relays reach each other for a quorum, so no view can form.
     NoQuorum,
-    /// The relay's lease expired: it may no longer rely on the last agreement.
+    /// The relay's lease expired: the relay may no longer rely on the last agreement.
     LeaseLapsed,
     /// Another node reports that it does not receive the relay.
     NotHeard,

@@ -95,7 +95,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Records the state of relay `relay` (from 0) at the time `at`, if it differs from the last one.
+    /// Records the state of relay `relay` (from 0) at time `at`, unless it is like the last recorded one.
     pub fn see(&mut self, at: Instant, relay: usize, state: RelayState) {
         let known = self.latest.get(&relay);
         if known.is_none_or(|known| !known.is_like(&state)) {
@@ -104,7 +104,9 @@ impl Track {
         }
     }
 
-    /// Returns this record with each relay at its position in `places`, m, whenever it has a position.
+    /// Returns this record with other positions: each position of relay k becomes `places[k]`, m.
+    ///
+    /// States in which a relay has no position keep none.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -230,7 +232,7 @@ impl Window {
         self.anchor + since.div_ceil(self.frame) * self.frame
     }
 
-    /// Returns the slot time, ps, from the first TDMA frame to `at`: the total duration of slots in it.
+    /// Returns the slot time, ps, until `at`: the total duration of slots since the first TDMA frame.
     fn elapsed(&self, at: Ps) -> Ps {
         let since = at.saturating_sub(self.anchor);
         let (frames, into) = (since / self.frame, since % self.frame);
@@ -242,7 +244,7 @@ impl Window {
         self.elapsed(until) - self.elapsed(from)
     }
 
-    /// Returns the end of a transmission that goes on at `from` and needs `duration` of slot time, above 0.
+    /// Returns the end of a transmission that needs `duration` of slot time, above 0, from `from` on.
     pub fn ends(&self, from: Ps, duration: Ps) -> Ps {
         let due = u128::from(self.elapsed(from)) + u128::from(duration) - 1;
         let open_for = u128::from(self.open_for);
@@ -285,7 +287,7 @@ pub enum ChainState {
 /// the promised rates.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Period {
-    /// Start of the period, ps. It ends where the next one starts.
+    /// Start of the period, ps. The period ends where the next period starts.
     pub from: Ps,
     /// Number of relays in the view (membership of the chain).
     pub relays: u16,
@@ -327,7 +329,7 @@ pub struct Route {
 struct Members {
     view: ViewId,
     version: u16,
-    /// Number (from 0) and state of each relay in the view, in the order of the indices in it.
+    /// Number (from 0) and state of each relay in the view, in the order of the view's indices.
     ///
     /// `None` for a relay that is off or has not accepted the view.
     relays: Vec<Option<(usize, RelayState)>>,
@@ -458,7 +460,7 @@ impl DataLink {
         self.radio.link.access == Access::Fitted && self.reverse > 0.0
     }
 
-    /// Returns the time slots of each direction's hops, from `anchor` on, for the linear SIRs of the hops.
+    /// Returns the time slots of each direction's hops, from time `anchor` on, for the hops' linear SIRs.
     fn windows(&self, anchor: Ps, sirs: &[Vec<f64>]) -> Vec<Vec<Window>> {
         let packets: Vec<Vec<Option<Ps>>> = sirs
             .iter()
@@ -580,7 +582,7 @@ pub fn route(
 }
 
 impl Route {
-    /// Adds `stage` with the hops between `members`, unless the relays have not agreed on positions yet.
+    /// Adds `stage`, with the hops between `members`, to the route, unless there is no agreement yet.
     fn add(
         &mut self,
         mut stage: Stage,

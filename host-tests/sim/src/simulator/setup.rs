@@ -49,7 +49,7 @@ pub struct UploadSpec {
 pub struct Channel {
     /// Data rate of the link or the channel, bit/s.
     pub baud: u32,
-    /// Largest number of relays that receive each other at one point, including the relay itself.
+    /// Largest number of relays within radio range of one relay, including that relay itself.
     ///
     /// It is 1 for separate lines.
     pub in_range: usize,
@@ -109,13 +109,15 @@ pub struct Setup {
     ///
     /// Otherwise it is at least [`Bursts::shortest`](super::faults::Bursts::shortest).
     pub burst: f64,
-    /// One-way link failures: periods in which one relay does not receive another one.
+    /// One-way link failures: periods in which one relay does not receive another relay.
     pub deaf: Vec<OneWayFailure>,
     /// True interferers, which relays measure and have to locate; `None` if relays do not measure them.
     pub true_interference: Option<TrueInterference>,
-    /// Fixed end of the run; its availability is then measured. `None` to end the run when the chain settles.
+    /// Fixed end of the run; `None` to end the run when the chain settles.
+    ///
+    /// With a fixed end, the run measures the availability of the chain.
     pub soak: Option<Instant>,
-    /// Time from which links cause no more faults; `None` if they do to the end.
+    /// Time from which links cause no more faults; `None` if they cause faults to the end.
     pub faults_end: Option<Instant>,
     /// True to record all frames, for [`Chain::frames`](super::chain::Chain::frames).
     pub record: bool,
@@ -179,7 +181,7 @@ impl Setup {
         setup
     }
 
-    /// Changes the setup so that the run ends at `until` and its availability is measured.
+    /// Changes the setup so that the run ends at `until` and the availability of the chain is measured.
     pub fn soaked(mut self, until: Instant) -> Self {
         self.soak = Some(until);
         self.deadline = until;
@@ -206,7 +208,7 @@ impl Setup {
         }
     }
 
-    /// Returns the number of relays that share the channel at one point, and the overhead of a frame.
+    /// Returns the number of relays that share the channel within radio range, and a frame's overhead.
     ///
     /// `None` if senders do not interfere with each other: on separate lines and on an ideal channel.
     pub fn load(&self) -> Option<ChannelLoad> {

@@ -24,7 +24,7 @@ pub struct TrueInterference {
     pub once: bool,
     /// Samples that relays get in place of all measurements: the relay's number from 1, and the sample.
     ///
-    /// They get these at the time of the first measurement.
+    /// The relays get these samples at the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
     /// Measuring receivers that report wrong powers.
     pub broken: Vec<BrokenReceiver>,
@@ -46,7 +46,7 @@ pub struct TrueInterference {
 pub struct BrokenReceiver {
     /// Number of the node with the wrong receiver: a relay from 1, 0 for Tx, N + 1 for Rx.
     pub node: u16,
-    /// Power that the receiver reports instead of the true one.
+    /// Power that the receiver reports instead of the true power.
     pub reading: BrokenReading,
     /// Time from which the reported powers are wrong.
     pub since: Instant,
@@ -179,8 +179,8 @@ pub struct Snapshot {
     pub at: Instant,
     /// Numbers of the relays that are on, from 1.
     pub nodes: Vec<u16>,
-    /// Positions of the relays that are on and have one. Each is the position of the drone or, without drones, the
-    /// setpoint.
+    /// Positions of the relays that are on and have a position. Each is the position of the drone or, without drones,
+    /// the setpoint.
     pub places: Vec<Placement>,
     /// Setpoints of all relays; `None` unless every relay has one.
     pub goals: Option<Vec<Placement>>,

@@ -32,7 +32,9 @@ impl Canvas {
         canvas
     }
 
-    /// Writes the document's title for screen readers, `words`, the style sheet and the white background.
+    /// Writes the beginning of the document: the style sheet, the white background, and the title `words`.
+    ///
+    /// Screen readers read the title.
     pub(super) fn describe(&mut self, words: &str) {
         let words = escape(words);
         self.put(format_args!(
@@ -380,7 +382,7 @@ impl Labels {
         !self.taken.iter().any(|area| area.crossed(line))
     }
 
-    /// Marks the area as occupied if it is inside the plot and free. Returns true if it was.
+    /// Marks the area as occupied if it is inside the plot and free; returns false if it is not.
     pub(super) fn try_take(&mut self, area: Area) -> bool {
         let free = area.inside(&self.plot)
             && !self.taken.iter().any(|other| area.meets(other))

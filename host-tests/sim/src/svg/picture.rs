@@ -100,8 +100,8 @@ impl LateralView {
 
 /// Returns the contents of a view from above; `None` if it would show nothing beside the line.
 ///
-/// They are the lateral limits in `mission` and the relays' lateral offsets `y_m`, m. `None` if relays must stay on
-/// the line and no near interferer is beside it.
+/// The contents are the lateral limits in `mission` and the relays' lateral offsets `y_m`, m. `None` if relays must
+/// stay on the line and no near interferer is beside it.
 pub fn lateral_view(
     mission: &Mission,
     y_m: impl IntoIterator<Item = f64>,

@@ -71,7 +71,7 @@ fn description((power, x, y): Source) -> String {
 
 /// Returns the earlier or estimated interferers to draw, each with its x in picture units.
 ///
-/// An earlier interferer is left out if the symbol of a present one would cover it.
+/// An earlier interferer is left out if the symbol of a present interferer would cover it.
 fn past_or_estimated(picture: &Picture, frame: &Frame) -> Vec<(f64, Source)> {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     let (before, _) = sorted(&picture.others, length(picture));

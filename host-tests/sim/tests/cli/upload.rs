@@ -179,9 +179,9 @@ fn a_reboot_with_or_without_a_store_ends_in_the_new_mission() {
     }
 }
 
-/// Checks that the remaining relays fly an uploaded mission, whenever a relay is lost.
+/// Checks that the remaining relays fly an uploaded mission if one relay is lost.
 ///
-/// It is lost before, during or after the upload.
+/// The relay is lost before, during or after the upload.
 #[test]
 fn the_remaining_relays_fly_the_upload() {
     let folder = tempfile::tempdir().unwrap();

@@ -12,7 +12,7 @@ use super::walk::{Flown, fly};
 /// Number of relays in the figures of Algorithm 2.
 pub const RELAYS: u16 = 50;
 
-/// Common altitude of the relays before Algorithm 2, m: the paper's best one.
+/// Common altitude of the relays before Algorithm 2, m: the paper's best altitude.
 pub const START_M: f64 = 220.0;
 
 /// Largest change of a relay's altitude in one round of Algorithm 2, m.
@@ -39,7 +39,7 @@ struct ShapeRow {
 /// Table row: SIR of the chain after one round of Algorithm 2, with two kinds of search.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct RoundRow {
-    /// Round number of Algorithm 2; 0 is the chain of Algorithm 1 before it.
+    /// Round number of Algorithm 2; 0 stands for the chain before the first round.
     round: u16,
     /// SIR of the worst hop with the coarse-to-fine search, linear.
     sir_fine_linear: f32,

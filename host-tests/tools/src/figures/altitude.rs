@@ -27,11 +27,11 @@ struct Row {
     sir_linear: f64,
     /// SIR of the worst hop, linear, if the target falls by the paper's fixed step of 0.1.
     ///
-    /// Only for altitudes near the paper's best one, otherwise `None`.
+    /// Only for altitudes near the paper's best altitude, otherwise `None`.
     sir_by_step_linear: Option<f64>,
 }
 
-/// Lowest and highest altitude, m, of the close-up around the paper's best one, in steps of 0.5 m.
+/// Lowest and highest altitude, m, of the close-up around the paper's best altitude, in steps of 0.5 m.
 const CLOSE_UP_M: (u32, u32) = (195, 230);
 
 /// Computes a table row for each pair of an interferer's offset and a common altitude, both in m.

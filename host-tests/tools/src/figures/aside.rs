@@ -44,9 +44,10 @@ struct Row {
     sir_linear: f32,
 }
 
-/// Table row: best SIRs of one relay with different freedom to leave the line at the lowest altitude.
+/// Table row: best SIRs of one relay, with different freedom to leave its position above the line.
 ///
-/// It may have to stay there, fly higher above the line, or fly beside the line.
+/// The relay is above the line at the lowest altitude, above the line at any altitude, beside the line at the lowest
+/// altitude, or at any position.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,
@@ -102,7 +103,8 @@ fn data(step_m: u16) -> Result<Vec<Row>, FigureError> {
 
 /// Returns the relay's best SIRs for different distances of the interferer from the line.
 ///
-/// The relay is above the line at the lowest altitude or any, or beside the line. The distances are `step_m` apart.
+/// The relay is above the line at the lowest altitude, above it at any altitude, or beside it. The distances are
+/// `step_m` apart.
 fn gains(step_m: u16) -> Result<Vec<PowerRatio>, FigureError> {
     let offsets: Vec<u16> = (0..=MOST_OFFSET_M).step_by(usize::from(step_m)).collect();
     offsets.par_iter().map(|&offset| gain(offset)).collect()

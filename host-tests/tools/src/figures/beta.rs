@@ -18,7 +18,7 @@ pub const STEPS: u32 = 100;
 struct Row {
     alpha: f64,
     beta: f64,
-    /// Ratio of the maximum interference power to the effective one that the relays use, 1 / E[1 / I].
+    /// Ratio of the maximum interference power to the effective power that the relays use, 1 / E[1 / I].
     upsilon_times_i_max: f64,
     /// Interference power I as a fraction of its maximum `I_max`, 0 to 1.
     interference_over_i_max: f64,

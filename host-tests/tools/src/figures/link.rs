@@ -16,26 +16,29 @@ use crate::plan::{Number, Plan, PlanRequest, plan};
 /// Largest number of relays in the figure; every number from 1 to it is drawn.
 pub const MOST_RELAYS: u16 = 24;
 
-/// Table row: SIRs and data rates of one number of relays, for data to Rx and in both directions.
+/// Table row: SIRs and data rates of one number of relays, for data to Rx only and for data both ways.
 ///
-/// In both directions the same SIR or rate is required.
+/// For data both ways, the same SIR or rate is required in each direction.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
     /// SIR of the worst hop to Rx, linear, with the positions that are best for data to Rx.
     one_way_sir_linear: f64,
-    /// SIR of the worst hop of both directions, linear, with the positions that are best for both.
+    /// SIR of the worst hop of both directions, linear, with the best positions for data both ways.
     both_ways_sir_linear: f64,
     /// SIR of the worst hop of both directions, linear, with the positions that are best for data to Rx.
     judged_sir_linear: f64,
-    /// Data rate to Rx in equal time slots, with the positions that are best for it.
+    /// Data rate to Rx in equal time slots, with the positions that give the largest rate.
     one_way_slots_bit_per_s_hz: f64,
-    /// Data rate to Rx in time slots as long as each hop needs, with the positions that are best for it.
+    /// Data rate to Rx in time slots as long as each hop needs, with the positions of the largest rate.
     one_way_fitted_bit_per_s_hz: f64,
-    /// Data rate in either direction at the same time, in equal time slots, with the best positions for it.
+    /// Data rate of each direction if data goes both ways, in equal time slots.
+    ///
+    /// The relays are at the positions that give the largest rate.
     both_ways_slots_bit_per_s_hz: f64,
-    /// Data rate in either direction at the same time, in time slots as long as each hop needs. The positions are the
-    /// best ones for it.
+    /// Data rate of each direction if data goes both ways, in time slots as long as each hop needs.
+    ///
+    /// The relays are at the positions that give the largest rate.
     both_ways_fitted_bit_per_s_hz: f64,
 }
 

@@ -18,30 +18,31 @@ pub const PASSES: u64 = 6;
 /// Speeds of the moving interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// Table row: a chain's SIR as a fraction of the best possible one, after a number of agreements.
+/// Table row: a chain's SIR as a fraction of the best possible SIR, after a number of agreements.
 ///
-/// It is over many random arrangements of the interferers.
+/// The row summarises many random arrangements of the interferers.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct AgreementShare {
     scene: &'static str,
     relays: u16,
     /// Number of agreements on positions that used measurements of the interference.
     agreements: usize,
-    /// Median of the chain's SIR divided by the best possible one, over all arrangements of interferers.
+    /// Median of the chain's SIR divided by the best possible SIR, over all arrangements of interferers.
     median_linear: f64,
-    /// Ratio of the SIR to the best possible one that nine of ten arrangements of interferers reach.
+    /// Ratio of the SIR to the best possible SIR that nine of ten arrangements of interferers reach.
     tenth_linear: f64,
 }
 
-/// Table row: mean SIR relative to the best possible one while the interferer moves at one speed.
+/// Table row: mean SIR relative to the best possible SIR while the interferer moves at one speed.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct Tracked {
     relays: u16,
     speed_mps: f64,
-    /// Mean ratio of SIR to the best possible one at that moment, for a chain that tracks the interferer.
+    /// Mean ratio of the SIR to the best possible SIR of the moment, if the chain tracks the interferer.
     followed_linear: f64,
-    /// Mean ratio of SIR to the best possible one at that moment, for a chain that does not move. It keeps the
-    /// positions that were best after the first minute.
+    /// Mean ratio of the SIR to the best possible SIR of the moment, if the chain does not move.
+    ///
+    /// The chain keeps the positions that were best after the first minute.
     stayed_linear: f64,
 }
 
@@ -62,7 +63,7 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ),
 ];
 
-/// Returns the table rows of the SIR as a fraction of the best possible one, by number of agreements.
+/// Returns the table rows of the SIR as a fraction of the best possible SIR, by number of agreements.
 ///
 /// There is a row for each kind of experiment and number of agreements, over `scenes` random arrangements of the
 /// interferers.
@@ -83,7 +84,7 @@ fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the table rows of the mean SIR relative to the best possible one, by the interferer's speed.
+/// Returns the table rows of the mean SIR relative to the best possible SIR, by the interferer's speed.
 ///
 /// There is a row for each number of relays and speed, over `scenes` random arrangements.
 fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {

@@ -14,7 +14,7 @@ use crate::baseline::{DRAWS, blind_places, equal_places, mean};
 /// Powers of Tx and of the relay, W, one pair for each panel of the figure.
 pub const REALISATIONS: [(f64, f64); 2] = [(100.0, 0.5), (80.0, 2.0)];
 
-/// First and last altitude of the figure, m; the step between is 1 m.
+/// First and last altitude of the figure, m, in steps of 1 m.
 pub const ALTITUDES_M: (u32, u32) = (10, 50);
 
 /// Seed of the relay's random positions: each altitude uses this seed plus the altitude in metres.

@@ -37,7 +37,7 @@ pub enum Kind {
     Even,
 }
 
-/// Table row: expected SIR of a chain after one pass of messages along it.
+/// Table row: expected SIR of a chain after one pass of messages along the chain.
 ///
 /// The interference is random; its distribution is known along the line Tx-Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
@@ -131,9 +131,9 @@ fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the cells of the table in the caption: final SIRs by three ways to choose the target SIRs.
+/// Returns the cells of the table in the caption: a chain's final SIR for three choices of target SIRs.
 ///
-/// These are the paper's step, a tenth of it, and targets that bracket the optimum.
+/// The target SIRs fall by the paper's step of 0.1, fall by 0.01, or bracket the optimum.
 fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     let mut rows = vec![
         ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]

@@ -117,14 +117,14 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
 
 /// Number of intervals into which the range of altitudes is divided for the scan.
 ///
-/// It is divided twice: into intervals of equal length, and into intervals of equal ratio.
+/// The range is divided twice: into intervals of equal length, and into intervals of equal ratio.
 const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;
 
 /// Number of golden-section steps that refine a maximum over altitude.
 ///
-/// They reduce the interval to 6e-6 of its length; the loss in SIR falls with the square of that.
+/// They reduce the interval to 6e-6 of its length; the loss in SIR falls with the square of the interval's length.
 const STEPS: u32 = 25;
 
 const COMMON_TOLERANCE: f64 = 1e-11;
@@ -221,7 +221,7 @@ pub(super) fn golden(
 // d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
 // target can be bisected.
 
-/// Group of feasible hops from one relay to the next, as an interval of x for each of the two.
+/// Group of feasible hops from one relay to the next, as an interval of x for each of the two relays.
 ///
 /// A sender at any x in `from` has at least one x in `to` at which the next relay meets the target SIR.
 #[derive(Debug, Clone, Copy)]
@@ -302,9 +302,9 @@ impl<'a> Stages<'a> {
         best.is_some_and(|x| self.line.first_sir(x) >= self.target)
     }
 
-    /// Returns the x of each relay, m, in a chain that meets the target if [`Stages::is_met`].
+    /// Returns the x of each relay, m, in a chain that meets the target SIR. [`Stages::is_met`] must be true.
     ///
-    /// They rise from Tx to Rx. Each relay divides the rest of the line among the remaining hops as evenly as the
+    /// The x rise from Tx to Rx. Each relay divides the rest of the line among the remaining hops as evenly as the
     /// target allows. `None` if the feasible positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
@@ -343,9 +343,9 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the feasible hops from a relay to the next one, which may be anywhere in `spans`.
+/// Returns the feasible hops from a relay whose next relay may be anywhere in `spans`, intervals of x.
 ///
-/// `reach` has the hop ranges. Each hop is at least `apart` metres long.
+/// `reach` has the hop ranges at which the next relay meets the target SIR. Each hop is at least `apart` metres long.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -397,7 +397,7 @@ pub(super) struct Line<'a> {
     tops: Vec<f64>,
 }
 
-/// Factor of the hop range for a target SIR and sender's power: range, m, over (I + N)^(-1/2).
+/// Ratio of a hop's range, m, to (I + N)^(-1/2), for a target SIR and a sender's power.
 ///
 /// I and N are the powers of interference and noise at the hop's receiver, W.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -519,7 +519,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the positions of the crossings in `turns` at which the function falls below the level.
+/// Returns the positions of those crossings in `turns` at which the function falls below the level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

@@ -35,7 +35,8 @@ pub struct Polished {
     pub places: Vec<Place>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
-    /// Number of rounds of the search; in each, all relays move in turn from Tx to Rx and back.
+    /// Number of rounds of the search. In each round the relays are moved one after the other, from relay 1 to the
+    /// last and back.
     pub rounds: u32,
 }
 

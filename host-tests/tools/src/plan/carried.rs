@@ -23,9 +23,10 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
 
-/// Largest relative excess of the time per bit on the coarse grid at which positions are still refined.
+/// Largest relative excess of time per bit for which a number of relays gets a precise search.
 ///
-/// It is relative to the number of relays with the least time. For a larger excess no refinement can make up.
+/// The excess is that on the coarse grid, over the number of relays with the least time per bit. A precise search for
+/// positions cannot make up for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
@@ -81,8 +82,8 @@ impl<'a> Carried<'a> {
 
     /// Returns the largest number of relays for which a precise search for positions is worthwhile.
     ///
-    /// It is used for time slots as long as each hop needs. With more relays, one bit needs over 5 % more time on the
-    /// coarse grid than with the best number, which a precise search cannot make up for.
+    /// Such a search is used for time slots as long as each hop needs. With more relays, one bit needs over 5 % more
+    /// time on the coarse grid than with the best number, which a precise search cannot make up for.
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }

@@ -22,7 +22,7 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// Returns the SIR that the relays' positions lose against the best ones, as a fraction of the best.
+    /// Returns the loss of SIR by the relays' positions, as a fraction of the best SIR.
     pub fn loss(&self) -> f64 {
         (1.0 - self.plan.sir() / self.best_sir).max(0.0)
     }
@@ -115,11 +115,11 @@ fn alone(
     })
 }
 
-/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed one.
+/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed plan.
 ///
-/// There is one if the plan was made on another machine, which rounds differently.
+/// The two plans differ if the file's plan was made on another machine, which rounds differently.
 const SAME_M: f64 = 0.1;
-/// Tolerated difference of the SIR, dB, between the file's plan and the recomputed one.
+/// Tolerated difference of the SIR, dB, between the file's plan and the recomputed plan.
 const SAME_DB: f64 = 0.01;
 
 /// Returns the section `[plan]` of a scenario file for the relays' agreed positions `flown`.

@@ -133,8 +133,8 @@ pub struct Theorem {
 pub struct Fitted {
     /// Power, position and error of the hypothetical interferer.
     pub hypothetical: Hypothetical,
-    /// SIR, linear, against all interferers, at the best positions for the hypothetical one. `None` if no positions
-    /// were found for the hypothetical interferer.
+    /// SIR, linear, against all interferers, at the best positions for the hypothetical interferer. `None` if no such
+    /// positions were found.
     pub sir: Option<f64>,
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
     /// against all interferers.
@@ -306,8 +306,8 @@ impl ProfiledMission {
 
 /// Returns true if the least separation of the relays does not cost any SIR, or if there is none.
 ///
-/// `is_as_good` gets the scenario without a least separation. It returns `Some(true)` if the best SIR there is not
-/// higher, and `None` if it finds no chain.
+/// `is_as_good` gets the scenario without a least separation. It returns `Some(true)` if the best SIR without the
+/// separation is not higher than with it, and `None` if it finds no chain.
 fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
     let free = Scenario {
         min_separation_m: 0.0,

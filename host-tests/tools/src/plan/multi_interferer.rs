@@ -72,7 +72,8 @@ struct Planner<'a> {
 
 /// Two candidate chains with the same number of relays.
 ///
-/// One is the best for the hypothetical interferer, the other the best found against the sum of all real ones.
+/// The first is the best chain for the hypothetical interferer, the second the best chain found against the sum of
+/// all real interferers.
 struct Candidates {
     scene: Scene,
     relays: u16,
@@ -193,8 +194,8 @@ impl Planner<'_> {
         variants
     }
 
-    /// Returns the plan with the fewest relays that give every hop the SIR `target`. It assumes that more relays do
-    /// no worse.
+    /// Returns the plan with the fewest relays that give every hop the SIR `target`. The search assumes that more
+    /// relays do no worse.
     fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
         let mut most: f64 = 0.0;
         let mut meets = |relays: u16| -> Result<Option<Candidates>, NoPlan> {
@@ -240,10 +241,10 @@ impl Candidates {
         one.max(all)
     }
 
-    /// Returns the chain for the hypothetical interferer if its SIR suffices, else the best one found.
+    /// Returns the chain for the hypothetical interferer if its SIR suffices, else the best chain found.
     ///
-    /// With a `target` the SIR suffices if it is at least that. Without one it suffices if it is at most 1 % below
-    /// the SIR of the best chain against all interferers.
+    /// With a `target` the SIR suffices if it is at least `target`. Without one it suffices if it is at most 1 %
+    /// below the SIR of the best chain against all interferers.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, sir)| *sir);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.sir);

@@ -168,7 +168,8 @@ fn slope(of: &[f64]) -> Polynomial {
         .collect()
 }
 
-/// Returns the real roots of the polynomial `of` within 0 to `end`. They are located between those of its derivative.
+/// Returns the real roots of the polynomial `of` within 0 to `end`. The roots are located between the roots of the
+/// derivative.
 fn roots(of: &[f64], end: f64) -> Vec<f64> {
     let size = of.iter().rposition(|coefficient| *coefficient != 0.0);
     let Some(of) = size.and_then(|degree| of.get(..=degree)) else {

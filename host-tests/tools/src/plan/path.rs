@@ -299,7 +299,7 @@ struct Hop {
     least_m: f64,
 }
 
-/// Least time of a chain from Tx to a grid point, and the index of the previous relay's point in it.
+/// Least time of a chain from Tx to a grid point, and the index of the previous relay's grid point.
 #[derive(Clone, Copy)]
 struct Best {
     time: f64,
@@ -362,7 +362,7 @@ impl<'a> Layers<'a> {
         self.layers.push((points, bests));
     }
 
-    /// Returns the least time of a whole chain to Rx, and the index of the last relay's grid point in it.
+    /// Returns the least time of a whole chain to Rx, and the index of the last relay's grid point.
     fn last(&self) -> (f64, usize) {
         let hop = self.times.hop(Some(self.layers.len()), None);
         let rx = self.times.rx();
@@ -427,9 +427,9 @@ impl Table {
         Self { starts }
     }
 
-    /// Returns the largest number of relays whose time per bit on the grid is near the least one.
+    /// Returns the largest number of relays whose time per bit on the grid is near the least time.
     ///
-    /// It is at most 1 + `loss` times the least time of all numbers of relays. Returns 0 if no time is finite.
+    /// The time is at most 1 + `loss` times the least time of all numbers of relays. Returns 0 if no time is finite.
     pub fn largest_within(&self, loss: f64) -> u16 {
         let times = || self.starts.iter().map(|(time, _)| *time);
         let best = times().fold(f64::INFINITY, f64::min);

@@ -36,7 +36,7 @@ const LEAST_LISTED: u16 = 10;
 pub enum Rate {
     /// Rate from Tx to Rx, bit/s, of a chain that carries data only in that direction.
     There(f64),
-    /// Rates to Rx and to Tx at the same time, bit/s, of a chain planned for both directions.
+    /// Rates to Rx and to Tx, bit/s, of a chain that carries data in both directions.
     Both([f64; 2]),
 }
 
@@ -228,7 +228,7 @@ const RISE: f64 = 1e-4;
 /// Largest number of relays for which [`carry_no_more`] looks for a proof.
 const MOST_PROVEN: u16 = MOST_FAST;
 
-/// Returns true if it is proven that no tried number of relays carries more than the best one.
+/// Returns true if it is proven that no number of relays up to `tried_uavs` carries more than `best`.
 ///
 /// Used for both directions, in equal slots or with a frequency for each hop.
 fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
@@ -320,10 +320,10 @@ fn most_between(scenario: &Scenario) -> [f64; 2] {
     ]
 }
 
-/// Returns an upper bound on the SIR (linear) at Rx for any number of relays, from that of `plan`.
+/// Returns an upper bound on the SIR (linear) at Rx for any number of relays, derived from `plan`.
 ///
-/// The interference at Rx does not depend on the relays; the signal is largest from right above, at the lowest altitude and with
-/// the largest power.
+/// The interference at Rx does not depend on the relays; the signal is largest from right above, at the lowest
+/// altitude and with the largest power.
 fn most_at_receiver(scenario: &Scenario, plan: &Plan) -> f64 {
     let (Some((last, profile)), Some(sir)) = (plan.places.last(), plan.sirs.last()) else {
         return f64::INFINITY;

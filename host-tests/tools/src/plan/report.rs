@@ -27,8 +27,8 @@ pub struct HypotheticalReport {
     pub mean_abs_error_w: f64,
     /// Mean absolute error divided by the mean interference power.
     pub relative_error: f64,
-    /// SIR, linear, against all interferers, at the best positions for the hypothetical one. Absent if no positions
-    /// were found for the hypothetical interferer.
+    /// SIR, linear, against all interferers, at the best positions for the hypothetical interferer. Absent if no such
+    /// positions were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
@@ -37,7 +37,7 @@ pub struct HypotheticalReport {
     /// SIR that the hypothetical interferer's positions lose, as a fraction of the plan's SIR; 0 if kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// SIR that the plan gains over the hypothetical interferer's positions, as a fraction of theirs.
+    /// SIR that the plan gains over the hypothetical interferer's positions, as a fraction of their SIR.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
 }
@@ -81,8 +81,9 @@ pub struct RateReport {
 }
 
 impl RateReport {
-    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are those to list. Without a
-    /// plan the report has only these.
+    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are those to list.
+    ///
+    /// Without a plan the report has only `best` and `rates`.
     pub fn new(
         plan: Option<&Plan>,
         (scenario, radio): (&Scenario, &Radio),
@@ -343,7 +344,7 @@ pub struct PlanReport {
     /// Hypothetical interferer in place of several; absent unless there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
-    /// True if relays may leave the line sideways: the table then has a column for that distance.
+    /// True if relays may leave the line sideways: the table then has a column for y.
     #[serde(skip)]
     pub room: bool,
     /// Unit in which the table shows SIRs: that of the user's request.

@@ -110,7 +110,7 @@ pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPl
     })
 }
 
-/// Returns `mission` with the relay's own altitude as the only permitted one.
+/// Returns `mission` with the relay's own altitude as the only permitted altitude.
 fn at_one_altitude(mission: &Mission, profile: Profile) -> Mission {
     let config = MissionConfig {
         band: Band::at(profile.altitude_m),

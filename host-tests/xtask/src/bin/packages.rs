@@ -37,7 +37,7 @@ fn is_allowed(expression: &str) -> bool {
 
 /// Packages of which the library may need two versions at once.
 ///
-/// embedded-hal 1.0 needs the older defmt, which re-exports the newer one.
+/// embedded-hal 1.0 needs the older defmt, which re-exports the newer defmt.
 const TWICE: [&str; 1] = ["defmt"];
 
 /// Runs `cargo` with `arguments` and returns its output.

@@ -45,9 +45,9 @@ use crate::reference::joint::{Corridor, FixedCrossSection};
 use crate::reference::{Link, Relay};
 use uav_relay_scenario::number::narrow;
 
-/// Random link, and the corridor in which its relays choose positions.
+/// Random link, and the corridor in which the relays of the link choose positions.
 ///
-/// The corridor limits altitude and lateral position. In the link all relays are at its lowest altitude.
+/// The corridor limits altitude and lateral position. In the link all relays are at the corridor's lowest altitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Chain of relays with Tx, Rx and interferer.

@@ -63,8 +63,8 @@ impl StochasticLink {
     /// Runs the paper's Algorithm 4: lowers the target SIR by `step` until the first hop meets it. The first target
     /// is [`StochasticLink::ceiling`].
     ///
-    /// Unlike printed, the last hop follows the target and no relay is before Tx. `None` if no target above 0 is met,
-    /// as with a step larger than the optimum.
+    /// In two points it differs from the printed algorithm: the last hop follows the target, and no relay is before
+    /// Tx. `None` if no target above 0 is met, as with a step larger than the optimum.
     pub fn algorithm4(&self, step: f64) -> Option<Backward> {
         let mut gamma = self.ceiling();
         let mut iterations = 1;

@@ -94,8 +94,10 @@ fn native(browser: &mut Browser) -> String {
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
-/// Cuts the report out of `told`, the JSON result of a run in the page. The text stays as it is, so that a test can
-/// compare it with the report of `cargo chain` byte by byte.
+/// Returns the report that is part of `told`, the JSON result of a run in the page.
+///
+/// The text of the report is not changed, so that a test can compare it with the report of `cargo chain` byte by
+/// byte.
 pub(crate) fn report(told: &str) -> &str {
     let report = told.strip_prefix("{\"report\":").unwrap();
     let end = report.find(",\"film\":{\"stands\":").unwrap();

@@ -102,10 +102,11 @@ impl Chain {
         }
     }
 
-    /// Returns true if the chain is available: a longest chain of the living relays has its best positions.
+    /// Returns true if the chain is available: one of the longest possible chains has its best positions.
     ///
-    /// Several chains of that length may exist. The best positions are those in which the relays settle without
-    /// faults. If such chains are too small for a quorum, their relays have no positions, and the result is false.
+    /// A possible chain consists of living relays that can be neighbours. Its best positions are those in which the
+    /// relays settle without faults. If such chains are too small for a quorum, their relays have no positions, and
+    /// the result is false.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();

@@ -80,7 +80,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs the steps of a `lane` beside the main lane, with their numbers. Returns the failures.
+/// Runs the numbered steps of `lane`, one after the other, beside the main lane. Returns the failures.
 fn run_in_one_piece(lane: Vec<(usize, &Step)>, all: usize) -> Vec<(&str, Evidence)> {
     let run = |(number, step)| {
         let mut output = Vec::new();

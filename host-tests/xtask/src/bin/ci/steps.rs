@@ -56,7 +56,9 @@ pub(crate) struct Step {
 pub(crate) enum Lane {
     /// The step runs after the previous step of this lane.
     Main,
-    /// The step starts after the previous step of the main lane, which does not wait for its end. It mostly waits for the wall clock.
+    /// The step starts after the previous step of the main lane.
+    ///
+    /// The main lane does not wait for the end of this step, because the step mostly waits for the wall clock.
     Waiting,
     /// The step runs at low priority after the previous step of this lane. It has a target folder of its own.
     Background,
@@ -211,7 +213,7 @@ const WAITING_TEST: &str = "companion";
 
 /// Number of test functions of [`WAITING_TEST`] that run at a time.
 ///
-/// It exceeds the number of cores, because each of them uses a few per cent of one.
+/// It may exceed the number of cores, because each of the test functions uses a few per cent of a core.
 const WAITING_TESTS: &str = "6";
 
 /// Returns the steps that run all tests of the workspace.
