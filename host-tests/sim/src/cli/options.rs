@@ -58,7 +58,7 @@ pub struct Options {
     /// Probability that a frame is overtaken by others, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub reorder: f64,
-    /// Search the target SIR without a prediction: the leader does not compute the chain first, and needs more messages
+    /// Search the target SIR without a prediction. The leader does not compute the chain first, and needs more messages
     #[arg(long)]
     pub no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
@@ -67,7 +67,7 @@ pub struct Options {
     /// Print only one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Draw the chain with each hop's SIR: a side view, and a top view if relays or an interferer are beside the line
+    /// Draw the chain with each hop's SIR. A side view, and a top view if relays or an interferer are beside the line
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub svg: Option<PathBuf>,
     /// Write every transmitted frame to a pcapng capture with virtual times. `cargo decode` and Wireshark read it
