@@ -299,7 +299,7 @@ impl World {
         if std::env::var_os("STORY").is_some()
             && ((self.now_s * 10.0).round() as u64).is_multiple_of(5)
         {
-            self.exchange_fences();
+            self.print_state();
         }
     }
 
@@ -331,7 +331,7 @@ impl World {
     }
 
     /// Prints the time, and each drone's position, setpoint and reasons to wait, for debugging.
-    fn exchange_fences(&self) {
+    fn print_state(&self) {
         let each = self.drones.iter().map(|drone| {
             let at = drone.line.along(drone.at);
             let goal = drone.setpoint().map(|goal| drone.line.along(goal));

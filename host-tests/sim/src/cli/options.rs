@@ -58,7 +58,7 @@ pub struct Options {
     /// Probability that a frame is overtaken by others, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub reorder: f64,
-    /// Search the target SIR without a prediction. The leader does not compute the chain first, and needs more messages
+    /// Search the target SIR without a prediction. The leader then does not compute the chain first, and more messages are needed
     #[arg(long)]
     pub no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
