@@ -140,7 +140,7 @@ const ZERO: SerialStats = SerialStats {
     unrouted: 0,
 };
 
-/// Stores the waker of the current task in `place`, unless the waker there wakes this task, too.
+/// Stores the current task's waker in `place`, unless the waker stored there wakes this task anyway.
 pub(super) fn store_waker(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
     let kept = place.take().filter(|waker| waker.will_wake(cx.waker()));
     place.set(Some(kept.unwrap_or_else(|| cx.waker().clone())));

@@ -770,7 +770,8 @@ impl Mission {
     }
 }
 
-/// Factor on a hop's gain for which the optimal hop is half as long. The SIR is gain over squared length.
+/// Factor on the gain of the first or last hop that makes it half as long as the others at best. The SIR is gain over
+/// squared length, and is the same on all hops of the best chain.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -784,8 +785,8 @@ impl Mission {
 
     /// Returns the mission with another `interference`.
     ///
-    /// A `receiver_w` above 0 is the interference power at the ground receiver, W. `halved` is for the first and the
-    /// last hop: true if that hop is to be half as long as the others.
+    /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
+    /// `halved` is for the first and the last hop: true if that hop is to be half as long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.

@@ -78,7 +78,7 @@ pub struct Hops {
     received: f32,
     back: WayBack,
     interferer: Interferer,
-    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / P, 1/m^2; 0 without noise.
+    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
 }
 
@@ -446,8 +446,9 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. The relay is at `altitude_m`,
-    /// the neighbours are at `beside_m`. `apart_m` is the minimum separation, and `band` the allowed altitudes, m.
+    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. The relay is at the altitude
+    /// `altitude_m`, the neighbours are at `beside_m`. `apart_m` is the minimum separation, and `band` the allowed
+    /// altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

@@ -79,8 +79,8 @@ const MOST_SQUARED: f32 = 1e18;
 /// Backward hop, for the traffic from Rx to Tx, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Gain A' of the backward hop over r; for a hop to Tx `K_tx` / r, m^2. r is the required ratio of backward to
-    /// forward SIR.
+    /// Gain A' of the backward hop over r. For a hop to Tx it is `K_tx` / r, m^2; the SIR at Tx is `K_tx` over the
+    /// hop's squared length. r is the required ratio of backward to forward SIR.
     gain: f32,
     /// True if Tx is the receiver of this hop, false if a relay is.
     to_tx: bool,
@@ -200,8 +200,8 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin by which the last relay receives Rx, as a length: (SIR / required SIR - 1) D, m. The relay
-    /// is at `x_m`. The margin is below 0 if `target` is missed, and continuous in the target.
+    /// Returns the margin by which the last relay, at `x_m`, receives Rx: (SIR / required SIR - 1) D, m. D is the
+    /// distance from Tx to Rx. The margin is below 0 if `target` is missed, and continuous in the target.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -210,9 +210,9 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`] at which the last relay receives Rx well enough, m. The SIR has to
-    /// meet `target` for the backward direction. `None` if there is no such x. At `x_m` itself the last relay misses
-    /// the target.
+    /// Returns the largest x in [`least_m`, `x_m`] at which the last relay receives Rx well enough, m. The backward
+    /// SIR has to meet `target`. `None` if there is no such x. Only for an `x_m` at which the last relay misses the
+    /// target.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -250,8 +250,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the hop length, m, beyond which a noise-free hop meets its target; `None` if there is none. It may be
-/// negative. It is the root at which f, which is 0 or above where the target is met, rises.
+/// Returns the length, m, at which a noise-free hop begins to meet its target as it gets longer. `None` if there is
+/// none; the length may be negative. f is 0 or above where the target is met, and this is the root at which f rises.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;

@@ -110,15 +110,15 @@ pub struct Hop {
     base: f32,
     /// Squared distance of receiver and sender across x, (y - y0)^2 + (h - h0)^2, m^2.
     across_squared: f32,
-    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / P, 1/m^2; 0 without noise.
+    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
     /// Maximum x that the hop's receiver may take, m.
     end_m: f32,
-    /// Maximum x of the receiver and of the sender, m, with enough space for the relays after it. Each of those
-    /// relays needs the minimum separation.
+    /// Maximum x of the receiver and maximum x of the sender, m. Each leaves enough space for the minimum separation
+    /// of the relays from there to Rx.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,

@@ -88,10 +88,11 @@ const LOST: f32 = 3e3;
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Normal,
-    /// Collection of measurements without this node. It shows if the other nodes' measurements are consistent.
+    /// Collection of measurements without the node of this number. It shows if the other nodes' measurements are
+    /// consistent.
     Trying(u16),
-    /// Collection of measurements that tells this node that it is excluded. The `bool` is false for the first of two
-    /// such collections, true for the second.
+    /// First or second collection that tells the node of this number that its measurements are left out. The `bool`
+    /// is true for the second one, whose measurements are used.
     Announcing(u16, bool),
 }
 

@@ -150,8 +150,8 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Mean square relative error that the current estimate is expected to have.
     chance: f64,
-    /// Number of times that the estimate was refined for the same stationary interferer. A settled chain has the
-    /// maximum; a moving interferer counts only refinements by more information.
+    /// Number of new estimates adopted for the same interferer, which [`REFINED`] limits. If the interferer moves, an
+    /// estimate with a large change resets the number to 0.
     refined: u8,
     track: Track,
 }
@@ -170,7 +170,7 @@ pub(crate) struct Review {
     pub(crate) adopt: Option<InterferenceEstimate>,
     pub(crate) known: Knowledge,
     pub(crate) unfit: Option<Unfit>,
-    /// Transmitter or receiver whose measurements do not fit the relays' measurements.
+    /// Result of the check which of the levels measured at Tx and Rx do not fit the relays' measurements.
     pub(crate) ends: EndsOff,
 }
 

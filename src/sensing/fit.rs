@@ -32,8 +32,8 @@ pub enum Unfit {
 /// positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D over the measured positions. With less, they do not show on which side of the line Tx
-/// to Rx the source is.
+/// Minimum variance of 2 y / D over the measured positions; D is the distance from Tx to Rx. With less, they do not
+/// show on which side of the line Tx to Rx the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -383,8 +383,8 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the square searched for a source, in units of D / 2. The square reaches from D before Tx to D beyond
-/// Rx, and 1.5 D to each side.
+/// Half width of the square searched for a source, in units of D / 2; D is the distance from Tx to Rx. The square
+/// reaches from D before Tx to D beyond Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
 /// Number of grid steps from the middle to the edge of the first grid of the search for a source.
@@ -397,7 +397,7 @@ const FINE: i8 = 2;
 const FINER: u8 = 5;
 
 /// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. They are searched on
-/// grids. Positions are in units of D / 2.
+/// grids. Positions are in units of half the distance from Tx to Rx.
 ///
 /// The search covers one side of the line of measured positions, whose Y' is `side`: larger Y' if `sign` is 1,
 /// smaller Y' if -1. 414 positions, some 16 000 instructions on a Cortex-M4F.

@@ -72,7 +72,7 @@ pub(crate) fn is_level(power_w: f32) -> bool {
 }
 
 /// Terms of a position, of which the inverse interference of a source is a linear combination. They are 1, u, u^2 -
-/// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D.
+/// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
 /// Returns the four terms of the position `at` for the fit of a source. `distance_m` is the distance from Tx to Rx.
@@ -99,8 +99,9 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Returns the strength k = eta D^2 [`UNIT_W`] / (4 P) of a source of P = `power_w` watts. For a strength it returns
-/// the power: the function is its own inverse.
+/// Returns the strength k = eta D^2 [`UNIT_W`] / (4 P) of a source of P = `power_w` watts. eta is the mission's
+/// path-loss factor to the ground, D its distance. For a strength it returns the power: the function is its own
+/// inverse.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
@@ -249,7 +250,7 @@ impl Sums {
     }
 }
 
-/// Minimum distance between two positions that count as different, as a fraction of D.
+/// Minimum distance between two positions that count as different. It is a fraction of the distance from Tx to Rx.
 const APART: f32 = 1.0 / 200.0;
 
 /// Measurements of one relay: the mean at its position, and the sums of earlier positions. 120 bytes.
@@ -363,7 +364,7 @@ pub(crate) struct Average {
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,
-    /// Mean age of the measurements at the time `last`, with their weights, s.
+    /// Mean age of the measurements at the time `last`, weighted like their mean, s.
     pub(crate) behind_s: f32,
 }
 

@@ -56,11 +56,12 @@ const SETTLED_M: f32 = 0.25;
 /// the drone's lag.
 const BEHIND_MS: u64 = 1_200;
 
-/// Half-life of the moving target's speed near the setpoint, ms: ln 2 / k with k = 0.5 /s.
+/// Half-life of the moving target's speed near the setpoint, ms. The speed is k times the remaining distance, with k
+/// = 0.5 /s, so it halves in ln 2 / k.
 const HALVES_MS: u64 = 1_387;
 
-/// Maximum number of half-lives that [`Pace::stopping_time`] counts. They suffice from 20 m, the longest remaining
-/// distance, to [`SETTLED_M`].
+/// Maximum number of half-lives that [`Pace::stopping_time`] counts. Eight of them reduce the remaining distance from
+/// 20 m, the longest one near the setpoint, to less than [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
 /// Maximum age of a drone's position from which the drone's lag behind the moving target is computed. The drone's
@@ -122,12 +123,13 @@ impl Pace {
         }
     }
 
-    /// Returns the time in which a drone at maximum speed stops at a new setpoint; 9.8 s for the default.
+    /// Returns the time from a new setpoint until a drone at maximum speed has stopped; 9.8 s by default.
     ///
     /// Intended for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
     ///
-    /// The target decelerates by a down to the speed a / k, and from there in proportion to the remaining distance, which is at
-    /// most 0.25 m after this time. At most 8 steps.
+    /// The drone reacts after 1.2 s. The target then decelerates by a down to the speed a / k, and from there in
+    /// proportion to the remaining distance, which is at most 0.25 m after this time. a is the acceleration of this
+    /// pace, and k is 0.5 /s. At most 8 steps.
     ///
     /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
     #[expect(
@@ -354,7 +356,8 @@ impl Target {
         }
     }
 
-    /// Restarts the schedule of transmissions after a change of the setpoint. The new target is sent at once.
+    /// Restarts the schedule of transmissions after the setpoint has changed. The target for the new setpoint is then
+    /// sent at once.
     pub(super) const fn renew(&mut self, now: Instant) {
         self.due = now;
         self.times_sent = 0;
@@ -400,7 +403,8 @@ impl Target {
         before < REFUSED_AFTER && self.other_targets >= REFUSED_AFTER
     }
 
-    /// Schedules the next transmission after the drone's own position was sent as the target.
+    /// Schedules the next target after the drone's own position was sent as the target to a waiting PX4. A PX4
+    /// accepts the mode OFFBOARD only while it receives targets.
     pub(super) fn on_own_place_sent(&mut self, now: Instant) {
         self.due = now + STANDING;
     }

@@ -38,7 +38,8 @@ struct LostSide {
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers.
+    /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers. A repetition of
+    /// this command is answered again, without another effect.
     accepted: Option<(Address, RelayNumbers)>,
     /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without one.
     answer: Option<(Address, u8)>,

@@ -705,7 +705,8 @@ impl Autopilot {
         millis(now.since(self.began).as_micros())
     }
 
-    /// Returns the newest measured position, with its time, once. It is meant for `Relay::handle_position`.
+    /// Returns the newest measured position of the drone, with its time, for `Relay::handle_position`. `None` if
+    /// there is no new one since the last call.
     pub fn poll_position(&mut self) -> Option<Position> {
         let position = self.position.take()?;
         let at = self.clock.external(position.at);
@@ -727,7 +728,8 @@ impl Autopilot {
         self.noise.take()
     }
 
-    /// Returns the side whose lost relays have landed, as the operator has reported. Once, for `Relay::clear_lost`.
+    /// Returns the side whose lost relays have landed by the operator's report, for `Relay::clear_lost`. `None` if
+    /// there is no new report since the last call.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
         self.clearance.take_cleared()
     }
@@ -742,7 +744,7 @@ impl Autopilot {
         self.events.take().or_else(mistrusted)
     }
 
-    /// Returns the latest time of the next [`handle_timeout`](Self::handle_timeout) call.
+    /// Returns the time at which [`handle_timeout`](Self::handle_timeout) must be called at the latest.
     pub fn poll_timeout(&self, now: Instant) -> Instant {
         let now = self.clock.internal(now);
         let target = self.target.map(|target| target.due);

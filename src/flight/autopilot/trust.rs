@@ -58,7 +58,7 @@ pub(super) struct Trust {
     #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
-    /// Kind of signature mismatch in the latest heartbeats, and the number of consecutive ones with it.
+    /// Kind of signature mismatch in the latest heartbeats, and the number of heartbeats in a row with it.
     row: Option<(Mistrust, u8)>,
     /// Kinds of signature mismatch that have to be reported, as bits.
     due: u8,

@@ -336,7 +336,7 @@ impl Vehicle {
         }
     }
 
-    /// Returns the drone's position if it is known, recent, and in the air.
+    /// Returns the drone's position if it is known and recent, and the drone is in the air.
     pub(super) fn place_in_air(&self, now: Instant) -> Option<Placement> {
         let position = self.position(now)?;
         (self.armed && self.in_air).then_some(position.place)
@@ -516,12 +516,12 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum differences of the relay's and the autopilot's clock, µs. The first is for the last half of the
-    /// window, the second for the present one.
+    /// Minimum of the relay's clock less the autopilot's clock, µs, for each half of the window. The first is of the
+    /// previous half, the second of the present one.
     least: [i64; 2],
     since: Instant,
     messages: u8,
-    /// Time of the last message on the relay's clock, and on the autopilot's clock in µs.
+    /// Last message: its arrival on the relay's clock, and its creation on the autopilot's clock, µs.
     last: (Instant, i64),
 }
 
@@ -727,7 +727,8 @@ mod clock_tests {
         }
     }
 
-    /// Checks an autopilot's clock that runs 1 % slow, as in a simulator on a loaded machine.
+    /// Checks that messages count as recent although the autopilot's clock runs 1 % slow. The clock of a simulator on
+    /// a loaded machine can be so slow.
     #[test]
     fn a_clock_that_runs_one_percent_slow_is_never_blind() {
         let ages = ages(|ms| ms - ms / 100, |_| 5);
@@ -744,7 +745,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20), "{ages:?}");
     }
 
-    /// Checks that a link with a growing delay is not trusted at first.
+    /// Checks a link whose delay jumps from 5 ms to 1.5 s: for 3 s its messages count as more than 1 s old. From 9 s
+    /// after the jump on, the new delay counts as normal.
     #[test]
     fn a_delay_that_grows_is_late_at_first() {
         let ages = ages(|ms| ms, |ms| if ms < 20_000 { 5 } else { 1_500 });

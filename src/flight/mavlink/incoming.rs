@@ -50,7 +50,7 @@ impl Payload<'_> {
 
 const _: () = assert!(MAX_PAYLOAD <= u8::MAX as usize, "what a length says");
 
-/// Received MAVLink message, in the units and frames of the wire. Enum values are unchecked numbers.
+/// Received MAVLink message, in the units and coordinate frames of the wire. Enum values are unchecked numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -296,8 +296,8 @@ impl Parser {
 
     /// Returns the result of `read` for the next received message and the bytes of its frame.
     ///
-    /// Each byte starts at most one checksum, of at most 266 bytes. In real frames at most one byte in ten does so, in
-    /// maliciously chosen bytes one in three.
+    /// Work: for each received byte, at most one checksum over at most 266 bytes is computed. In real frames this
+    /// happens at no more than one byte in ten, in maliciously chosen bytes at one in three.
     pub fn next_frame<T>(&mut self, read: impl FnOnce(Received, &[u8]) -> T) -> Option<T> {
         while !self.bytes.is_empty() {
             match first(&self.bytes) {

@@ -26,7 +26,7 @@ pub mod severity {
     pub const INFO: u8 = 6;
 }
 
-/// MAVLink message to send, in the units and frames of the wire.
+/// MAVLink message to send, in the units and coordinate frames of the wire.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Outgoing<'a> {
     /// HEARTBEAT of an active onboard computer, the companion.

@@ -11,45 +11,47 @@ use super::outlook::Outlook;
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
 /// Initial trust region: limit of a relay's move in one iteration of the joint method. It is a fraction of the
-/// relay's distance from the interferer. It also limits the change of the target, in ln(SIR).
+/// relay's distance from the interferer. The same number limits the change of the target SIR, in ln(SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust region at which the final target of an ascent (improvement of one chain) is predicted. A smaller
-/// limit of the relays' moves would distort the prediction.
+/// Minimum trust region (limit of a relay's move) at which the result of an ascent is predicted. An ascent improves
+/// one chain; its result is the final target SIR. A smaller limit holds the relays back, so that the prediction would
+/// be too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust region below which an ascent (improvement of one chain) ends, because it makes no progress. It is a fraction
-/// like [`TRUST`].
+/// Trust region (limit of a relay's move) below which an ascent ends, because it makes no progress. An ascent
+/// improves one chain. The limit is a fraction of the relay's distance from the interferer.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which the spare length at Rx is assumed to fall with the target, in D per ln(SIR). Steps of the
-/// target are divided by the rate, so that a rate near 0 would make them too long. The usual rate is 0.5, since hop
-/// lengths vary as 1 / sqrt(SIR).
+/// Minimum rate at which a rising target SIR is assumed to reduce the chain's spare length at Rx. It is in D per
+/// ln(SIR); D is the distance from Tx to Rx. Steps of the target are divided by the rate, so that a rate near 0 would
+/// make them too long. The usual rate is 0.5, since hop lengths vary as 1 / sqrt(SIR).
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the limit of the target is raised, in ln(SIR). The limit is raised if a chain that meets it
-/// fails the check against the upper bound.
+/// First amount by which the upper limit of a chain's target SIR is raised, in ln(SIR). The limit is raised if a
+/// chain that meets it fails the check against the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the chain's spare length at Rx, in units of D. Spare length above the cap does not count, so that it
-/// cannot outweigh the penalty for relays too near the interferer.
+/// First cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. Spare length above the
+/// cap does not count, so that it cannot outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Cap on the spare length at Rx below which the cap is not lowered any further, in units of D.
+/// Value below which the cap on the chain's spare length at Rx is not lowered any further. It is a fraction of the
+/// distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of a missing length when two chains are compared. A metre that a chain falls short of Rx counts as much as
 /// two metres of spare length.
 const SHORT: f32 = 2.0;
 
-/// Gain of the target below which an improvement step counts as idle, in ln(SIR). Two idle steps in a row end the
-/// ascent.
+/// Increase of the target SIR below which an improvement step counts as idle, in ln(SIR). Two idle steps in a row end
+/// the ascent, the improvement of one chain.
 const CLOSE: f32 = 3e-6;
 
-/// Expected gain of the target below which the improvement of a chain ends, in ln(SIR).
+/// Expected increase of the target SIR below which the improvement of a chain ends, in ln(SIR).
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected gain of the target below which its final value can be predicted, in ln(SIR). Final is the value at the
-/// end of the ascent, the improvement of one chain.
+/// Expected increase of the target SIR below which its final value can be predicted, in ln(SIR). Final is the value
+/// at the end of the ascent, the improvement of one chain.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which an ascent (improvement of one chain) is checked for divergence. It has diverged
@@ -57,8 +59,8 @@ const FORESEEN: f32 = 1e-4;
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Maximum length by which a chain may fall short of Rx after its ascent, in units of D. A chain that is shorter is
-/// dropped; for the others a lower target is searched that they meet.
+/// Maximum length by which an improved chain may fall short of Rx to be improved once more. The next improvement has
+/// a lower cap on the chain's spare length. The value is a fraction of the distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -72,7 +74,7 @@ pub(crate) enum AscentStep {
     /// Compute the relays' moves anew for the current chain. This takes a backward pass from the last relay to the
     /// first.
     Again,
-    /// End the ascent: the chain is not improved further.
+    /// End the ascent. It goes on only if a lower cap on the chain's spare length may improve the chain.
     Over,
 }
 
@@ -84,14 +86,14 @@ pub(crate) struct Ascent {
     /// 0 if the chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Limit of the target, in ln(SIR). A chain that meets the limit is checked against the upper bound of all
-    /// chains.
+    /// Upper limit of the target SIR, in ln(SIR). A chain that meets the limit is checked against the upper bound of
+    /// all chains.
     limit: f32,
     /// Next increase of the target's limit, in ln(SIR). It is made if a chain that meets the limit fails the check
     /// against the upper bound.
     excess: f32,
-    /// Cap on the chain's spare length at Rx, in units of D. It is lowered if relays too near the interferer cause a
-    /// penalty, so that spare length cannot outweigh it.
+    /// Cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. It is lowered if relays
+    /// too near the interferer cause a penalty, so that spare length cannot outweigh the penalty.
     spare: f32,
     /// Penalty for relays too near the interferer, m. It is subtracted from the chain's spare length at Rx.
     pub(crate) penalty: f32,
@@ -129,8 +131,8 @@ impl Ascent {
         }
     }
 
-    /// Returns this ascent with a limit of its target, in ln(SIR). A chain that meets the limit is checked against
-    /// the upper bound of all chains.
+    /// Returns this ascent with an upper limit of its target SIR, in ln(SIR). A chain that meets the limit is checked
+    /// against the upper bound of all chains.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -143,7 +145,8 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the cap on the spare length at Rx, m. A chain with more than that counts as no better.
+    /// Returns the cap on the chain's spare length at Rx, m. Spare length above the cap does not count when chains
+    /// are compared.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
@@ -172,13 +175,13 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the target has reached its limit, and the current chain meets that target.
+    /// Returns true if the target SIR has reached its upper limit, and the current chain meets that target.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the limit of the target, and returns the next action. The chain that met the old limit has failed the
-    /// check against the upper bound.
+    /// Raises the upper limit of the target SIR, and returns the next action. The chain that met the old limit has
+    /// failed the check against the upper bound of all chains.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -219,7 +222,8 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if spare length and expected gain each change the target by less than `by`, in ln(SIR).
+    /// Returns true if the target SIR is nearly final: it can change by less than `by`, in ln(SIR). This must hold
+    /// for the effect of the chain's spare or missing length, and for that of the relays' moves.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -230,7 +234,8 @@ impl Ascent {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if the chain falls short of Rx by so little that its improvement is continued.
+    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only then it
+    /// is improved again with a lower cap on its spare length.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
@@ -298,7 +303,8 @@ impl Ascent {
     }
 
     /// Makes a successful trial the current chain; returns the next action. In the trial the relays made the fraction
-    /// `share` of their moves. It has the spare length `slack` at Rx, m, for the target `sigma`, in ln(SIR).
+    /// `share` of their moves. The trial has the spare length `slack` at Rx, m, for the target SIR `sigma`, in
+    /// ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);

@@ -43,8 +43,8 @@ use crate::place::Placement;
 use crate::sir::square;
 
 /// Derivatives of the end of a hop of maximum length, with which the joint method computes moves. Such a hop just
-/// meets its target. So one coordinate of its end (the dependent one) follows from the other two, w, from the hop's
-/// start p, and from the target.
+/// meets its target SIR. So one coordinate of its end (the dependent one) is a function of three things: the other
+/// two coordinates w, the hop's start p, and the target SIR.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -54,14 +54,14 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the third coordinate of the hop's end, which depends on w and p. w are the other two
-    /// coordinates of the end, p is the start. There is a row for each coordinate of w, with a value for each
-    /// coordinate of p.
+    /// Second derivatives of the dependent coordinate of the hop's end, by w and p. w are the other two coordinates
+    /// of the end, p is the start. There is a row for each coordinate of w, with a value for each coordinate of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the third coordinate of the hop's end by the other two, w_1 and w_2. The order is w_1
-    /// w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end by its other two, w_1 and w_2. The order is
+    /// w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the third coordinate of the hop's end by the target in ln(SIR), m. The other two are fixed.
+    /// Derivative of the dependent coordinate of the hop's end by the target SIR in ln(SIR), m. The other two
+    /// coordinates of the end do not change.
     pub(super) by_target: f32,
 }
 

@@ -21,11 +21,11 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Expected gain of slack (spare length at Rx) by later relays' moves, m: the linear part. It is multiplied by
-    /// the fraction of the moves that is tried.
+    /// Coefficient of f in the slack (spare length at Rx) that later relays' moves should add, m. f is the fraction
+    /// of their computed moves that is tried. Later relays are those toward Rx.
     pub(crate) linear: f32,
-    /// Expected gain of slack (spare length at Rx) by later relays' moves, m: the quadratic part. It is multiplied by
-    /// the square of the fraction of the moves that is tried.
+    /// Coefficient of f^2 in the slack (spare length at Rx) that later relays' moves should add, m. f is the fraction
+    /// of their computed moves that is tried. Later relays are those toward Rx.
     pub(crate) square: f32,
 }
 

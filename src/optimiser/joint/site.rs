@@ -31,7 +31,7 @@ const HALVINGS: u8 = 12;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
-    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / P, 1/m^2; 0 without noise.
+    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,
@@ -123,8 +123,9 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. It is the centre and
-    /// the squared radius, m^2. `None` if c = target / gain is at most 1, where the reach has no such limit.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is the
+    /// centre and the squared radius, m^2. `None` if c = target / gain is at most 1, where the reach has no such
+    /// limit.
     fn disk(
         &self,
         target: f32,
@@ -428,7 +429,7 @@ impl Room {
 /// leaves the first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
-/// Number of bisection steps for the optimum of a first hop with noise.
+/// Number of bisection steps for the position with the largest SIR of a first hop with noise.
 const END_HALVINGS: u8 = 24;
 
 /// Returns the maximum SIR of the first hop, less a margin that leaves the relay a choice of position. `room` has the
@@ -507,15 +508,16 @@ pub(super) fn tail(
     (slack, outlook)
 }
 
-/// Weight of the penalty for a violated minimum separation, in units of D. It is so large that no gain of spare
-/// length at Rx is worth a violation.
+/// Weight of the penalty for a violated minimum separation, in units of the distance from Tx to Rx. It is so large
+/// that no gain of spare length at Rx is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from a limit of its allowed range at which a relay counts as at that limit, in units of D.
+/// Distance from a limit of its allowed range at which a relay counts as at that limit. It is a fraction of the
+/// distance from Tx to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Maximum unused part of a hop's squared length for which the hop counts as fully stretched. It applies to hops that
-/// end at the x of Rx. A hop with a larger unused part does not restrict the move of its receiver.
+/// Relative difference of a hop's squared length from the maximum, up to which it counts as stretched. It applies to
+/// hops that end at the x of Rx. With a larger difference the hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
@@ -606,7 +608,8 @@ impl Site<'_> {
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
     /// It is the one with the steepest slope of those that are not at a limit of their allowed range, `low` to
-    /// `high`. The second result is the derivative by it of F; F is 0 for a hop of maximum length (see `hop`).
+    /// `high`. The second result is the derivative of F by the selected coordinate; F is 0 for a hop of maximum
+    /// length (see `hop`).
     fn axis(
         &self,
         c: f32,

@@ -15,7 +15,7 @@ use crate::sir::square;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
     /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and height of its middle,
-    /// in units of D / 2.
+    /// in units of half the distance from Tx to Rx.
     Arch { aside: f32, up: f32 },
     /// Initial chain on a spiral about the interferer. It leads from Tx to Rx through a position right above or
     /// beside the interferer.
@@ -36,15 +36,16 @@ pub(super) enum Start {
     /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside
     /// it. The corner is at the highest altitude, on the side away from the interferer.
     Turns,
-    /// Initial chain at the lowest altitude, for a high target. No hop can then pass the interferer in one leap.
+    /// Initial chain at the lowest altitude, for a high target. The target is so high that no hop can pass the
+    /// interferer in one leap.
     Near,
     /// Initial chain with relay 1 at the x of Rx, high above it or far to its side. The lateral offsets and altitudes
     /// of the other relays lead down from there in equal steps.
     Far,
 }
 
-/// Parabolas that are tried as initial chains. Each has a lateral offset and a height in the middle, in units of D /
-/// 2.
+/// Parabolas that are tried as initial chains. Each has the lateral offset and the height of its middle, in units of
+/// half the distance from Tx to Rx.
 const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
@@ -59,7 +60,7 @@ const ARCHES: [(f32, f32); 7] = [
 const THROUGH: usize = 3;
 
 /// Initial chains for relays of which some have a fixed altitude. Each has the lateral offset of its middle, in units
-/// of D / 2, and true if the altitude is level toward Tx and Rx.
+/// of half the distance from Tx to Rx. The `bool` is true if the altitude is level toward Tx and Rx.
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -334,5 +335,5 @@ impl Seek {
     }
 }
 
-/// Maximum step between two targets, in ln(SIR); with a longer one the search gives up.
+/// Maximum step between two targets, in ln(SIR). If the next step would be longer, the search ends.
 const MOST_STEP: f32 = 40.0;

@@ -234,7 +234,7 @@ pub(super) fn narrow(value: f64) -> f32 {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Maximum number of doublings of a coordinate in the search for a point that fails a condition.
+/// Maximum number of times that t is doubled to find a t at which a condition no longer holds.
 const DOUBLINGS: u8 = 100;
 
 /// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. Missing ones are NaN.
@@ -260,7 +260,8 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     slope.turns().map(|t| libm::copysign(1.0, p) * t)
 }
 
-/// Function phi(t) whose sign for t > 0 is that of the slope of the first hop's SIR along an edge. `p` is above 0.
+/// Function phi(t) whose sign for t > 0 is that of the slope of the first hop's SIR along an edge. t is the position
+/// on the edge. `p`, the t closest to the interferer, is above 0.
 struct Slope {
     p: f64,
     a: f64,

@@ -51,7 +51,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the altitude of relay `index`, m, if it is fixed and others are not; else `None`.
+    /// Returns the altitude of relay `index`, m, if it is fixed. `None` if the relay may choose its altitude, or if
+    /// the mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = (self.seat_of)(index).room;
         let free = !self.mission.config().band.is_single();

@@ -20,7 +20,7 @@ pub(super) const JUDGED: f32 = 4e-6;
 /// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Difference between the first limit on a chain's target and the upper bound of its SIR, in ln(SIR).
+/// Excess of the first limit of a chain's target over the upper bound of all chains, in ln(SIR).
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -192,8 +192,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the ascent from the current initial chain may still give the best chain. An ascent improves
-    /// one initial chain step by step.
+    /// Returns true if the current chain may still become the best one, so that it is improved again.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
@@ -245,13 +244,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays of a chain that is improved at the end by trial moves of single relays. Chains in which
+/// Maximum number of relays for which the last phase improves the chain by single-relay trial moves. Chains in which
 /// some relays have a fixed altitude are always improved so, since their path has kinks.
 const POLISHED: u16 = 5;
 
-/// Number of times that the trial moves of the relays are halved at the end of the solution.
+/// Number of times that the relays' trial moves are halved in the last phase of the solution.
 const HALVINGS: u16 = 12;
-/// First trial move of a relay at the end of the solution, as a fraction of its allowed range.
+/// First trial move of a relay in the last phase of the solution, as a fraction of its allowed range.
 const FIRST_MOVE: f32 = 0.25;
 
 /// Minimum gain of the target for which a trial move of a relay is accepted, in ln(SIR).
@@ -391,8 +390,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`. They are those of a new initial chain if `purpose`
-    /// is a start, and otherwise the stored ones.
+    /// Returns the lateral offset and altitude of relay `index`. With the purpose [`Purpose::Start`] they are those
+    /// of a new initial chain, otherwise those stored for the current chain.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -34,9 +34,9 @@ pub use chain::Seat;
 struct ForwardPass {
     /// Number of relays that the forward pass has completed.
     done: u16,
-    /// New position of the last relay that this forward pass has moved.
+    /// Position to which the forward pass has moved the last relay that it has completed.
     from: Placement,
-    /// Position that the last relay moved by this forward pass had before the pass.
+    /// Position before the forward pass of the last relay that the pass has completed.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -124,9 +124,10 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     holds_back: bool,
     /// True if the minimum separation has limited the improvement of any chain.
     walled: bool,
-    /// Number of the current trial move of a single relay, at the end of the solution.
+    /// Index of the current trial move of a single relay, in the last phase of the solution. It counts the kinds of
+    /// move fastest, then the relays, then the halvings of the moves.
     moving: u16,
-    /// Number of trial moves of single relays that were accepted at the end of the solution.
+    /// Number of trial moves of single relays that were accepted in the last phase of the solution.
     moved: u8,
     /// Lateral offset and altitude that a relay had before its current trial move.
     kept: Cell,

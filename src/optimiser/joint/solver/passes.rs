@@ -22,9 +22,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Work::Back(last_of(mission))
     }
 
-    /// Computes the policies (moves) of the relays in `segment`; returns the value function at its start.
+    /// Computes the policies (moves) of the relays in `segment`. Returns the value function of the relay before the
+    /// segment, which is at `before`.
     ///
-    /// The relay before the segment is at `before`. `None` if a hop cannot meet the target. Bounded by ten relays.
+    /// `None` if a hop cannot meet the target. Bounded by ten relays.
     pub(super) fn recall(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -189,8 +190,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 /// Number of relays per call in a pass that only computes x, and no moves of the relays.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty at which a chain counts as feasible, in units of D. The penalty is for relays too near the
-/// interferer.
+/// Maximum penalty at which an improved chain counts as feasible. It is a fraction of the distance from Tx to Rx. The
+/// penalty is for relays too near the interferer.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
