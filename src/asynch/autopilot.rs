@@ -20,7 +20,7 @@ use crate::time::Duration;
 
 /// Pause after the autopilot's port has failed, ended or accepted nothing.
 ///
-/// The data exchange with the relay also pauses for this time, unless an event requests it earlier.
+/// It is also the minimum time between two data exchanges with the relay, unless an event requests one earlier.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.

@@ -55,7 +55,8 @@ impl<'a> AsyncRelay<'a> {
         done
     }
 
-    /// Passes the relay to `look` without waking its ports: for a setpoint or counters. `None` as with [`with`](Self::with).
+    /// Passes the relay to `look` without waking its ports: for a setpoint or counters. Returns `None` inside the
+    /// `work` or `look` of another call, which already has the relay.
     pub fn look<R>(&self, look: impl FnOnce(&Relay) -> R) -> Option<R> {
         self.lend(|relay| look(relay))
     }
@@ -78,7 +79,8 @@ impl<'a> AsyncRelay<'a> {
         self.counters(port).get()
     }
 
-    /// Passes the relay to `work` without waking the task that runs the ports.
+    /// Passes the relay to `work` without waking the task that runs the ports. Returns `None` if another call already
+    /// has the relay.
     pub(super) fn lend<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }

@@ -11,8 +11,7 @@ use crate::root::sqrt;
 /// Number of target SIRs in a full ladder, the set of targets that one sweep along the chain tries.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps between neighbouring targets from the middle gap of a full ladder to either end. The middle gap is
-/// counted.
+/// Number of gaps between neighbouring targets in half of a full ladder, including the middle gap.
 const HALF: usize = TARGETS / 2;
 
 /// Ladder: target SIRs (linear, rising) that the relays try in one pass along the chain (a sweep). They are encoded
@@ -173,7 +172,7 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
 }
 
 /// Returns the ratio of the highest target to the lower of the two middle targets. The ratio of the higher of those
-/// two to the lowest target is the same.
+/// two to the lowest target is the same. `gap` and `growth` are the codes in a [`Ladder`].
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()

@@ -126,8 +126,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Continues [`extend`](Self::extend) within the work of one call; returns true once all are computed. The limit
-    /// is 16 reaches (farthest x for a target); in an interference field 128 of its points, or one target.
+    /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. A reach is the
+    /// farthest x for a target. One call computes 16 of them, or in an interference field as many as take 128
+    /// evaluations of its points, at least one.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);

@@ -48,7 +48,7 @@ use crate::sir::{Sender, square};
 /// best x for forward traffic to the best x for backward traffic.
 const HALVINGS: u8 = 6;
 
-/// Relative rounding error that is allowed to the length of a hop at the limit of its target.
+/// Relative rounding error by which the squared length of a backward hop may exceed its maximum.
 const ROUNDING: f32 = 4e-6;
 
 /// Number of f32 steps by which a computed root is moved, at most, until the hop meets its target.
@@ -158,8 +158,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the first x from `place` on at which this hop's sender receives the backward hop, m. The backward hop
-    /// is sent from `from_m`. `None` if there is no such x.
+    /// Returns the smallest x of at least `place` at which this hop's sender receives the backward hop, m. The
+    /// backward hop is sent by this hop's receiver, at x = `from_m`. `None` if there is no such x.
     ///
     /// `c` is the gain over the target for the field's largest Upsilon. At most one root for each field point in
     /// between.
@@ -341,7 +341,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the ratio of Upsilon = E[1/I] at `x_m` to the field's largest.
+    /// Returns the ratio of Upsilon = E[1/I] at `x_m` to the largest Upsilon of the interference field.
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
             Self::Evenly(quiet) => quiet,

@@ -500,7 +500,7 @@ impl Hop {
     }
 }
 
-/// Relative rounding error that is allowed to a hop's SIR at the limit of its target.
+/// Relative rounding error by which a hop's SIR may be below its target when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
 /// Returns the sum `from_m` + `d`, rounded toward `from_m`; `None` if that equals `from_m`. Two relays must never
@@ -522,8 +522,9 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 
 /// Returns the maximum distance along x, m, from which a relay meets `target` at Rx (`d_max`).
 ///
-/// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited
-/// to D, so that it is a smooth function of the target, which the root search needs.
+/// It is sqrt(K / gamma - y^2 - h^2), at most 1e9, with the factor K of the last hop, the target gamma, and the
+/// relay's offset y and altitude h. `None` if even a relay right above the receiver is too weak. Not limited to D, so
+/// that it is a smooth function of the target, which the root search needs.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;

@@ -49,8 +49,9 @@ use crate::place::Placement;
 /// variance the search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum fall of the fit's residual by which the exclusion of a relay shows that it is faulty. It is a squared
-/// number of standard deviations.
+/// Squared number of standard deviations from which on a deviation shows that a relay is faulty. It is the minimum
+/// fall of the fit's residual by the exclusion of that relay, over the variance. A relay that checks its own
+/// measurements uses it, too.
 const DEVIATIONS: f64 = 49.0;
 
 /// Minimum residual of the fit to all measurements for which a faulty relay is searched. The exclusion of the faulty

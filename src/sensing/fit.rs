@@ -113,7 +113,7 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the last unknown: one over the unknown's variance, for measurements of variance 1.
+    /// Pivot of the last unknown. Its inverse is the unknown's variance, for measurements of variance 1.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last

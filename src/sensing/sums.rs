@@ -109,7 +109,8 @@ pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
 }
 
 /// Returns the four coefficients of `source`, which turn a position's terms into v = 1e-12 W / I. They are k (X'^2 +
-/// Y'^2 + 1/3), -2 k X', k and -2 k Y', with X' and Y' the position in units of D / 2.
+/// Y'^2 + 1/3), -2 k X', k and -2 k Y'. X' and Y' are the position in units of half the distance from Tx to Rx, and k
+/// is the [`strength`].
 pub(crate) fn coefficients(mission: &Mission, source: &Interferer) -> [f64; 4] {
     let config = mission.config();
     let half = 0.5 * f64::from(config.distance_m);
@@ -148,7 +149,8 @@ pub struct Sums {
     pub(crate) numbers: [f32; SUMS],
 }
 
-/// Limit of each sum, which keeps it finite. Measurements within 2 D of the line Tx to Rx do not reach it.
+/// Limit of each sum, which keeps it finite. Measurements do not reach it within two Tx-Rx distances of the line Tx
+/// to Rx.
 const MOST: f32 = 1e38;
 
 fn within(sum: f32) -> f32 {

@@ -566,8 +566,8 @@ mod tests {
         );
     }
 
-    /// Checks that the velocity does not jump when a new setpoint is in another direction. The old direction is left
-    /// within 3 s.
+    /// Checks that the velocity does not jump when a new setpoint is in another direction. The velocity in the old
+    /// direction ends within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

@@ -48,7 +48,7 @@ const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from an ArduCopter's mode change to its report of the fence breach that was the cause.
+/// Maximum time from an ArduCopter's mode change to its report of the fence breach behind the change.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
 /// Time for which a reason not to control the drone must last before the operator is told.

@@ -582,7 +582,8 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 /// Maximum age of a reported position too far from the line Tx to Rx; an older one counts as unknown.
 const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 
-/// Position of a drone too far from the line Tx to Rx for the mission's coordinates, and its distance.
+/// Position of a drone too far from the line Tx to Rx for the mission's coordinates. It includes the distance of the
+/// drone from that line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OffLine {
@@ -620,7 +621,7 @@ impl OffLine {
 pub(super) struct OffLineDetector {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
-    /// True once a position far from the line was reported while the drone was on the ground.
+    /// True after a report on the ground of a position far from the line, until a position near the line.
     reported_on_ground: bool,
 }
 

@@ -21,7 +21,8 @@ const RIM: f32 = 0.999_99;
 /// slightly, and the margin makes that harmless.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Number of Newton steps to the point at which a hop with noise is linearised (see [`Tangent`]).
+/// Number of Newton steps in the computation of a hop with noise. Each step linearises the hop's condition at the end
+/// found so far (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
 /// Number of bisection steps by which [`Site::halved`] finds the farthest reachable point of a path.

@@ -24,7 +24,8 @@ pub(super) enum Start {
     /// the geometric mean of the distances of Tx and Rx.
     Around { aside: f32, up: f32, far: f32 },
     /// Initial chain on a parabola as `Arch`, computed without a minimum separation. Its highest target is then
-    /// searched with hops computed as by the relays; a relay may stay short of its farthest position.
+    /// searched with hops computed exactly as the relays compute them; a relay may stay short of its farthest
+    /// position.
     Through { aside: f32, up: f32 },
     /// Initial chain for relays of which some have a fixed altitude: a parabola to the side. The altitudes of the
     /// others are interpolated.

@@ -261,7 +261,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
     }
 }
 
-/// Number of additional relays that are tried if the minimum separation makes the minimum number fail.
+/// Maximum number of relays that are added if the minimum separation makes the minimum number fail.
 const MORE: u16 = 32;
 
 #[cfg(feature = "internals")]

@@ -107,7 +107,8 @@ pub enum AsideCase {
 }
 
 impl AsideCase {
-    /// Number of the case, 1 to 10. Cases 1 to 3 are optima without limits, 4 to 6 those on edges along x, y and h.
+    /// Number of the case, 1 to 10. Cases 1 to 3 are optima without limits, 4 to 6 those on edges along x, y and h, 7
+    /// and 8 those with the interferer at Tx or Rx, 9 and 10 those with noise.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,

@@ -177,8 +177,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target with hops computed as by the relays. The relays compute
-    /// the hops from their messages.
+    /// Returns the work that searches for the highest target that the current chain meets. The hops are computed
+    /// exactly as the relays compute them from their messages.
     ///
     /// The chain results from an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in
     /// ln(SIR). Relays may stay short of their farthest position.
@@ -198,8 +198,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the improvement of the current chain is stopped early. It then cannot give the best chain.
-    /// `turn` is its next action.
+    /// Returns true if the current chain can no longer become the best one, so that its improvement stops. `turn` is
+    /// the next action of the improvement.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))

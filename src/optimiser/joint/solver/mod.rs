@@ -69,16 +69,19 @@ enum Purpose {
     Start,
     /// The search raises the target during the improvement of a chain, while its relays stay.
     Raise,
-    /// The search computes the chain's slack (spare length at Rx) again after the cap on it was lowered.
+    /// The work computes the chain's slack (spare length at Rx) again after the cap on the slack was lowered.
     Tighten,
-    /// The search finds the highest target of an improved chain, with hops as in its improvement.
+    /// The search finds the highest target of an improved chain. Hops are computed as in the improvement, with its
+    /// margins, and not as the relays compute them.
     Judge,
-    /// The search finds the highest target of an improved chain, with hops computed as by the relays. The relays
-    /// compute hops from their messages. Some may then stay short of their farthest position.
+    /// The search finds the highest target of an improved chain. Hops are computed exactly as the relays compute them
+    /// from their messages. Some relays may then stay short of their farthest position.
     Last,
-    /// The search checks that the chain meets its upper bound, with hops computed as by the relays.
+    /// The search checks if the chain meets the upper bound of all chains. Hops are computed exactly as the relays
+    /// compute them from their messages.
     Probe,
-    /// The search checks a trial move of one relay, with hops computed as by the relays.
+    /// The search checks a trial move of one relay. Hops are computed exactly as the relays compute them from their
+    /// messages.
     Move,
 }
 
@@ -106,10 +109,12 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: [Cell; RELAYS],
-    /// Start value of the search for the highest target SIR that the best chain meets, in ln(SIR). With it the stored
-    /// best chain can be used, and its improvement is not repeated. `None` if a repetition would give another chain.
+    /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for the best chain's
+    /// highest target starts there, so that the improvement is not repeated. `None` if a repetition would give
+    /// another chain.
     best_judged: Option<f32>,
-    /// Start value of the search for the highest target SIR that the current chain meets, in ln(SIR).
+    /// Target at which the improvement of the current chain ended, in ln(SIR). The search for the highest target that
+    /// the chain meets starts there. `None` before the end, and if the improvement was cut short.
     judged_at: Option<f32>,
     /// True if no comparison with the best chain has cut the current chain's improvement short. A repetition of the
     /// improvement would then give the same chain.
