@@ -417,8 +417,8 @@ impl LocalSearch {
         best
     }
 
-    /// Evaluates the next position of the grid; altitudes vary first. Returns the number of evaluations, 1, or `None`
-    /// after the last position.
+    /// Evaluates the next position of the grid, which is traversed altitude by altitude at each x. Returns the number
+    /// of evaluations, 1, or `None` after the last position.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;

@@ -324,7 +324,7 @@ pub struct Step {
 /// Interference at the receiver of a hop, as a function of its x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
-    /// Same interference at every x, as measured: Upsilon = E[1/I] over the field's largest.
+    /// Same interference at every x, as measured: Upsilon = E[1/I] over the largest one of the field.
     Evenly(f32),
     /// Interference field of the mission, with receiver noise.
     In(InNoise<'a>),

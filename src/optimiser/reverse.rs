@@ -86,7 +86,7 @@ pub struct Back {
     to_tx: bool,
     /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance of the receiver from the interferer across x, (Y - y0)^2 + h0^2, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, (Y - y0)^2 + h0^2, m^2.
     aside_squared: f32,
     /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
@@ -162,7 +162,7 @@ impl Back {
     }
 }
 
-/// Hop from Rx to the last relay, the first one of the traffic from Rx to Tx.
+/// Hop from Rx to the last relay: the first hop of the traffic from Rx to Tx.
 pub(super) struct FromRx {
     /// Hop from Rx in a mirrored frame: x is the distance from Rx.
     hop: Hop,

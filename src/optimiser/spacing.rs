@@ -103,12 +103,12 @@ pub struct Hop {
     sender: Sender,
     /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance of the receiver from the interferer across x, (Y - y)^2 + h^2, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, (Y - y)^2 + h^2, m^2.
     aside_squared: f32,
     /// Part of the hop's equation that depends neither on the target nor on the length, m^2. It is (Y - y0) (Y + y0 -
     /// 2y) + h0 (2h - h0). The interferer is at (X, Y), the sender at (y0, h0), the receiver at (y, h).
     base: f32,
-    /// Squared distance of receiver and sender across x, (y - y0)^2 + (h - h0)^2, m^2.
+    /// Squared distance of receiver and sender perpendicular to x, (y - y0)^2 + (h - h0)^2, m^2.
     across_squared: f32,
     /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
@@ -546,7 +546,7 @@ const TURNS: u8 = 5;
 /// at most this counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// Relative change of the hop length at which the search for the maximum length ends.
+/// Relative change of the hop length below which the search for the maximum length ends.
 const CLOSE: f32 = 5e-7;
 
 impl Hop {
@@ -603,12 +603,12 @@ pub(super) struct NoisyHop {
     pub(super) excess: f32,
     /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
-    /// Squared distance of the receiver from the interferer across x, a^2, m^2.
+    /// Squared distance a^2 of the receiver from the interferer perpendicular to x, m^2.
     pub(super) aside_squared: f32,
-    /// Squared distance of the receiver from the sender across x, b^2, m^2.
+    /// Squared distance b^2 of the receiver from the sender perpendicular to x, m^2.
     pub(super) across_squared: f32,
-    /// Difference of two squared distances across x, m^2: receiver to interferer less receiver to sender. It is
-    /// computed without cancellation.
+    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the
+    /// interferer, b from the receiver to the sender. It is computed without cancellation.
     pub(super) base: f32,
     /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2, above 0.
     pub(super) noise: f32,

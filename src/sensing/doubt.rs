@@ -63,14 +63,15 @@ const LEAST: f64 = 0.02;
 /// variance of a fit that excludes one relay. With a smaller ratio it remains unknown which relay is faulty.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of relative errors for measurements to count as consistent; some 1.5 dB.
+/// Maximum variance of relative errors for measurements to count as consistent. Its square root is an error of some
+/// 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay's measurement fits the others again, so that it is used. The first is a
+/// Limits within which an excluded relay's measurement fits the others, so that it is used again. The first is a
 /// multiple of the variance, the second a squared relative difference; the larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 

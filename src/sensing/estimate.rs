@@ -117,7 +117,7 @@ const FOLLOWED: f64 = 1.5;
 /// means another interferer, so the count of refinements starts again.
 const ANOTHER: f64 = 64.0;
 
-/// Squared relative change of the level measured at Rx that counts as a change of the interference.
+/// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
 /// Maximum squared deviation of a moving interferer's track from the fit, over the fit's variance. With a larger one
@@ -135,18 +135,18 @@ const REFINED: u8 = 4;
 /// far ahead, plus half the interval between two collections of measurements.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Mean square relative error of measurements that contradicts an estimated source. The relays then treat the
+/// Minimum mean square relative error of measurements that contradicts an estimated source. The relays then treat the
 /// interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error of measurements that contradicts the mission's interference, over their variance. The relays
-/// then treat the interference as unknown.
+/// Minimum mean square error of measurements that contradicts the mission's interference. It is in units of the
+/// measurements' variance. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information (certainty) of the measurements: number of positions over the variance of a single one.
+    /// Information (certainty): number of measured positions over the variance of one position's error.
     information: f64,
     /// Mean square relative error that the current estimate is expected to have.
     chance: f64,

@@ -247,7 +247,7 @@ impl Fit {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Information (certainty) of the measurements: number of positions over the variance of a single one.
+    /// Information (certainty): number of measured positions over the variance of one position's error.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }

@@ -8,7 +8,8 @@ use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time for which messages are counted before their rates are checked; too rare ones are requested again.
+/// Time for which messages are counted before their rates are checked. Messages that come too rarely are requested
+/// again.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
 /// Maximum time from a request for a message to its answer.

@@ -516,8 +516,8 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum of the relay's clock less the autopilot's clock, µs, for each half of the window. The first is of the
-    /// previous half, the second of the present one.
+    /// Minimum of the relay's clock less the autopilot's clock, µs, in each half of the time window. The first is of
+    /// the previous half, the second of the present one.
     least: [i64; 2],
     since: Instant,
     messages: u8,

@@ -89,8 +89,8 @@ pub(crate) struct Ascent {
     /// Upper limit of the target SIR, in ln(SIR). A chain that meets the limit is checked against the upper bound of
     /// all chains.
     limit: f32,
-    /// Next increase of the target's limit, in ln(SIR). It is made if a chain that meets the limit fails the check
-    /// against the upper bound.
+    /// Next increase of the upper limit of the target SIR, in ln(SIR). It is made if a chain that meets the limit
+    /// fails the check against the upper bound of all chains.
     excess: f32,
     /// Cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. It is lowered if relays
     /// too near the interferer cause a penalty, so that spare length cannot outweigh the penalty.

@@ -36,7 +36,7 @@ struct ForwardPass {
     done: u16,
     /// Position to which the forward pass has moved the last relay that it has completed.
     from: Placement,
-    /// Position before the forward pass of the last relay that the pass has completed.
+    /// Old position, before the forward pass, of the last relay that the pass has completed.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -69,7 +69,7 @@ enum Purpose {
     Start,
     /// The search raises the target during the improvement of a chain, while its relays stay.
     Raise,
-    /// The work computes the chain's slack (spare length at Rx) again after the cap on the slack was lowered.
+    /// The work computes the chain's slack (spare length at Rx) again, after the slack's cap was lowered.
     Tighten,
     /// The search finds the highest target of an improved chain. Hops are computed as in the improvement, with its
     /// margins, and not as the relays compute them.
@@ -257,8 +257,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that a shortcut of the solver changes nothing: it stores the best chain. Without the shortcut it would
-/// compute that chain a second time.
+/// Checks that the solver may store the best chain instead of computing it a second time at the end.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
