@@ -226,7 +226,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the x of [`Retreat::reach`] for the traffic toward Rx only.
+    /// Returns the x of [`Retreat::reach`] for the traffic toward Rx only; `None` if there is none.
     fn onward(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {

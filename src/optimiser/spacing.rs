@@ -569,7 +569,8 @@ impl Hop {
         }
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m: [`Hop::reach`] for a hop with noise.
+    /// Returns the largest x at which the receiver meets `target`, m: [`Hop::reach`] for a hop with noise. `None` if
+    /// there is none.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;

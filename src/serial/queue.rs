@@ -400,7 +400,7 @@ impl<P: AtomicSlot> Producer<'_, P> {
 }
 
 impl<P: AtomicSlot> Consumer<'_, P> {
-    /// Returns the first item of the ring without removing it.
+    /// Returns the first item of the ring without removing it; `None` if the ring is empty.
     pub(super) fn peek(&self) -> Option<P::Item> {
         let RingEnd { slots, indices } = &self.0;
         let first = indices.first.load(Ordering::Relaxed);

@@ -83,14 +83,14 @@ pub struct Autopilot {
     state: State,
     setpoint: Option<Placement>,
     bearing: Option<Bearing>,
-    /// Side of the neighbour that a directional antenna points to.
+    /// Side of the neighbour that a directional antenna points to; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
     /// Time at which the drone's position was last lost.
     blind_at: Option<Instant>,
-    /// Time since which positions are received again, after the drone's position was lost.
+    /// Time since which positions are received again in the state [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
     /// Time for which positions must be received regularly before the present state [`State::Blind`] ends.
     recovery: Duration,

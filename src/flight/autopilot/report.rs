@@ -268,7 +268,7 @@ impl Report {
         None
     }
 
-    /// Returns the time at which the next line or number is due.
+    /// Returns the time at which the next line or number is due; `None` if none waits to be sent.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let waits = !(self.lines.is_empty() && self.texts.is_empty());
         let lines = self.recent.iter().map(|(_, until)| *until);

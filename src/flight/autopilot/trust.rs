@@ -58,7 +58,8 @@ pub(super) struct Trust {
     #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
-    /// Kind of signature mismatch in the latest heartbeats, and the number of heartbeats in a row with it.
+    /// Kind of signature mismatch in the latest heartbeats, and the number of heartbeats in a row with it. `None` if
+    /// the last heartbeat had no mismatch.
     row: Option<(Mistrust, u8)>,
     /// Kinds of signature mismatch that have to be reported, as bits.
     due: u8,

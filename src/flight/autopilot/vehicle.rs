@@ -342,7 +342,8 @@ impl Vehicle {
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the time at which the next received value becomes too old, if no new message comes before.
+    /// Returns the time at which the next received value becomes too old, if no new message comes before. A TIMESYNC
+    /// request that is due earlier also counts. `None` if there is no such time.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -478,7 +479,8 @@ impl Echo {
         }
     }
 
-    /// Returns the time at which the next TIMESYNC request is due, or at which the link counts as late.
+    /// Returns the time of the next TIMESYNC request, or of a change of `is_late` if that is earlier. `None` if
+    /// neither is pending.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let late = self.answered_at.map(|at| at + LATE).filter(|at| *at > now);
         let all = [self.due, late, self.begun_at.map(|at| at + SUPPORT_TIMEOUT)];

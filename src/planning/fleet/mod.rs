@@ -131,8 +131,8 @@ impl Mission {
     }
 }
 
-/// Returns the minimum number of relays for `target`. Its field `proven` is only valid for a mission without a
-/// minimum separation.
+/// Returns the minimum number of relays for `target`; `None` if no number of relays meets it. The result's field
+/// `proven` is only valid for a mission without a minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))
@@ -277,8 +277,8 @@ fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
     chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
 
-/// Returns the minimum number of relays for `target` in an interference field. All relays have the same `profile`.
-/// Without a minimum separation it is found by bisection; see [`Fewest::of`].
+/// Returns the minimum number of relays for `target` in an interference field; `None` if there is none. All relays
+/// have the same `profile`. Without a minimum separation the number is found by bisection; see [`Fewest::of`].
 fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<Fewest> {
     let met_by = |mission: &Mission, relays: u16| {
         mission

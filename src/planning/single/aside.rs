@@ -123,8 +123,8 @@ impl AsideCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The
-/// position is in [0, D] and in the allowed lateral range.
+/// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The x is
+/// between Tx and Rx, and y in the allowed lateral range.
 ///
 /// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64; with noise each of them takes 48
 /// more. If the optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral
@@ -133,8 +133,8 @@ pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The
-/// position is in [0, D] and in the allowed ranges of altitudes and lateral offsets.
+/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The x
+/// is between Tx and Rx; y and altitude are in their allowed ranges.
 ///
 /// Work: 48 bisection steps in f64; with noise each of them takes 48 more. If the optimum without limits is not
 /// allowed, some 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
@@ -242,8 +242,8 @@ fn without_limits(
     (place, case)
 }
 
-/// Horizontal plane at one altitude, with all numbers that determine both hops' SIRs in it. In m and m^2: D,
-/// interferer (X, Y), h^2, ratio G = K / A of the gains of both hops, noise nu.
+/// Horizontal plane at one altitude h, with all numbers that determine both hops' SIRs in it. In m and m^2: Tx-Rx
+/// distance D, interferer (X, Y), h^2, ratio G = K / A of the gains of both hops, noise nu.
 struct Plane {
     d: f64,
     x: f64,

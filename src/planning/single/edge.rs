@@ -420,8 +420,8 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
 }
 
 /// Returns the position in the plane y = `y_m` at which the two hops' curves of constant SIR touch. `None` if it is
-/// outside of [0, D] or of the altitudes `band`, and without noise, where it does not exist. Work: 40 bisection
-/// steps.
+/// not between Tx and Rx or not within the altitudes `band`, and without noise, where it does not exist. Work: 40
+/// bisection steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -461,8 +461,8 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane y = y0, with all numbers that determine both hops' SIRs in it. In m and m^2: D, interferer's X, (y0
-/// - Y)^2, y0^2, noise nu, ratio G = K / A of the gains of both hops.
+/// Vertical plane y = y0, with all numbers that determine both hops' SIRs in it. In m and m^2: Tx-Rx distance D,
+/// interferer's X, (y0 - Y)^2, y0^2, noise nu, ratio G = K / A of the gains of both hops.
 struct Face {
     d: f64,
     x: f64,
@@ -473,8 +473,8 @@ struct Face {
 }
 
 impl Face {
-    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane, as x - D, m. `r` is the
-    /// radius of the circle, m.
+    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane. The result is its x
+    /// less that of Rx, m. `r` is the radius of the circle, m.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);

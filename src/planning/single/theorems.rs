@@ -89,23 +89,23 @@ pub enum PlaceCase {
     /// Optimum at the only x where both hops have the same SIR. The first hop's SIR falls all the way to Rx, and
     /// crosses the second's once.
     Crossing = 2,
-    /// Optimum at x = D: the first hop's SIR falls all the way to Rx, and is the higher one even there.
+    /// Optimum above Rx: the first hop's SIR falls all the way to Rx, and is the higher one even there.
     AboveRx = 3,
-    /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is at x = D
+    /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is above Rx
     /// instead if the first hop's SIR has risen enough beyond its minimum.
     BeforeValley = 4,
-    /// Optimum at x = D: the first hop's SIR has a minimum before Rx, and is the higher one even there.
+    /// Optimum above Rx: the first hop's SIR has a minimum before Rx, and is the higher one even there.
     OverValley = 5,
     /// Optimum at the maximum of the first hop's SIR, which is the lower one even there. The interferer is behind Tx.
     Hilltop = 6,
     /// Optimum where both hops have the same SIR, beyond the maximum of the first hop's. The interferer is behind Tx.
     BeyondHill = 7,
-    /// Optimum at x = D, with the interferer behind Tx. The first hop's SIR rises all the way to Rx, or is the higher
+    /// Optimum above Rx, with the interferer behind Tx. The first hop's SIR rises all the way to Rx, or is the higher
     /// one even there.
     HillAboveRx = 8,
-    /// Optimum at x = D: the interferer is at Tx, so the first hop's SIR is the same everywhere.
+    /// Optimum above Rx: the interferer is at Tx, so the first hop's SIR is the same at every x.
     Level = 9,
-    /// Optimum at x = D: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
+    /// Optimum above Rx: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 10,
     /// Optimum at the maximum of the first hop's SIR after its minimum, or at the SIRs' crossing after it. Only with
     /// noise.
@@ -220,7 +220,7 @@ impl AltitudeCase {
 }
 
 /// Returns the optimal altitude in the mission's range, m, and its case. The relay has `power_w` watts and is at
-/// `x_m`, in [0, D].
+/// `x_m`, which is between Tx (0) and Rx (D).
 ///
 /// `None` in an interference field, and for `x_m` outside [0, D]. Work: at most six evaluations of both hops and one
 /// of Lemma 1.
@@ -292,7 +292,7 @@ pub enum FreeCase {
 }
 
 /// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. Its x
-/// is in [0, D], and its altitude in the mission's range.
+/// is between Tx and Rx, and its altitude in the mission's range.
 ///
 /// Work: at most 190 evaluations of both hops and one of Lemma 1.
 pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
