@@ -326,8 +326,8 @@ mod tests {
         assert!(found > 12, "{found}");
     }
 
-    /// Checks that the last relay moves back toward Tx until it receives Rx well enough. It begins at x = 650 m,
-    /// beside a strong interferer at x = 700 m; Rx is at x = 1000 m.
+    /// Checks that the last relay is placed farther from Rx, at an x at which it receives Rx well enough. At x = 650
+    /// m, where the search begins, a strong interferer at x = 700 m prevents that. Rx is at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

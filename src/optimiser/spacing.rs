@@ -779,9 +779,9 @@ mod tests {
         )
     }
 
-    /// Checks the maximum length of a first hop whose SIR rises with the length at first.
-    ///
-    /// The interferer is 10 m behind Tx, so the SIR rises from 1.04 above Tx to 1.22 at 45 m.
+    /// Checks the maximum length of a first hop whose SIR rises with the length up to 45 m, and then falls. The
+    /// interferer is 10 m behind Tx, so the SIR rises from 1.04 above Tx to 1.22. The target is met only in an
+    /// interval of lengths, which may be beyond the end of the hop's range.
     #[test]
     fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
         // SIR_1 is at least 1.22 from 40.9 m to 50 m.

@@ -527,8 +527,8 @@ mod tests {
         }
     }
 
-    /// Checks that a target stops gently when the setpoint is withdrawn, at every moment of a flight. It never stops
-    /// beyond the setpoint.
+    /// Checks that the moving target stops gently when the setpoint is withdrawn at any moment of a flight. It never
+    /// stops beyond the setpoint.
     #[test]
     fn a_withdrawn_carrot_stops_gently_anywhere() {
         let to = Placement::on_line(60.0, 20.0);
@@ -566,8 +566,8 @@ mod tests {
         );
     }
 
-    /// Checks that the velocity does not jump when a new setpoint is in another direction. The velocity in the old
-    /// direction ends within 3 s.
+    /// Checks that the moving target's velocity does not jump when a new setpoint is in another direction. The
+    /// velocity in the old direction ends within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

@@ -137,7 +137,7 @@ pub(super) struct Report {
     texts: Deque<String<50>, TEXTS>,
     /// Hashes of the sent lines, and the earliest time at which each may be sent again.
     recent: Vec<(u32, Instant), RECENT>,
-    /// Last line sent on each topic. An equal line that still waits is dropped.
+    /// Last line sent on each topic. An equal line that would have to wait is dropped.
     newest_sent: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
     /// Number of values (SIR and position) already sent in the present second.

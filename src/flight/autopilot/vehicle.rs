@@ -757,7 +757,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20));
     }
 
-    /// Checks messages that a cable delivers at once after 7 s: the age of the first one is 7 s.
+    /// Checks messages that a cable holds back and delivers at once after 7 s. The age of the first one is 7 s, and
+    /// later ones are the younger the later they were sent.
     #[test]
     fn a_burst_after_a_gap_is_old() {
         let held = 20_000..27_000;
