@@ -1,4 +1,4 @@
-//! Bytes of a block against the table of `examples/block/src/lib.rs`, and the block as a drone reads it.
+//! Bytes of a block against the table of `examples/block/src/lib.rs`; the block as a drone reads it.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
