@@ -109,8 +109,8 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. The paper's `SIR_{N+1}`, K / (d^2
-/// + y^2 + h^2).
+/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. It is the paper's `SIR_{N+1}`:
+/// [`Mission::receiver_gain`] over the squared distance from the relay to Rx.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);

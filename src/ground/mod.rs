@@ -78,7 +78,7 @@ pub struct Ground {
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last query for the mission that the relays fly; 0 before the first query.
+    /// Number of the last query for the relays' mission; 0 before the first query. The answer repeats it.
     query_number: u16,
     flown: Option<FlownMission>,
     /// Distance of the relay that is polled now, in relays along the chain: 1 for the nearest.
@@ -88,7 +88,7 @@ pub struct Ground {
     relay_mission: Option<MissionId>,
     /// True from a hello to the polled relay until that relay's next hello, which is the reply.
     query_sent: bool,
-    /// Number in the relay's hello, which the next mission offer must repeat; `None` if no offer is due.
+    /// Nonce in the polled relay's last hello, which the next mission offer must repeat. `None` if no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,

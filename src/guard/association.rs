@@ -185,8 +185,8 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to an association (session) that either relay has left. If this relay has
-    /// left it, its leave notice is sent again, until the neighbour starts a new association.
+    /// Returns true if a message is of an association (session) that this relay or its neighbour has left. If this
+    /// relay has left it, its leave notice is sent again, until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -213,7 +213,7 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the message that this relay has left its association (session), if it is due.
+    /// Returns the notice that this relay has left the association (session) with its neighbour, if due.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
         core::mem::take(&mut leave_notice.due).then(|| Fence {
@@ -325,7 +325,7 @@ impl Association {
 pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m.
     lost: Option<(u16, f32)>,
-    /// x at which this relay has the separation from a lost relay nearby, m; NaN if no lost relay is near. Until this
+    /// Nearest x at which this relay is the separation away from a lost relay, m; NaN if none is near. Until this
     /// relay has reached that x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
     /// True if a lost relay was last reported on the wrong side of this one along x.
@@ -444,7 +444,8 @@ impl KeepOut {
 
     /// Limits this relay's x to `x_m`, the x of its first setpoint, because some relays were never heard.
     ///
-    /// These may hover anywhere beyond `x_m`. At `near_m` this relay has the separation from them.
+    /// These relays may hover anywhere beyond `x_m`. At x = `near_m` this relay is the separation away from all of
+    /// them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -452,25 +453,26 @@ impl KeepOut {
         }
     }
 
-    /// Records that the last lost relay may be closer than the separation. This ends when this relay is at x =
+    /// Records that the relay lost last may be closer than the separation. This ends when this relay is at x =
     /// `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
-    /// Returns the x at which this relay is the separation away from the last lost relay, m. NaN if it already is.
+    /// Returns the x, m, at which this relay is the separation away from the relay that was lost last. NaN if it
+    /// already is.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
 
-    /// Returns true while the last lost relay may be closer than the separation.
+    /// Returns true while the relay that was lost last may be closer than the separation.
     pub(super) const fn is_near(&self) -> bool {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, which then limits its x. There it
-    /// has the separation from the lost relay. `is_beyond` returns true if this relay has passed the x that it is
-    /// given.
+    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, away from the lost relay. At
+    /// `near_m` the two are the separation apart, so from then on this x limits that of this relay. `is_beyond`
+    /// returns true if this relay has passed the x that is its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -523,17 +525,18 @@ pub struct Fence {
     /// Number of the fence, the plane x = constant between the two relays; 0 before the first. The relay upstream
     /// (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
     pub number: u16,
-    /// x of the fence, m, from the relay upstream; from the relay downstream, its lowest possible x, m.
+    /// x limit that the sender states, m, -1e7 to 1e7: the fence, or an end of the sender's own interval.
     ///
-    /// Before the first fence the relay upstream sends its highest possible x. -1e7 to 1e7.
+    /// The relay upstream sends the x of the fence; before the first fence, its highest possible x. The relay
+    /// downstream sends its lowest possible x.
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, they are those of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the relay upstream requests to keep from the fence, m, 0 to 1e5. If it is less than the
-    /// separation, the relay downstream must not change its lateral offset or altitude.
+    /// Distance along x that the relay upstream requests to stay before the fence, m, 0 to 1e5. If it is less than
+    /// the separation, the relay downstream must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -547,7 +550,8 @@ impl Fence {
     /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
     /// beyond it, needs that to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
-    /// Flag: echo of the last [`REQUESTS_OPENING`](Self::REQUESTS_OPENING) received from the destination.
+    /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies it from that flag in the
+    /// last message that it has received from the destination.
     pub const OPENING_RECEIVED: u8 = 8;
     /// Flag: the sender has left this association (session). It does not fly to its setpoints, or did not for a time.
     /// Positions and the number of the fence are not valid.

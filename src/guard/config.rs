@@ -190,7 +190,7 @@ impl GuardConfig {
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a position in the geofence, m: four steps of an f32.
+    /// Returns the maximum rounding error of a position in the geofence, m: four units in the last place.
     pub(super) fn rounding(&self) -> f32 {
         let fence = &self.geofence;
         4.0 * f32::EPSILON * fence.most_x_m.abs().max(fence.least_x_m.abs())

@@ -112,7 +112,7 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     started_at: Instant,
-    /// Last reported position before the first setpoint, which is this position.
+    /// Last position reported before the first setpoint; it becomes the first setpoint. `None` before any report.
     initial_place: Option<Placement>,
     /// True while the drone flies to this guard's setpoints.
     flown: bool,

@@ -160,8 +160,8 @@ impl<'a> Context<'a> {
 /// Remaining leases of other relays, as far as this relay knows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Longest remaining lease that members of this relay's view can have because of this relay. A lease is granted
-    /// only after all members, and so this relay, have taken part in a renewal.
+    /// Upper bound of the remaining leases of the other members of this relay's view. The bound is known because a
+    /// lease is granted only after all members, and so this relay, have taken part in a renewal.
     pub(crate) lease_left: Duration,
     /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,
@@ -253,7 +253,7 @@ pub(crate) struct Sensed {
     pub(crate) new_estimate: bool,
     /// The measurements do not fit a single source of interference.
     pub(crate) unclear: bool,
-    /// Node whose measurements contradict those of the other nodes.
+    /// Node that was found now to measure values that contradict those of the other nodes; else `None`.
     pub(crate) faulty_sensor: Option<u16>,
 }
 

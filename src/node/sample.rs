@@ -64,7 +64,7 @@ impl Sample {
     }
 }
 
-/// Meter of the interference at the setpoint: averages the samples that the firmware passes.
+/// Average of the interference at the setpoint, over the samples that the firmware passes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {
     estimator: Option<(Estimator, u32)>,

@@ -63,7 +63,7 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
     dropped: u16,
-    /// Previous neighbour, if the selected node has replaced it as the nearer one; 0 for none.
+    /// Previous neighbour that the selected node has replaced because it is nearer; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
@@ -233,8 +233,8 @@ impl Neighbour {
         self.reported_found != before
     }
 
-    /// Measures the neighbour's silence from `now` on, if the neighbour is linked and a member of the view. Returns
-    /// true if so, and if the neighbour is not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, if it is linked and in the view. Returns true if
+    /// so, and if the neighbour is not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()

@@ -241,7 +241,7 @@ impl Round {
         self.computation.discard_agreed_place();
     }
 
-    /// Schedules the message of an outstanding pass again. Called when the next relay can be reached again.
+    /// Schedules a retransmission of an outstanding pass message. Called when the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }

@@ -223,8 +223,8 @@ impl RoundState {
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass was received after the state `before`. In that state the result of its pass was
-    /// known.
+    /// Returns true if a new pass was received after the state `before`. The pass of that state must have had its
+    /// result then.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }

@@ -45,8 +45,8 @@ impl Computation {
         )
     }
 
-    /// Starts this relay's computation in a sweep, a pass along the chain that tries target SIRs. `from` has the
-    /// farthest x of the previous node for each target, m.
+    /// Starts this relay's computation in a sweep, a pass along the chain that tries target SIRs. `from` has the x,
+    /// m, at which the previous node meets each target farthest along the pass.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -183,16 +183,17 @@ pub(crate) struct SweepPass {
     /// True if a later relay of this pass has another power or fixed altitude than the common profile.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x at which the previous node meets each target SIR, m.
+    /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
     from: PerTarget,
-    /// Farthest x at which this relay meets each target SIR, m.
+    /// Farthest x in the direction of the pass at which this relay meets each target SIR, m.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
     /// x that this relay takes for the committed target, m; `None` without a committed target.
     place: Option<f32>,
-    /// Required x of the previous relay for the committed target, m. `None` if that relay takes its farthest x.
+    /// x that the previous relay must take for the committed target, m. `None` if that relay must take the farthest x
+    /// at which it meets this target.
     required_x_m: Option<f32>,
 }
 

@@ -373,7 +373,7 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Schedules the outstanding view proposal again. Called when the next relay can be reached again.
+    /// Schedules a retransmission of the outstanding view proposal. Called when the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
@@ -535,7 +535,7 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive view proposals that were refused.
     refusals: u8,
-    /// Earliest time of the next view request after a refusal, if anything has changed. `None` without a refusal.
+    /// Earliest time to which a new reason can advance the next view request. Set after a refusal, else `None`.
     not_before: Option<Instant>,
     jitter: Jitter,
 }

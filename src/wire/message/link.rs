@@ -28,8 +28,8 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could be inserted between the destination and the destination's neighbour. That is the
-    /// neighbour on the side of the sender; the sender and that neighbour must receive each other.
+    /// True if the sender could be inserted between the destination and the destination's neighbour. That is its
+    /// neighbour on the side of the sender. The sender and that neighbour must receive each other.
     pub ready: bool,
     /// Number of connected relays from the sender to the end of the chain away from the destination. It includes the
     /// sender: 1 to 1000.
@@ -46,7 +46,7 @@ pub struct Hello {
     /// True if the mission `latest_mission` is refused. The sender refuses it, or a relay farther from the
     /// destination.
     pub refused: bool,
-    /// Number that the reply to this hello must repeat if it is a mission offer. 0 if the sender accepts no offer.
+    /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,
 }
 
@@ -132,7 +132,7 @@ impl Hello {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Claim number of the claiming node: drawn at its start, raised at most once while it is active.
+    /// Random claim number of the claiming node. Drawn at its start, and raised at most once while it is active.
     pub number: u32,
     /// Last claim number that the claiming node received from another node with its number; 0 for none.
     pub other_number: u32,

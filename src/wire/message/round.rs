@@ -18,7 +18,8 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each target.
+/// Sweep message of a pass along the chain: target SIRs, and the farthest x of the sender for each. Farthest means in
+/// the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, wrapping.
@@ -34,8 +35,8 @@ pub struct Sweep {
     /// Upsilon = E[1/I] measured by the sender at its position, 1/W. `None` if receivers must use the field, the
     /// mission's known distribution of interference along x.
     pub measured_per_w: Option<f32>,
-    /// Farthest x at which the sender meets each target SIR, m, from the lowest target. The list ends at the first
-    /// target that cannot be met.
+    /// Farthest x in the direction of the pass at which the sender meets each target SIR, m. The list begins with the
+    /// lowest target, and ends at the first one that cannot be met.
     pub reaches: PerTarget,
 }
 
@@ -272,7 +273,7 @@ pub struct Token {
     pub power_w: f32,
     /// Action that each relay performs when it receives the token in this pass.
     pub turn: AdjustStep,
-    /// SIR of the chain before this pass, linear; 0 if unknown.
+    /// SIR of the chain's worst hop before this pass, linear; 0 if unknown.
     pub sir: f32,
 }
 
