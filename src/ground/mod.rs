@@ -269,7 +269,8 @@ impl Ground {
         }
     }
 
-    /// Handles a message of relay `sender`. `message` is `None` if the frame's body is malformed.
+    /// Handles a message of relay `sender`, which is `distance` relays away from this station. `message` is `None` if
+    /// the frame's body is malformed.
     fn handle_message(&mut self, sender: u16, distance: u16, message: Option<&Message>) {
         let counter = match message {
             Some(Message::Hello(hello)) if hello.mission == self.base => {
@@ -316,8 +317,8 @@ impl Ground {
         self.repeat_at = None;
     }
 
-    /// Handles a hello of relay `by` that answers the query for the mission that it flies. If the relay has stored an
-    /// uploaded mission, it sends that mission in its next message.
+    /// Handles a hello of relay `by`, `distance` relays away, that answers the query for the mission. If the relay
+    /// has stored an uploaded mission, it sends that mission in its next message.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
@@ -338,7 +339,7 @@ impl Ground {
         self.flown = Some(flown);
     }
 
-    /// Handles a hello of relay `by`, which reports the newest mission that the relay has stored.
+    /// Handles a hello of relay `by`, `distance` relays away, which reports the relay's newest mission.
     fn on_hello(&mut self, by: u16, distance: u16, hello: Hello) {
         if self.is_querying() {
             return self.on_query_reply(by, distance, hello);

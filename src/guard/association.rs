@@ -12,8 +12,8 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove a restart. Fewer messages of another
-/// association may be late ones, from before.
+/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer messages
+/// of another association may be late ones, from before.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
@@ -140,7 +140,7 @@ impl Association {
         self.left_number != 0
     }
 
-    /// Marks the neighbour as absent, because it has left the association (session) of that number. An absent
+    /// Marks the neighbour as absent: it has left the association (session) with the number `association`. An absent
     /// neighbour may be anywhere.
     pub(super) const fn mark_absent(&mut self, association: u16) {
         self.left_number = association;
@@ -359,8 +359,8 @@ impl KeepOut {
         });
     }
 
-    /// Removes lost relays as obstacles after a message from `node`. They are that node, and nodes farther away on
-    /// `side`.
+    /// Removes obstacles after a message from `node`: that node, and nodes farther away on `side`. They are lost
+    /// relays, or drones that do not fly to setpoints.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,

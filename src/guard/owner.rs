@@ -337,9 +337,9 @@ impl FenceOwner {
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
-    /// Schedules a message if the best x of the fence has changed. The fence is a limit of x for the neighbour
-    /// downstream. A final x is sent at once. While this relay moves, an x that is not final waits for the next
-    /// reminder.
+    /// Schedules a message if the fence, the limit of x for the neighbour downstream, must move. If its new x is
+    /// final, the message is sent at once. If the fence can come nearer once this relay has moved, the message waits
+    /// for the next reminder.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
         if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
             let stays = last || own.reachable.has_arrived();

@@ -38,8 +38,8 @@ const SLOW: u32 = 4;
 /// times, so it is at most eight.
 const LOG_MOST: u32 = 2;
 
-/// Wait before the first retransmission on a lossy channel, in hop times. The neighbour's reply arrives earlier, even
-/// a reply to a duplicate.
+/// Wait before the first retransmission on a lossy channel, in hop times. It is longer than the time until the
+/// neighbour's reply, even the reply to a duplicate.
 const SOON: u32 = 4;
 
 /// Number of messages after a loss for which the channel counts as lossy.

@@ -45,8 +45,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank in the loaded mission (1 at the leader's end), and its number of relays. View
-    /// changes do not alter them.
+    /// Returns this relay's rank in the loaded mission, and the mission's number of relays. The rank counts from 1 at
+    /// the leader's end. View changes alter neither number.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -92,8 +92,8 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if every relay solves the whole chain by the joint method. It requires this method in the
-    /// settings, and a mission in which the lateral offset or the altitude is free.
+    /// Returns true if every relay solves the whole chain by the joint method. The settings must select this method,
+    /// and the mission must leave the lateral offset or the altitude free.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let free = !(config.band.is_single() && config.lateral.is_single());

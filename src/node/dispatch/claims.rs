@@ -49,8 +49,8 @@ impl Node {
 
     /// Handles a claim message from node `from`. Returns false if signed frames replace claims.
     ///
-    /// A claim of that node to its own node number is sent back to it as an echo. An echo shows a claim to this
-    /// relay's node number; it is compared with this relay's own claim.
+    /// A claim of that node to its own node number is sent back to it as an echo. An echo received by this relay
+    /// shows a claim to this relay's node number; the claim is compared with this relay's own.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -99,8 +99,8 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if the authentication sessions must be restarted. New nonces then count up from
-    /// it.
+    /// Returns the new claim number if the authentication sessions must be restarted; else `None`. New nonces then
+    /// count up from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }

@@ -208,7 +208,7 @@ impl Node {
         }
     }
 
-    /// Replaces the interference in the active mission by the current estimate, and reports it.
+    /// Replaces the interference in the active mission by the current estimate, and reports the change.
     fn apply_estimate(&mut self) {
         let estimate = self.layers.round.sensing().estimate();
         let Member {

@@ -126,8 +126,8 @@ impl Node {
         }
     }
 
-    /// Stores `upload` if it is newer than the stored mission. Refuses it, counts it, and reports it once if it does
-    /// not fit the line from Tx to Rx or the geofence.
+    /// Stores `upload` if it is newer than the stored mission. If it does not fit the line from Tx to Rx or the
+    /// geofence, it is refused and counted instead, and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
             Offered::Stored => self.on_stored(now),

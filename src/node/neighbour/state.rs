@@ -471,8 +471,8 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between the candidate and the lost next node. This relay waits longer for each of
-    /// them before it selects the candidate, because a nearer node may still answer.
+    /// Returns the number of nodes that are nearer than the candidate, without the lost next node. This relay waits
+    /// longer for each of them before it selects the candidate, because a nearer node may still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }

@@ -329,7 +329,7 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 pub(crate) enum LeaderTask {
     /// Idle: not the leader, not started, or finished.
     Idle,
-    /// Prediction of the chain's target SIR from the mission; the first sweep of targets starts there.
+    /// Prediction of the chain's target SIR from the mission; the first sweep tries targets around it.
     Predicting(Planner),
     /// Solution of the whole chain by the joint method. Every relay computes it for itself.
     Solving(ChainSolver),

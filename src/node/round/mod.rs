@@ -62,8 +62,8 @@ impl Round {
         }
     }
 
-    /// Handles a message of the current mission and view that comes from the right neighbour. Work: at most this
-    /// relay's positions for 16 target SIRs.
+    /// Handles a message of the current mission and view. A pass message comes from the previous relay, a reply from
+    /// the next one. Work: at most this relay's positions for 16 target SIRs.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let before = computation.state;
