@@ -569,8 +569,8 @@ pub enum Progress {
     /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the positions of Tx and
     /// Rx, or that relay's geofence.
     Refused {
-        /// Node number of the relay that reports the refusal. It refuses the mission itself, or a relay farther from
-        /// the station does.
+        /// Node number of the relay that reports the refusal. Either this relay refuses the mission, or one that is
+        /// farther from the station.
         by: u16,
     },
     /// The upload is outdated, because a relay has stored a newer mission.

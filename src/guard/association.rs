@@ -125,13 +125,13 @@ impl Association {
     }
 
     /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The difference must
-    /// exceed the errors of both reports.
+    /// exceed the sum of the errors of both reports.
     pub(super) fn is_on_wrong_side(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
     /// Returns true if this relay's reported x is on the right side of the neighbour's last x. The difference must be
-    /// at least the errors of both reports.
+    /// at least the sum of the errors of both reports.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -160,7 +160,7 @@ impl Association {
     }
 
     /// Returns a new association (session) in place of this one, which this relay has left. It includes a leave
-    /// notice if the neighbour's number is known, because the neighbour then relies on the old association.
+    /// notice if the neighbour has sent its number for the old association, because the neighbour then relies on it.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own_number: self.own_number,
@@ -470,9 +470,9 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, away from the lost relay. At
-    /// `near_m` the two are the separation apart, so from then on this x limits that of this relay. `is_beyond`
-    /// returns true if this relay has passed the x that is its argument.
+    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, away from the lost relay. From then
+    /// on `near_m`, at which the two are the separation apart, is the limit of this relay's x. `is_beyond` returns
+    /// true if this relay has passed the x that is its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {

@@ -43,7 +43,8 @@ impl Geofence {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
-    /// Geofence of the setpoints. A relay that starts outside returns into it; no setpoint inside leaves it.
+    /// Geofence of the setpoints. A relay that starts outside returns into it; after that all its setpoints are
+    /// inside.
     pub geofence: Geofence,
     /// Minimum distance between relays, m: 0 to 1e5; the same on all relays.
     pub separation_m: f32,

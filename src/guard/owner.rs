@@ -21,7 +21,7 @@ pub(super) struct FenceOwner {
     /// Distance along x that this relay requests to stay before the fence, m; infinite before any request.
     requested_m: f32,
     /// Distance along x to the neighbour downstream that is in force, m. The neighbour has agreed to it, or this
-    /// relay has requested a larger one since. Infinite stands for the separation.
+    /// relay has requested a larger one since. Infinity stands for the separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,

@@ -117,10 +117,10 @@ pub(crate) struct IndexClaims {
     rival: u32,
     /// Last claim number received from another node with the same node number; 0 before any.
     last_rival: u32,
-    /// Last contact with another node of this number: its time, and a flag; `None` before any. The flag is true if
-    /// this relay already had a position at the first contact.
+    /// Last contact with another node of this node number: its time, and a flag; `None` before any. The flag is true
+    /// if this relay already had a position at the first contact.
     contest: Option<(Instant, bool)>,
-    /// Times at which a number was last seen used by two nodes: this relay's number, a neighbour's number.
+    /// Times at which two nodes were last seen to use this relay's number [0], or a neighbour's number [1].
     observed: [Option<Instant>; 2],
     /// Time at which this relay last received a frame that it had sent itself.
     echoed: Option<Instant>,
@@ -130,8 +130,8 @@ pub(crate) struct IndexClaims {
     next_claim: Option<Instant>,
     /// Time from the next unprompted claim to the one after it.
     interval: Duration,
-    /// Number of claims still to send because another active node uses this number. They are [`least_interval`]
-    /// apart.
+    /// Number of claims still to send because another active node uses this relay's node number. They are
+    /// [`least_interval`] apart.
     defences: u8,
     /// Earliest time at which this relay may send its next claim.
     quiet_until: Instant,
@@ -210,8 +210,8 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Records a frame of another node with this number. Returns true if this relay has a lease, and had one when it
-    /// received the first such frame.
+    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease, and already
+    /// had one when it received the first such frame.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -250,8 +250,8 @@ impl IndexClaims {
         false
     }
 
-    /// Compares another node's claim to this number with this relay's claim. Returns true if this relay becomes
-    /// passive.
+    /// Compares another node's claim to this relay's number with this relay's own claim. Returns true if this relay
+    /// becomes passive.
     fn compare(
         &mut self,
         now: Instant,
@@ -374,7 +374,8 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Handles the report that the other node with this number is gone. Returns true if this relay becomes active.
+    /// Handles the report that the other node with this relay's number is gone. Returns true if this relay becomes
+    /// active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {

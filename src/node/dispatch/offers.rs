@@ -174,8 +174,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles a neighbour's report that the mission `refused` is refused. That neighbour refuses it, or a relay
-    /// beyond.
+    /// Handles a neighbour's report that the mission `refused` is refused. The neighbour itself refuses it, or a
+    /// relay beyond the neighbour.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {

@@ -494,8 +494,8 @@ impl Sensing {
 }
 
 impl SensorState {
-    /// Returns the interference level at a ground station at time `now`, from the station's `average`. Its weight
-    /// decreases with the age of the last report.
+    /// Returns the interference level at a ground station at time `now`, from the station's `average`. The level's
+    /// weight in an estimate decreases with the age of the station's last report.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {

@@ -203,7 +203,7 @@ impl RoundState {
         }
     }
 
-    /// Counts a late pass message. Too many in a row are foreign, because their leader has restarted.
+    /// Counts a late pass message. Too many in a row count as foreign, because their leader has restarted.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign

@@ -45,8 +45,8 @@ impl Computation {
         )
     }
 
-    /// Starts this relay's computation in a sweep, a pass along the chain that tries target SIRs. `from` has the x,
-    /// m, at which the previous node meets each target farthest along the pass.
+    /// Starts this relay's computation in a sweep, a pass along the chain that tries target SIRs. `from` has the
+    /// previous node's farthest x in the direction of the pass for each target, m.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -278,8 +278,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores `place`, this relay's x for the committed target SIR, m. Derives the required x of the previous relay;
-    /// if there is no suitable one, the commitment is revoked.
+    /// Stores `place`, this relay's x for the committed target SIR, m. Computes from it the x that the previous relay
+    /// must take; if there is no suitable one, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;

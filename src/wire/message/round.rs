@@ -141,8 +141,8 @@ pub struct SweepVerdict {
     pub view_digest: u16,
     /// Slack (spare length of the chain) of each target, and the committed target, if any.
     pub verdict: Verdict,
-    /// Required x of the destination if a target is committed, m. `None` if the destination must take the farthest x
-    /// that it has reported for this target.
+    /// x that the destination must take if a target is committed, m. `None` if the destination must take the farthest
+    /// x that it has reported for this target.
     pub required_x_m: Option<f32>,
     /// True if the sender or a later relay of the pass has its own power or its own fixed altitude. They differ from
     /// the profile that the mission has in common for all relays.
@@ -456,8 +456,8 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict the others; 0 for none. They are left out of `sums`. Set
-    /// in replies only.
+    /// Node number of a relay whose measurements contradict those of the other relays; 0 for none. The measurements
+    /// of that relay are left out of `sums`. Set in replies only.
     pub excluded: u16,
 }
 

@@ -266,7 +266,8 @@ pub struct Pulse {
     pub number: u16,
     /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
-    /// Duration of the lease, in tenths of a second: 1 to 65535. It starts when a member takes part in a renewal.
+    /// Duration of the lease, in tenths of a second: 1 to 65535. The lease of each member starts when that member
+    /// takes part in the renewal.
     pub lease: u16,
 }
 
