@@ -493,8 +493,8 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Writes the interference report to the next relay. A handshake is written instead if that relay cannot verify
-    /// frames of this station yet.
+    /// Writes the interference report to the next relay; `None` if no report is pending. A handshake is written
+    /// instead if that relay cannot verify frames of this station yet.
     fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {

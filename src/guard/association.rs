@@ -63,7 +63,8 @@ pub(super) struct Association {
     /// Number of the association (session) that the neighbour has left, 0 for none. After that the neighbour counts
     /// as absent: its drone does not fly to setpoints.
     left_number: u16,
-    /// Pending notice to the neighbour that this relay has left an association (session) with it.
+    /// Notice to the neighbour that this relay has left an association (session) with it. `None` if no notice is
+    /// needed, or no longer.
     leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, m, in any association (session); NaN before the first.
     seen_m: f32,
@@ -323,14 +324,16 @@ impl Association {
 /// that does not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m.
+    /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
+    /// is lost.
     lost: Option<(u16, f32)>,
     /// Nearest x at which this relay is the separation away from a lost relay, m; NaN if none is near. Until this
     /// relay has reached that x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
     /// True if a lost relay was last reported on the wrong side of this one along x.
     disordered: bool,
-    /// Node number and last reported position of a neighbour whose drone does not fly to setpoints.
+    /// Node number and last reported position of a neighbour whose drone does not fly to setpoints. `None` without
+    /// such a neighbour.
     unflown: Option<(u16, Placement)>,
 }
 

@@ -274,9 +274,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. If `placed` is false, there
-    /// is only a message with a halt request, because this relay's order with its neighbour downstream is not
-    /// confirmed.
+    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. `None` if no message is due.
+    /// If `placed` is false, there is only a message with a halt request, because this relay's order with its
+    /// neighbour downstream is not confirmed.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

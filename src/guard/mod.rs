@@ -417,12 +417,13 @@ impl Guard {
         self.disorder || upstream || downstream
     }
 
-    /// Returns the last setpoint of [`steer`](Self::steer).
+    /// Returns the last setpoint of [`steer`](Self::steer); `None` before the first one.
     pub const fn setpoint(&self) -> Option<Placement> {
         self.own.setpoint
     }
 
-    /// Returns the next message to a neighbour: its side, its node number and the message.
+    /// Returns the next message to a neighbour, with the neighbour's side and node number. `None` if no message is
+    /// due.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         for (side, association) in [(Side::Upstream, up), (Side::Downstream, down)] {

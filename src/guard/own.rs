@@ -134,7 +134,7 @@ const MAX_REMINDERS_STILL: u8 = 5;
 pub(super) struct Own {
     pub(super) config: GuardConfig,
     node: u16,
-    /// Agreed position, inside the geofence.
+    /// Agreed position, inside the geofence; `None` before the first agreement.
     pub(super) target: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,

@@ -247,7 +247,7 @@ impl Circulation {
         self.timer = Some(now + self.jitter.spread(path.hop_time.times(hops)));
     }
 
-    /// Returns the pending reply and marks it as sent.
+    /// Returns the pending reply and marks it as sent; `None` if no reply is pending.
     pub(crate) const fn poll_reply(&mut self) -> Option<Reply> {
         self.reply_due.take()
     }

@@ -197,7 +197,7 @@ impl OtherLeases {
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Effects {
-    /// Reason why the received message had no effect.
+    /// Reason why the received message had no effect; `None` if it had an effect.
     pub(crate) ignored: Option<Ignored>,
     /// True if a message was retransmitted.
     pub(crate) resent: bool,
@@ -206,9 +206,9 @@ pub(crate) struct Effects {
     /// True if a new view (agreed members of the chain) is needed.
     pub(crate) view_needed: bool,
     /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
-    /// proves that the neighbour was alive after that time.
+    /// proves that the neighbour was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the view proposal that this relay has received or made now.
+    /// Origin of the view proposal that this relay has received or made now; `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
     /// True if a view proposal is outstanding. No pass along the chain continues before its decision.
     pub(crate) view_proposed: bool,

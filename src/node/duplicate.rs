@@ -122,11 +122,11 @@ pub(crate) struct IndexClaims {
     contest: Option<(Instant, bool)>,
     /// Times at which two nodes were last seen to use this relay's number [0], or a neighbour's number [1].
     observed: [Option<Instant>; 2],
-    /// Time at which this relay last received a frame that it had sent itself.
+    /// Time at which this relay last received a frame that it had sent itself; `None` before any.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next claim that this relay sends unprompted, not in reply to a frame.
+    /// Time of the next claim that this relay sends unprompted, not in reply to a frame; `None` for none.
     next_claim: Option<Instant>,
     /// Time from the next unprompted claim to the one after it.
     interval: Duration,
@@ -294,7 +294,8 @@ impl IndexClaims {
         true
     }
 
-    /// Schedules a claim to this relay's node number, unless one was sent a moment ago.
+    /// Schedules a claim to this relay's node number, unless one was sent a moment ago. The minimum interval is
+    /// [`least_interval`].
     fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);

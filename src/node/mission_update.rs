@@ -119,7 +119,8 @@ struct Uploads {
     loaded_m: f32,
     /// Range of altitudes of the mission loaded before flight, m, including the common altitude.
     loaded_band: Band,
-    /// Identifier of the last mission that was refused, by this relay, a neighbour, or a relay beyond one.
+    /// Identifier of the last mission that was refused, by this relay, a neighbour, or a relay beyond one. `None` if
+    /// there is none.
     refused: Option<MissionId>,
     /// Present nonce in this relay's hellos, and the previous one. A mission offer must repeat one of the two.
     asked: [Asked; 2],

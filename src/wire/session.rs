@@ -230,7 +230,7 @@ impl Session {
         self.rival.take()
     }
 
-    /// Returns a node to which a handshake is due, and marks the handshake as sent.
+    /// Returns a node to which a handshake is due, and marks it as sent; `None` if no handshake is due.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;

@@ -30,7 +30,7 @@ impl Node {
             .schedule_hello(distance, ask);
     }
 
-    /// Returns the next pending hello with its side and its destination node.
+    /// Returns the next pending hello with its side and its destination node; `None` if none is pending.
     pub(super) fn next_hello(&mut self, now: Instant) -> Option<(Side, u16, Hello)> {
         let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {

@@ -218,8 +218,8 @@ impl Node {
         }
     }
 
-    /// Returns the pending mission offer to the neighbour at `side`. An offer must answer a recent hello; without
-    /// one, a hello that requests a hello is returned instead.
+    /// Returns the pending mission offer to the neighbour at `side`; `None` if no offer is pending. An offer must
+    /// answer a recent hello; without one, a hello that requests a hello is returned instead.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

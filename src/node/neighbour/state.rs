@@ -74,7 +74,7 @@ pub(crate) struct Neighbour {
     /// Node that each of the four nearest nodes on this side has selected on its side toward this relay. 0 for none;
     /// the nearest node is first.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame from a node on this side that is not selected.
+    /// Time of the last frame from a node on this side that is not selected; `None` before any.
     unselected_at: Option<Instant>,
     /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
@@ -95,7 +95,8 @@ pub(crate) struct Neighbour {
     pub(super) heartbeat: PendingHeartbeat,
     /// Newest mission that the selected node has reported to have stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
-    /// Time of the next check of the neighbour's silence, or of the next hellos of the search.
+    /// Time of the next check of the neighbour's silence, or of the next hellos of the search. `None` if no check is
+    /// due later.
     check_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
@@ -716,7 +717,8 @@ impl Neighbour {
     }
 
     /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is that of a
-    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
+    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers. `None` if no
+    /// heartbeat is pending.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {

@@ -82,8 +82,8 @@ pub(crate) struct Computation {
     /// Measurements of the unknown interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// Upper bound of the worst hop's SIR for any positions at the configured altitudes, linear. Known at the leader
-    /// only.
+    /// Upper bound of the worst hop's SIR for any positions at the configured altitudes, linear. `None` at other
+    /// relays than the leader, and until it is known.
     pub(super) bound: Option<f32>,
 }
 

@@ -299,7 +299,7 @@ impl Round {
         self.computation.is_untouched()
     }
 
-    /// Returns the agreed position. The guard may limit the setpoint on the way there.
+    /// Returns the agreed position; `None` before an agreement. The guard may limit the setpoint on the way there.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
     }

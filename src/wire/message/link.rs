@@ -58,7 +58,8 @@ impl Hello {
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes the hello into `buffer`; returns its length. The seven flags share one byte.
+    /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The seven flags share one
+    /// byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let Self {
             requests_reply: ask,
@@ -143,7 +144,8 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// Encodes the claim into `buffer`; returns its length. Its flags from bit 0: passive, echo.
+    /// Encodes the claim into `buffer`; returns its length, or `None` if it does not fit. Its flags from bit 0:
+    /// passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
         let numbers = [self.number, self.other_number].map(u32::to_le_bytes);
@@ -164,8 +166,8 @@ impl Claim {
     }
 }
 
-/// Encodes a fence message into `buffer`; returns its length. A fence is the limit along x that keeps two neighbours
-/// apart; `mission` is the digest in the message.
+/// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit
+/// along x that keeps two neighbours apart; `mission` is the digest in the message.
 pub(super) fn encode_fence(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, mission);
     let numbers = [fence.echo, fence.number].map(Word::new);

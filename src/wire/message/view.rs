@@ -37,7 +37,8 @@ pub struct Poll {
     /// Time until leases of views before `agreed` have expired, in tenths of a second; 65535 if unknown. Positions of
     /// the new view may be used only after that time.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on.
+    /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on. `None` without such
+    /// a view.
     pub successor: Option<Successor>,
 }
 
