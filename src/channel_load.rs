@@ -52,8 +52,8 @@ pub struct ChannelLoad {
 }
 
 impl ChannelLoad {
-    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4. The overhead is 12 bytes per
-    /// frame.
+    /// Creates the load of `in_range` relays whose radios sense the carrier as in IEEE 802.15.4. The overhead is 12
+    /// bytes per frame.
     pub const fn of_radios(in_range: u16) -> Self {
         Self {
             in_range,

@@ -63,8 +63,8 @@ pub(super) struct Association {
     /// Number of the association (session) that the neighbour has left, 0 for none. After that the neighbour counts
     /// as absent: its drone does not fly to setpoints.
     left_number: u16,
-    /// Notice to the neighbour that this relay has left an association (session) with it. `None` if no notice is
-    /// needed, or no longer.
+    /// Notice to the neighbour that this relay has left an association (session) with it. `None` if the neighbour
+    /// needs no notice.
     leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, m, in any association (session); NaN before the first.
     seen_m: f32,
@@ -257,8 +257,8 @@ impl Association {
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
-    /// Sets or clears the request for an open chain (all relays the separation apart) to the neighbour. A message is
-    /// due after a change.
+    /// Requests an open chain from the neighbour if `opens` is true, or else withdraws the request. In an open chain
+    /// all relays are the separation apart along x. A message is due after a change.
     pub(super) const fn forward_open(&mut self, opens: bool) {
         self.due |= self.open_sent != opens;
         self.open_sent = opens;
@@ -278,8 +278,8 @@ impl Association {
         self.halt_reminders_left > 0
     }
 
-    /// Sets or clears the request to halt the chain in the messages to the neighbour. A message is due after a
-    /// change.
+    /// Requests a halt of the chain from the neighbour if `halts` is true, or else withdraws the request. A message
+    /// is due after a change.
     pub(super) const fn forward_halt(&mut self, halts: bool) {
         self.due |= self.halt_sent != halts;
         self.halt_sent = halts;
@@ -504,7 +504,7 @@ impl KeepOut {
     }
 
     /// Adds an obstacle at `side`: relays that were never heard. They may hover anywhere beyond `limit_m`, until any
-    /// of them has sent a message.
+    /// of them has sent a message. This relay must move `separation_m` away from `limit_m`.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),

@@ -400,7 +400,8 @@ impl Guard {
             && (self.owner.is_ordered(own) || seen(&self.owner.association, Side::Downstream))
     }
 
-    /// Halts this relay while its order along x is not known, or while another relay requests a halt.
+    /// Halts this relay while its order along x is not known (`is_ordered` is false), or on request. The request
+    /// comes from another relay, or from this relay if it is on the wrong side of a neighbour.
     fn halt(&mut self, is_ordered: bool, now: Instant) {
         self.disorder &= !is_ordered && !self.is_seen_in_order();
         self.disorder |= self.is_out_of_order();

@@ -238,7 +238,8 @@ impl Own {
         (self.open, self.halted) = (false, true);
     }
 
-    /// Starts or ends a halt of this relay. If it halts on its way, it stops where it was last reported.
+    /// Starts a halt of this relay if `halted` is true, or else ends it. If the relay halts on its way, it stops
+    /// where it was last reported.
     pub(super) fn halt(&mut self, halted: bool, now: Instant) {
         let begins = halted && !self.halted;
         self.halted = halted;

@@ -312,8 +312,8 @@ impl FenceOwner {
 
     /// Returns the next fence: its x, m, the distance that this relay stays before it, m, and a flag. The flag is
     /// true if the x is final, false if the fence can come nearer once relays have moved. `None` if the neighbour
-    /// downstream is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays
-    /// upstream, m.
+    /// downstream is not known to be beyond this relay. `kept_m` is the distance to the neighbour upstream,
+    /// `upstream_m` the highest possible x of the relays upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {

@@ -79,8 +79,8 @@ struct OlderHandshakes {
 }
 
 impl OlderHandshakes {
-    /// Counts a handshake with an outdated nonce. Returns true if it is the fifth in a row (`WENT_BACK`) with rising
-    /// frame counters; replays do not count.
+    /// Counts a handshake with an outdated nonce, of epoch `epoch` and frame counter `counter`. Returns true if it is
+    /// the fifth in a row (`WENT_BACK`) with this epoch and rising frame counters; replays do not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {

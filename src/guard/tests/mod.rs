@@ -33,8 +33,8 @@ fn at(x_m: f32) -> Placement {
     Placement::on_line(x_m, 50.0)
 }
 
-/// Returns the first message of a neighbour for the tests. It does not know this relay's association (session) number
-/// yet.
+/// Returns the first message of a neighbour for the tests, at `x_m`, with the agreed x `target_m`. It does not know
+/// this relay's association (session) number yet.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,

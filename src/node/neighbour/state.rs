@@ -95,8 +95,8 @@ pub(crate) struct Neighbour {
     pub(super) heartbeat: PendingHeartbeat,
     /// Newest mission that the selected node has reported to have stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
-    /// Time of the next check of the neighbour's silence, or of the next hellos of the search. `None` if no check is
-    /// due later.
+    /// Time of the next check of the neighbour's silence, or of the next hellos of the search. `None` on a side that
+    /// needs neither.
     check_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }

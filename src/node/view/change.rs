@@ -452,7 +452,8 @@ impl ViewChange {
         Effects { resent, ..effects }
     }
 
-    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads.
+    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads. `fresh` is
+    /// true if this relay has taken part in no pass or view since its start.
     fn request_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
         let settings = &context.member.settings;
         if !self.request.poll_due(context.now, fresh, settings) {
