@@ -92,7 +92,7 @@ const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 /// [`least_interval`] apart.
 const DEFENCES: u8 = 32;
 
-/// Number of claims that this relay sends after another frame than a claim has borne its node number.
+/// Number of claims that this relay sends after a frame, not a claim, that bears its node number.
 ///
 /// With signed frames it is the number of claims after this relay has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;

@@ -93,7 +93,7 @@ pub(crate) enum Offered {
 
 /// Time until the first repetition of a mission offer, in hop times.
 const OFFER_HOPS: u32 = 4;
-/// Number of mission offers after each of which the interval between offers doubles.
+/// Number of mission offers that are sent at the same interval, before that interval doubles.
 const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;

@@ -203,7 +203,8 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to node `to` that requests a reply. Each node then knows the other one's nonce.
+    /// Schedules a handshake to node `to` that requests a reply. After the reply, each of the two nodes knows the
+    /// other's nonce.
     pub(crate) fn request_reply(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {

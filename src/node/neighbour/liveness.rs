@@ -79,7 +79,7 @@ const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Time of the neighbour's last sign of life; at first the time of this relay's start.
+    /// Time of the neighbour's last sign of life; before the first one, the time of this relay's start.
     last_sign: Instant,
     lost: bool,
     /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.

@@ -72,7 +72,7 @@ fn chains_of_three_and_four_in_more_states() {
 }
 
 /// Checks that the model check finds a broken quorum rule. If all reachable relays could vote, two views would be in
-/// force at once.
+/// force at the same time.
 #[test]
 fn the_check_finds_the_fault_of_counting_all_votes() {
     for relays in [3, 4] {
