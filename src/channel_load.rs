@@ -20,7 +20,8 @@
 use crate::time::Duration;
 use crate::wire::MAX_SWEEP;
 
-/// Maximum number of frames that two neighbours of an idle chain exchange in the time `probe_after`.
+/// Maximum number of frames that two neighbours of an idle chain exchange in the time `probe_after`. In an idle chain
+/// all relays hold their positions, and only renew the lease.
 const FRAMES: u64 = 8;
 
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
@@ -31,7 +32,7 @@ const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Maximum number of relays in range without a wait for a free channel.
+/// Maximum number of relays in range for which no wait for a free channel is assumed.
 ///
 /// For every further nine relays, a transmission is assumed to take one frame time longer. Nine are this relay and
 /// four on either side.
@@ -51,8 +52,8 @@ pub struct ChannelLoad {
 }
 
 impl ChannelLoad {
-    /// Creates the load of relays whose radios sense the carrier as in IEEE 802.15.4. The overhead is 12 bytes per
-    /// frame.
+    /// Creates the load of `in_range` relays whose radios sense the carrier as in IEEE 802.15.4. The overhead is 12
+    /// bytes per frame.
     pub const fn of_radios(in_range: u16) -> Self {
         Self {
             in_range,
@@ -60,10 +61,10 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the capacity that the idle chain needs in one `probe_after`, in units of 1e-6 bit.
+    /// Returns the bits that the channel must be able to carry in one `probe_after`, times 1e6.
     ///
-    /// It is the number of bits sent in that time, divided by the fraction of the channel that they may take. Divided
-    /// by a time in microseconds it gives bit/s.
+    /// These are the bits that an idle chain sends in that time, divided by the fraction of the channel that they may
+    /// take. The result divided by a time in microseconds is a data rate in bit/s.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;

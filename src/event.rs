@@ -59,12 +59,12 @@ pub enum Event {
         /// Index of the node that signs with another key.
         node: u16,
     },
-    /// Five handshakes in a row from a node have an epoch that is not newer than the known one. The key is right, but
-    /// the node did not increase its epoch at its last start, so its frames are rejected. The epoch is older, or the
-    /// same with the same seed, and none in between is newer. An operator increases that node's epoch and restarts
-    /// it, or restarts this relay and its other neighbours. A replay of one recorded frame does not raise it, but a
-    /// replay in order of five handshakes of one start does. If `node` is this relay, its neighbours know a newer
-    /// epoch, and it becomes passive ([`Event::DuplicateIndex`]).
+    /// Five handshakes in a row from a node have an epoch not newer than the node's last known one. The key is right,
+    /// but the node did not increase its epoch (start counter) at its last start, so its frames are rejected. The
+    /// epoch is older, or the same with the same seed, and none in between is newer. An operator increases that
+    /// node's epoch and restarts it, or restarts this relay and its other neighbours. A replay of one recorded frame
+    /// does not raise it, but a replay in order of five handshakes of one start does. If `node` is this relay, its
+    /// neighbours know a newer epoch, and it becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
         /// Index of the node whose epoch went back.
         node: u16,

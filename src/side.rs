@@ -2,7 +2,8 @@
 
 use crate::mission::Heading;
 
-/// Side of a relay along the chain, toward Tx or toward Rx: the neighbour there, or the link to it.
+/// Side of a relay along the chain, toward Tx or toward Rx. It also stands for the neighbour on that side, or for the
+/// link to it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {

@@ -109,8 +109,8 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. The paper's `SIR_{N+1}`, K / (d^2
-/// + y^2 + h^2).
+/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. It is the paper's `SIR_{N+1}`:
+/// [`Mission::receiver_gain`] over the squared distance from the relay to Rx.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
@@ -200,8 +200,8 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// Function phi(x) that has the sign of the slope of the first hop's SIR along x. The field `x` is the interferer's
-/// X, and `q` is X^2 + Y^2.
+/// Function phi(x) that has the sign of the slope of the first hop's SIR along x. The field `x` is the X of the
+/// interferer at (X, Y), and `q` is X^2 + Y^2.
 struct Slope {
     x: f32,
     q: f32,
@@ -221,7 +221,7 @@ impl Slope {
     }
 
     /// Returns half the derivative of phi at x = `at`, m, for an interferer at X > 0. phi has the sign of the slope
-    /// of the first hop's SIR. Beyond X the derivative falls.
+    /// of the first hop's SIR. Beyond X this derivative falls with x, so phi has at most one maximum there.
     fn bend(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)

@@ -43,17 +43,17 @@ pub struct Stats {
     /// Messages from the wrong neighbour. They are messages along the chain from the next relay, and replies from the
     /// previous relay.
     pub misdirected: u32,
-    /// Messages of another mission, and offers of a mission that this relay refuses. The events are
+    /// Ignored messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Messages of another view, or of another mission than the one of this view. They belong to a pass along the
-    /// chain or to a view change.
+    /// Ignored messages of another view, or of another mission than the one of this view. They belong to a pass along
+    /// the chain or to a view change.
     pub view: u32,
     /// New views that this relay has accepted.
     pub views: u32,
-    /// Outdated messages, for example of a pass along the chain or a view change that has ended. Also mission offers
-    /// that this relay has not requested by a recent hello.
+    /// Ignored outdated messages, for example of a pass along the chain or a view change that has ended. Also mission
+    /// offers that this relay has not requested by a recent hello.
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or while this relay measures nothing.
     pub samples_rejected: u32,

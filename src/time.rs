@@ -116,7 +116,7 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 /// Timers continue after a backward step, which extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
-    /// Latest time that the caller has passed, by the caller's clock.
+    /// Time of the caller's clock up to which this clock has advanced.
     latest: Instant,
     /// Internal time at the moment `latest`.
     internal: Instant,
@@ -142,7 +142,7 @@ impl MonotonicClock {
         self.internal
     }
 
-    /// Returns the internal time of the last call.
+    /// Returns the internal time as of the last call of [`advance`](Self::advance).
     pub(crate) const fn now(&self) -> Instant {
         self.internal
     }

@@ -60,8 +60,8 @@ impl ViewId {
         }
     }
 
-    /// Returns the value that marks messages of this view; it is added to the mission's digest. Views of one number,
-    /// and of thousands of consecutive numbers, have different values.
+    /// Returns the value that marks messages of this view; it is added to the mission's digest. The value differs
+    /// between views of one number by different proposers, and between views of thousands of consecutive numbers.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -78,7 +78,7 @@ pub struct Ground {
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last query for the mission that the relays fly; 0 before the first query.
+    /// Number of the last query for the relays' mission; 0 before the first query. The answer repeats it.
     query_number: u16,
     flown: Option<FlownMission>,
     /// Distance of the relay that is polled now, in relays along the chain: 1 for the nearest.
@@ -88,7 +88,7 @@ pub struct Ground {
     relay_mission: Option<MissionId>,
     /// True from a hello to the polled relay until that relay's next hello, which is the reply.
     query_sent: bool,
-    /// Number in the relay's hello, which the next mission offer must repeat; `None` if no offer is due.
+    /// Nonce in the polled relay's last hello, which the next mission offer must repeat. `None` if no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
@@ -269,7 +269,8 @@ impl Ground {
         }
     }
 
-    /// Handles a message of relay `sender`. `message` is `None` if the frame's body is malformed.
+    /// Handles a message of relay `sender`, which is `distance` relays away from this station. `message` is `None` if
+    /// the frame's body is malformed.
     fn handle_message(&mut self, sender: u16, distance: u16, message: Option<&Message>) {
         let counter = match message {
             Some(Message::Hello(hello)) if hello.mission == self.base => {
@@ -316,8 +317,8 @@ impl Ground {
         self.repeat_at = None;
     }
 
-    /// Handles a hello of relay `by` that answers the query for the mission that it flies. If the relay has stored an
-    /// uploaded mission, it sends that mission in its next message.
+    /// Handles a hello of relay `by`, `distance` relays away, that answers the query for the mission. If the relay
+    /// has stored an uploaded mission, it sends that mission in its next message.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
@@ -338,7 +339,7 @@ impl Ground {
         self.flown = Some(flown);
     }
 
-    /// Handles a hello of relay `by`, which reports the newest mission that the relay has stored.
+    /// Handles a hello of relay `by`, `distance` relays away, which reports the relay's newest mission.
     fn on_hello(&mut self, by: u16, distance: u16, hello: Hello) {
         if self.is_querying() {
             return self.on_query_reply(by, distance, hello);
@@ -492,8 +493,8 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Writes the interference report to the next relay. A handshake is written instead if that relay cannot verify
-    /// frames of this station yet.
+    /// Writes the interference report to the next relay; `None` if no report is pending. A handshake is written
+    /// instead if that relay cannot verify frames of this station yet.
     fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {
@@ -568,8 +569,8 @@ pub enum Progress {
     /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the positions of Tx and
     /// Rx, or that relay's geofence.
     Refused {
-        /// Node number of the relay that reports the refusal. It refuses the mission itself, or a relay farther from
-        /// the station does.
+        /// Node number of the relay that reports the refusal. Either this relay refuses the mission, or one that is
+        /// farther from the station.
         by: u16,
     },
     /// The upload is outdated, because a relay has stored a newer mission.

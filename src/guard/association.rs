@@ -12,8 +12,8 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove a restart. Fewer messages of another
-/// association may be late ones, from before.
+/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer messages
+/// of another association may be late ones, from before.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
@@ -63,7 +63,8 @@ pub(super) struct Association {
     /// Number of the association (session) that the neighbour has left, 0 for none. After that the neighbour counts
     /// as absent: its drone does not fly to setpoints.
     left_number: u16,
-    /// Pending notice to the neighbour that this relay has left an association (session) with it.
+    /// Notice to the neighbour that this relay has left an association (session) with it. `None` if the neighbour
+    /// needs no notice.
     leave_notice: Option<LeaveNotice>,
     /// Last x received from the neighbour, m, in any association (session); NaN before the first.
     seen_m: f32,
@@ -125,13 +126,13 @@ impl Association {
     }
 
     /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The difference must
-    /// exceed the errors of both reports.
+    /// exceed the sum of the errors of both reports.
     pub(super) fn is_on_wrong_side(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
     /// Returns true if this relay's reported x is on the right side of the neighbour's last x. The difference must be
-    /// at least the errors of both reports.
+    /// at least the sum of the errors of both reports.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -140,7 +141,7 @@ impl Association {
         self.left_number != 0
     }
 
-    /// Marks the neighbour as absent, because it has left the association (session) of that number. An absent
+    /// Marks the neighbour as absent: it has left the association (session) with the number `association`. An absent
     /// neighbour may be anywhere.
     pub(super) const fn mark_absent(&mut self, association: u16) {
         self.left_number = association;
@@ -160,7 +161,7 @@ impl Association {
     }
 
     /// Returns a new association (session) in place of this one, which this relay has left. It includes a leave
-    /// notice if the neighbour's number is known, because the neighbour then relies on the old association.
+    /// notice if the neighbour has sent its number for the old association, because the neighbour then relies on it.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own_number: self.own_number,
@@ -185,8 +186,8 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to an association (session) that either relay has left. If this relay has
-    /// left it, its leave notice is sent again, until the neighbour starts a new association.
+    /// Returns true if a message is of an association (session) that this relay or its neighbour has left. If this
+    /// relay has left it, its leave notice is sent again, until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -213,7 +214,7 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the message that this relay has left its association (session), if it is due.
+    /// Returns the notice that this relay has left the association (session) with its neighbour, if due.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
         core::mem::take(&mut leave_notice.due).then(|| Fence {
@@ -256,8 +257,8 @@ impl Association {
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
-    /// Sets or clears the request for an open chain (all relays the separation apart) to the neighbour. A message is
-    /// due after a change.
+    /// Requests an open chain from the neighbour if `opens` is true, or else withdraws the request. In an open chain
+    /// all relays are the separation apart along x. A message is due after a change.
     pub(super) const fn forward_open(&mut self, opens: bool) {
         self.due |= self.open_sent != opens;
         self.open_sent = opens;
@@ -277,8 +278,8 @@ impl Association {
         self.halt_reminders_left > 0
     }
 
-    /// Sets or clears the request to halt the chain in the messages to the neighbour. A message is due after a
-    /// change.
+    /// Requests a halt of the chain from the neighbour if `halts` is true, or else withdraws the request. A message
+    /// is due after a change.
     pub(super) const fn forward_halt(&mut self, halts: bool) {
         self.due |= self.halt_sent != halts;
         self.halt_sent = halts;
@@ -323,14 +324,16 @@ impl Association {
 /// that does not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m.
+    /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
+    /// is lost.
     lost: Option<(u16, f32)>,
-    /// x at which this relay has the separation from a lost relay nearby, m; NaN if no lost relay is near. Until this
+    /// Nearest x at which this relay is the separation away from a lost relay, m; NaN if none is near. Until this
     /// relay has reached that x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
     /// True if a lost relay was last reported on the wrong side of this one along x.
     disordered: bool,
-    /// Node number and last reported position of a neighbour whose drone does not fly to setpoints.
+    /// Node number and last reported position of a neighbour whose drone does not fly to setpoints. `None` without
+    /// such a neighbour.
     unflown: Option<(u16, Placement)>,
 }
 
@@ -359,8 +362,8 @@ impl KeepOut {
         });
     }
 
-    /// Removes lost relays as obstacles after a message from `node`. They are that node, and nodes farther away on
-    /// `side`.
+    /// Removes obstacles after a message from `node`: that node, and nodes farther away on `side`. They are lost
+    /// relays, or drones that do not fly to setpoints.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -444,7 +447,8 @@ impl KeepOut {
 
     /// Limits this relay's x to `x_m`, the x of its first setpoint, because some relays were never heard.
     ///
-    /// These may hover anywhere beyond `x_m`. At `near_m` this relay has the separation from them.
+    /// These relays may hover anywhere beyond `x_m`. At x = `near_m` this relay is the separation away from all of
+    /// them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -452,25 +456,26 @@ impl KeepOut {
         }
     }
 
-    /// Records that the last lost relay may be closer than the separation. This ends when this relay is at x =
+    /// Records that the relay lost last may be closer than the separation. This ends when this relay is at x =
     /// `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
-    /// Returns the x at which this relay is the separation away from the last lost relay, m. NaN if it already is.
+    /// Returns the x, m, at which this relay is the separation away from the relay that was lost last. NaN if it
+    /// already is.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
 
-    /// Returns true while the last lost relay may be closer than the separation.
+    /// Returns true while the relay that was lost last may be closer than the separation.
     pub(super) const fn is_near(&self) -> bool {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, which then limits its x. There it
-    /// has the separation from the lost relay. `is_beyond` returns true if this relay has passed the x that it is
-    /// given.
+    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, away from the lost relay. From then
+    /// on `near_m`, at which the two are the separation apart, is the limit of this relay's x. `is_beyond` returns
+    /// true if this relay has passed the x that is its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -499,7 +504,7 @@ impl KeepOut {
     }
 
     /// Adds an obstacle at `side`: relays that were never heard. They may hover anywhere beyond `limit_m`, until any
-    /// of them has sent a message.
+    /// of them has sent a message. This relay must move `separation_m` away from `limit_m`.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),
@@ -523,17 +528,18 @@ pub struct Fence {
     /// Number of the fence, the plane x = constant between the two relays; 0 before the first. The relay upstream
     /// (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
     pub number: u16,
-    /// x of the fence, m, from the relay upstream; from the relay downstream, its lowest possible x, m.
+    /// x limit that the sender states, m, -1e7 to 1e7: the fence, or an end of the sender's own interval.
     ///
-    /// Before the first fence the relay upstream sends its highest possible x. -1e7 to 1e7.
+    /// The relay upstream sends the x of the fence; before the first fence, its highest possible x. The relay
+    /// downstream sends its lowest possible x.
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, they are those of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the relay upstream requests to keep from the fence, m, 0 to 1e5. If it is less than the
-    /// separation, the relay downstream must not change its lateral offset or altitude.
+    /// Distance along x that the relay upstream requests to stay before the fence, m, 0 to 1e5. If it is less than
+    /// the separation, the relay downstream must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -547,7 +553,8 @@ impl Fence {
     /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
     /// beyond it, needs that to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
-    /// Flag: echo of the last [`REQUESTS_OPENING`](Self::REQUESTS_OPENING) received from the destination.
+    /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies it from that flag in the
+    /// last message that it has received from the destination.
     pub const OPENING_RECEIVED: u8 = 8;
     /// Flag: the sender has left this association (session). It does not fly to its setpoints, or did not for a time.
     /// Positions and the number of the fence are not valid.

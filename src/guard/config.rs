@@ -43,7 +43,8 @@ impl Geofence {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
-    /// Geofence of the setpoints. A relay that starts outside returns into it; no setpoint inside leaves it.
+    /// Geofence of the setpoints. A relay that starts outside returns into it; after that all its setpoints are
+    /// inside.
     pub geofence: Geofence,
     /// Minimum distance between relays, m: 0 to 1e5; the same on all relays.
     pub separation_m: f32,
@@ -190,7 +191,7 @@ impl GuardConfig {
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a position in the geofence, m: four steps of an f32.
+    /// Returns the maximum rounding error of a position in the geofence, m: four units in the last place.
     pub(super) fn rounding(&self) -> f32 {
         let fence = &self.geofence;
         4.0 * f32::EPSILON * fence.most_x_m.abs().max(fence.least_x_m.abs())

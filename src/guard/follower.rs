@@ -20,11 +20,11 @@ pub(super) struct FenceFollower {
     number: u16,
     /// x of the newest fence that the neighbour upstream has announced, m: this relay stays beyond it.
     fence_m: f32,
-    /// Distance along x that the neighbour upstream requests to keep from the fence, m. It is infinite before its
-    /// first request.
+    /// Distance along x that the neighbour upstream requests to stay before the fence, m. Infinite before its first
+    /// request.
     requested_m: f32,
-    /// Distance along x to the neighbour upstream to which this relay has agreed, m. Infinite, which is also the
-    /// value before any agreement, stands for the separation.
+    /// Distance along x to the neighbour upstream to which this relay has agreed, m. Infinity stands for the
+    /// separation, and is also the value before any agreement.
     agreed_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
@@ -107,8 +107,8 @@ impl FenceFollower {
     }
 
     /// Handles the notice that the neighbour upstream no longer flies to setpoints. This relay then comes no nearer
-    /// to that neighbour. If the two were in the right order along x, the neighbour limits this relay's x in no other
-    /// way.
+    /// to that neighbour than its present setpoint. If the two were in the right order along x, this relay may
+    /// otherwise move; if not, it holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -274,9 +274,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. If `placed` is false, there
-    /// is only a message with a halt request, because this relay's order with its neighbour downstream is not
-    /// confirmed.
+    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. `None` if no message is due.
+    /// If `placed` is false, there is only a message with a halt request, because this relay's order with its
+    /// neighbour downstream is not confirmed.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

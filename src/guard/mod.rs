@@ -112,7 +112,7 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     started_at: Instant,
-    /// Last reported position before the first setpoint, which is this position.
+    /// Last position reported before the first setpoint; it becomes the first setpoint. `None` before any report.
     initial_place: Option<Placement>,
     /// True while the drone flies to this guard's setpoints.
     flown: bool,
@@ -400,7 +400,8 @@ impl Guard {
             && (self.owner.is_ordered(own) || seen(&self.owner.association, Side::Downstream))
     }
 
-    /// Halts this relay while its order along x is not known, or while another relay requests a halt.
+    /// Halts this relay while its order along x is not known (`is_ordered` is false), or on request. The request
+    /// comes from another relay, or from this relay if it is on the wrong side of a neighbour.
     fn halt(&mut self, is_ordered: bool, now: Instant) {
         self.disorder &= !is_ordered && !self.is_seen_in_order();
         self.disorder |= self.is_out_of_order();
@@ -417,12 +418,13 @@ impl Guard {
         self.disorder || upstream || downstream
     }
 
-    /// Returns the last setpoint of [`steer`](Self::steer).
+    /// Returns the last setpoint of [`steer`](Self::steer); `None` before the first one.
     pub const fn setpoint(&self) -> Option<Placement> {
         self.own.setpoint
     }
 
-    /// Returns the next message to a neighbour: its side, its node number and the message.
+    /// Returns the next message to a neighbour, with the neighbour's side and node number. `None` if no message is
+    /// due.
     pub fn poll(&mut self) -> Option<(Side, u16, Fence)> {
         let (up, down) = (&mut self.follower.association, &mut self.owner.association);
         for (side, association) in [(Side::Upstream, up), (Side::Downstream, down)] {

@@ -134,7 +134,7 @@ const MAX_REMINDERS_STILL: u8 = 5;
 pub(super) struct Own {
     pub(super) config: GuardConfig,
     node: u16,
-    /// Agreed position, inside the geofence.
+    /// Agreed position, inside the geofence; `None` before the first agreement.
     pub(super) target: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
@@ -187,8 +187,8 @@ impl Own {
     }
 
     /// Returns the position from which the relay's next path starts. It is `setpoint` once the relay has arrived
-    /// there. Before, the relay may stop on its way. The x returned is then at most the error of the position report
-    /// away from the reported x.
+    /// there. Before that its x is the reported x, moved toward that of `setpoint` by at most the error of the
+    /// report.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -238,7 +238,8 @@ impl Own {
         (self.open, self.halted) = (false, true);
     }
 
-    /// Starts or ends a halt of this relay. If it halts on its way, it stops where it was last reported.
+    /// Starts a halt of this relay if `halted` is true, or else ends it. If the relay halts on its way, it stops
+    /// where it was last reported.
     pub(super) fn halt(&mut self, halted: bool, now: Instant) {
         let begins = halted && !self.halted;
         self.halted = halted;

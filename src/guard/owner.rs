@@ -18,10 +18,10 @@ pub(super) struct FenceOwner {
     /// x of the newest fence that this relay has announced, m; infinite before the first. The neighbour downstream
     /// stays beyond it.
     fence_m: f32,
-    /// Distance along x that this relay requests to keep from the fence, m; infinite before any request.
+    /// Distance along x that this relay requests to stay before the fence, m; infinite before any request.
     requested_m: f32,
     /// Distance along x to the neighbour downstream that is in force, m. The neighbour has agreed to it, or this
-    /// relay has requested a larger one since. Infinite stands for the separation.
+    /// relay has requested a larger one since. Infinity stands for the separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
@@ -104,8 +104,8 @@ impl FenceOwner {
     }
 
     /// Handles the notice that the neighbour downstream no longer flies to setpoints. This relay then comes no nearer
-    /// to that neighbour. If the two were in the right order along x, the neighbour limits this relay's x in no other
-    /// way.
+    /// to that neighbour than its present setpoint. If the two were in the right order along x, this relay may
+    /// otherwise move; if not, it holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -310,9 +310,10 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the next fence: its x, m, the distance to keep from it, m, and true if its x is final. The fence is a
-    /// limit of x that the neighbour downstream stays beyond. `None` if the neighbour is not known to be beyond this
-    /// relay. `upstream_m` is the highest possible x of the relays upstream, m.
+    /// Returns the next fence: its x, m, the distance that this relay stays before it, m, and a flag. The flag is
+    /// true if the x is final, false if the fence can come nearer once relays have moved. `None` if the neighbour
+    /// downstream is not known to be beyond this relay. `kept_m` is the distance to the neighbour upstream,
+    /// `upstream_m` the highest possible x of the relays upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -336,9 +337,9 @@ impl FenceOwner {
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
-    /// Schedules a message if the best x of the fence has changed. The fence is a limit of x for the neighbour
-    /// downstream. A final x is sent at once. While this relay moves, an x that is not final waits for the next
-    /// reminder.
+    /// Schedules a message if the fence, the limit of x for the neighbour downstream, must move. If its new x is
+    /// final, the message is sent at once. If the fence can come nearer once this relay has moved, the message waits
+    /// for the next reminder.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
         if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
             let stays = last || own.reachable.has_arrived();

@@ -38,8 +38,8 @@ const SLOW: u32 = 4;
 /// times, so it is at most eight.
 const LOG_MOST: u32 = 2;
 
-/// Wait before the first retransmission on a lossy channel, in hop times. The neighbour's reply arrives earlier, even
-/// a reply to a duplicate.
+/// Wait before the first retransmission on a lossy channel, in hop times. It is longer than the time until the
+/// neighbour's reply, even the reply to a duplicate.
 const SOON: u32 = 4;
 
 /// Number of messages after a loss for which the channel counts as lossy.
@@ -54,8 +54,8 @@ pub(crate) enum Stage {
     Outstanding,
     /// The result of the message is known.
     Completed,
-    /// The message was cancelled after sending. Duplicates are answered as in `Completed`, but the times of the
-    /// message do not count as a sign of life of a neighbour.
+    /// The message was cancelled after it was sent. Duplicates are answered as in `Completed`. No reply to the
+    /// message proves any more that a neighbour is alive.
     Cancelled,
 }
 
@@ -186,8 +186,8 @@ impl Circulation {
         self.stop(Stage::Idle);
     }
 
-    /// Cancels the message: it counts as completed without a result. Its times are forgotten, because a later message
-    /// must not be taken for its reply, which would prove that a neighbour is alive.
+    /// Cancels the message: it counts as completed, without a result. The time at which it was sent is discarded.
+    /// Otherwise a later message could be taken for its reply, and prove wrongly that a neighbour is alive.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -223,7 +223,8 @@ impl Circulation {
         self.await_result(now, path);
     }
 
-    /// Schedules the message again if its result is still awaited. Called when the next relay can be reached again.
+    /// Schedules a retransmission of the message if its result is still awaited. Called when the next relay can be
+    /// reached again.
     pub(crate) const fn resend(&mut self) {
         self.is_forward_due |= self.is_outstanding();
     }
@@ -246,7 +247,7 @@ impl Circulation {
         self.timer = Some(now + self.jitter.spread(path.hop_time.times(hops)));
     }
 
-    /// Returns the pending reply and marks it as sent.
+    /// Returns the pending reply and marks it as sent; `None` if no reply is pending.
     pub(crate) const fn poll_reply(&mut self) -> Option<Reply> {
         self.reply_due.take()
     }

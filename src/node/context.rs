@@ -45,8 +45,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank in the loaded mission (1 at the leader's end), and its number of relays. View
-    /// changes do not alter them.
+    /// Returns this relay's rank in the loaded mission, and the mission's number of relays. The rank counts from 1 at
+    /// the leader's end. View changes alter neither number.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -92,8 +92,8 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if every relay solves the whole chain by the joint method. It requires this method in the
-    /// settings, and a mission in which the lateral offset or the altitude is free.
+    /// Returns true if every relay solves the whole chain by the joint method. The settings must select this method,
+    /// and the mission must leave the lateral offset or the altitude free.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let free = !(config.band.is_single() && config.lateral.is_single());
@@ -160,8 +160,8 @@ impl<'a> Context<'a> {
 /// Remaining leases of other relays, as far as this relay knows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Longest remaining lease that members of this relay's view can have because of this relay. A lease is granted
-    /// only after all members, and so this relay, have taken part in a renewal.
+    /// Upper bound of the remaining leases of the other members of this relay's view. The bound is known because a
+    /// lease is granted only after all members, and so this relay, have taken part in a renewal.
     pub(crate) lease_left: Duration,
     /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,
@@ -197,7 +197,7 @@ impl OtherLeases {
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Effects {
-    /// Reason why the received message had no effect.
+    /// Reason why the received message had no effect; `None` if it had an effect.
     pub(crate) ignored: Option<Ignored>,
     /// True if a message was retransmitted.
     pub(crate) resent: bool,
@@ -206,9 +206,9 @@ pub(crate) struct Effects {
     /// True if a new view (agreed members of the chain) is needed.
     pub(crate) view_needed: bool,
     /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
-    /// proves that the neighbour was alive after that time.
+    /// proves that the neighbour was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the view proposal that this relay has received or made now.
+    /// Origin of the view proposal that this relay has received or made now; `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
     /// True if a view proposal is outstanding. No pass along the chain continues before its decision.
     pub(crate) view_proposed: bool,
@@ -253,7 +253,7 @@ pub(crate) struct Sensed {
     pub(crate) new_estimate: bool,
     /// The measurements do not fit a single source of interference.
     pub(crate) unclear: bool,
-    /// Node whose measurements contradict those of the other nodes.
+    /// Node that was found now to measure values that contradict those of the other nodes; else `None`.
     pub(crate) faulty_sensor: Option<u16>,
 }
 

@@ -92,7 +92,7 @@ const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 /// [`least_interval`] apart.
 const DEFENCES: u8 = 32;
 
-/// Number of claims that this relay sends after a frame with its node number that is no claim.
+/// Number of claims that this relay sends after a frame, not a claim, that bears its node number.
 ///
 /// With signed frames it is the number of claims after this relay has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
@@ -117,21 +117,21 @@ pub(crate) struct IndexClaims {
     rival: u32,
     /// Last claim number received from another node with the same node number; 0 before any.
     last_rival: u32,
-    /// Last contact with another node of this number: its time, and a flag; `None` before any. The flag is true if
-    /// this relay already had a position at the first contact.
+    /// Last contact with another node of this node number: its time, and a flag; `None` before any. The flag is true
+    /// if this relay already had a position at the first contact.
     contest: Option<(Instant, bool)>,
-    /// Times at which a number was last seen used by two nodes: this relay's number, a neighbour's number.
+    /// Times at which two nodes were last seen to use this relay's number [0], or a neighbour's number [1].
     observed: [Option<Instant>; 2],
-    /// Time at which this relay last received a frame that it had sent itself.
+    /// Time at which this relay last received a frame that it had sent itself; `None` before any.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next claim that this relay sends unprompted, not in reply to a frame.
+    /// Time of the next claim that this relay sends unprompted, not in reply to a frame; `None` for none.
     next_claim: Option<Instant>,
     /// Time from the next unprompted claim to the one after it.
     interval: Duration,
-    /// Number of claims still to send because another active node uses this number. They are [`least_interval`]
-    /// apart.
+    /// Number of claims still to send because another active node uses this relay's node number. They are
+    /// [`least_interval`] apart.
     defences: u8,
     /// Earliest time at which this relay may send its next claim.
     quiet_until: Instant,
@@ -210,8 +210,8 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Records a frame of another node with this number. Returns true if this relay has a lease, and had one when it
-    /// received the first such frame.
+    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease, and already
+    /// had one when it received the first such frame.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -250,8 +250,8 @@ impl IndexClaims {
         false
     }
 
-    /// Compares another node's claim to this number with this relay's claim. Returns true if this relay becomes
-    /// passive.
+    /// Compares another node's claim to this relay's number with this relay's own claim. Returns true if this relay
+    /// becomes passive.
     fn compare(
         &mut self,
         now: Instant,
@@ -294,7 +294,8 @@ impl IndexClaims {
         true
     }
 
-    /// Schedules a claim to this relay's node number, unless one was sent a moment ago.
+    /// Schedules a claim to this relay's node number, unless one was sent a moment ago. The minimum interval is
+    /// [`least_interval`].
     fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);
@@ -374,7 +375,8 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Handles the report that the other node with this number is gone. Returns true if this relay becomes active.
+    /// Handles the report that the other node with this relay's number is gone. Returns true if this relay becomes
+    /// active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {

@@ -199,8 +199,8 @@ impl Lease {
         }
     }
 
-    /// Handles a lease renewal, or the reply to one. It belongs to this relay's view and comes from the right
-    /// neighbour.
+    /// Handles a lease renewal, or the reply to one, of this relay's view. A renewal comes from the previous relay, a
+    /// reply from the next one.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         match message {
             Message::Pulse(pulse) => self.on_pulse(context, *pulse),

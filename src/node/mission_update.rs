@@ -37,9 +37,9 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
-/// Number in this relay's hellos, with the times of its first and last use; 0 is no number.
+/// Nonce in this relay's hellos, with the times of its first and last use; 0 stands for no nonce.
 ///
-/// A mission offer must repeat it, which proves that the offer is not a recording.
+/// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -50,7 +50,7 @@ struct Asked {
 /// State of this relay's mission offers on one side, to the neighbour and to the ground station.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Number in the neighbour's last hello, 0 before any. An offer to the neighbour repeats it.
+    /// Nonce in the neighbour's last hello, 0 before any. An offer to the neighbour repeats it.
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` before any.
     heard: Option<Instant>,
@@ -62,7 +62,8 @@ struct Offering {
     tries: u8,
     /// True if a hello to the ground station is pending.
     reports: bool,
-    /// Number in the ground station's hello that requests the uploaded mission; 0 if none is requested.
+    /// Number of the ground station's request for the uploaded mission; 0 if there is no such request. The reply
+    /// repeats the number.
     ground_asks: u16,
 }
 
@@ -92,7 +93,7 @@ pub(crate) enum Offered {
 
 /// Time until the first repetition of a mission offer, in hop times.
 const OFFER_HOPS: u32 = 4;
-/// Number of mission offers after which the interval between offers doubles.
+/// Number of mission offers that are sent at the same interval, before that interval doubles.
 const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;
@@ -118,9 +119,10 @@ struct Uploads {
     loaded_m: f32,
     /// Range of altitudes of the mission loaded before flight, m, including the common altitude.
     loaded_band: Band,
-    /// Identifier of the last mission that was refused, by this relay or by a relay beyond a neighbour.
+    /// Identifier of the last mission that was refused, by this relay, a neighbour, or a relay beyond one. `None` if
+    /// there is none.
     refused: Option<MissionId>,
-    /// Number in this relay's hellos now, and the previous one. A mission offer must repeat one of the two.
+    /// Present nonce in this relay's hellos, and the previous one. A mission offer must repeat one of the two.
     asked: [Asked; 2],
     /// State of the mission offers toward Tx and toward Rx.
     offering: [Offering; 2],
@@ -173,7 +175,7 @@ impl MissionUpdate {
         Mission::try_new(*upload.config()).ok()
     }
 
-    /// Returns the number for the next hello, which an offer must repeat; 0 if uploads are not accepted. The number
+    /// Returns the nonce for the next hello, which an offer must repeat; 0 if uploads are not accepted. The nonce
     /// changes every `dead_after`.
     pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
@@ -193,7 +195,7 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if this relay has sent a hello with the number `answer` within twice `dead_after`.
+    /// Returns true if this relay has sent a hello with the nonce `answer` within twice `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -208,7 +210,7 @@ impl MissionUpdate {
         })
     }
 
-    /// Records the number in a hello of the neighbour at `side`. The next mission offer repeats it.
+    /// Records the nonce in a hello of the neighbour at `side`. The next mission offer repeats it.
     pub(crate) fn record_hello_number(&mut self, side: Side, nonce: u16, now: Instant) {
         if let Some(offering) = self.offering(side) {
             offering.nonce = nonce;
@@ -238,8 +240,8 @@ impl MissionUpdate {
 
     /// Returns the pending mission offer to the neighbour `to` at `side`, and marks it as sent.
     ///
-    /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The returned number is that
-    /// of the neighbour's hello, which the offer repeats. It is `None` if the hello is older than half of
+    /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The returned number is the
+    /// nonce of the neighbour's hello, which the offer repeats. It is `None` if the hello is older than half of
     /// `dead_after`, so that a new one must be requested first.
     pub(crate) fn poll_offer(
         &mut self,

@@ -29,8 +29,8 @@ pub enum Sample {
     /// It is averaged until its relative error is that of [`Listen`](crate::sensing::Listen). It excludes the signals
     /// of the chain, and includes the receiver's noise, which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
-        /// Position of the drone at the measurement. In each coordinate it is at most 100 times the distance from Tx
-        /// to Rx away from Tx.
+        /// Position of the drone at the measurement. Each coordinate differs from that of Tx by at most 100 times the
+        /// distance from Tx to Rx.
         at: Placement,
         /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
@@ -64,7 +64,7 @@ impl Sample {
     }
 }
 
-/// Meter of the interference at the setpoint: averages the samples that the firmware passes.
+/// Average of the interference at the setpoint, over the samples that the firmware passes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {
     estimator: Option<(Estimator, u32)>,

@@ -19,7 +19,7 @@ const GUARD: bool = cfg!(feature = "guard");
 pub(crate) struct Steering {
     guard: Option<Guard>,
     remind_at: Option<Instant>,
-    /// Setpoint last reported to the firmware.
+    /// Setpoint last reported to the firmware; `None` if there was no setpoint.
     reported_setpoint: Option<Placement>,
 }
 

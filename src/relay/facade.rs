@@ -487,7 +487,7 @@ impl Relay {
     /// Returns an upper bound of the worst hop's SIR for any positions at the current altitudes, linear.
     ///
     /// The leader (the relay that starts the search) knows it after Algorithm 1 or 4. `None` at other relays, and
-    /// with the paper's fixed step, which does not try all chains.
+    /// with the paper's fixed-step schedule, which gives no such bound.
     pub fn bound(&self) -> Option<f32> {
         self.node.round().bound()
     }

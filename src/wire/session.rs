@@ -79,8 +79,8 @@ struct OlderHandshakes {
 }
 
 impl OlderHandshakes {
-    /// Counts a handshake with an outdated nonce. Returns true if it is the fifth in a row (`WENT_BACK`) with rising
-    /// frame counters; replays do not count.
+    /// Counts a handshake with an outdated nonce, of epoch `epoch` and frame counter `counter`. Returns true if it is
+    /// the fifth in a row (`WENT_BACK`) with this epoch and rising frame counters; replays do not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -203,7 +203,8 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to node `to` that requests a reply. Each node then knows the other one's nonce.
+    /// Schedules a handshake to node `to` that requests a reply. After the reply, each of the two nodes knows the
+    /// other's nonce.
     pub(crate) fn request_reply(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -230,7 +231,7 @@ impl Session {
         self.rival.take()
     }
 
-    /// Returns a node to which a handshake is due, and marks the handshake as sent.
+    /// Returns a node to which a handshake is due, and marks it as sent; `None` if no handshake is due.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;

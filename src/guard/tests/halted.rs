@@ -495,9 +495,9 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Checks that a new neighbour upstream moves a fence (limit of x) that relay 3 has already passed. Relay 1 starts
-/// beside relay 2; the two are in order only within the error of the reports. Each next fence of relay 2 then is the
-/// separation beyond relay 1, too (rule 7).
+/// Checks that a new neighbour upstream raises a fence (limit of x) that relay 3 has already passed. The fence is
+/// that of relay 2, beside which relay 1 starts; the two are in order only within the error of the reports. Each next
+/// fence of relay 2 then is the separation beyond relay 1, too (rule 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

@@ -33,8 +33,8 @@ fn at(x_m: f32) -> Placement {
     Placement::on_line(x_m, 50.0)
 }
 
-/// Returns the first message of a neighbour for the tests. It does not know this relay's association (session) number
-/// yet.
+/// Returns the first message of a neighbour for the tests, at `x_m`, with the agreed x `target_m`. It does not know
+/// this relay's association (session) number yet.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,
@@ -506,8 +506,8 @@ fn a_restart_is_distinguished_from_late_messages() {
     );
 }
 
-/// Checks that a relay on the wrong side of its downstream neighbour lets no upstream neighbour move. It requests a
-/// halt, in a message whose x does not count.
+/// Checks that a relay on the wrong side of its downstream neighbour keeps the upstream one in place. Its message to
+/// the upstream neighbour requests a halt, and is flagged so that its x permits no move.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);

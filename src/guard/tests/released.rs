@@ -310,8 +310,8 @@ fn lost_messages_are_repeated() {
     assert!(row.all.iter().all(|one| one.guard.has_arrived()));
 }
 
-/// Checks that late messages change nothing after a pilot has taken a drone over or given it back. Old fence messages
-/// do not make the drone count as flown to setpoints, and old leave notices not as released.
+/// Checks that late messages change nothing after a pilot has taken a drone over or given it back. For the
+/// neighbours, old fence messages do not end the manual control, and old leave notices do not begin it again.
 #[test]
 fn late_messages_do_not_change_who_is_flown() {
     let mut row = Row::new();

@@ -49,8 +49,8 @@ impl Node {
 
     /// Handles a claim message from node `from`. Returns false if signed frames replace claims.
     ///
-    /// A claim of that node to its own node number is sent back to it as an echo. An echo shows a claim to this
-    /// relay's node number; it is compared with this relay's own claim.
+    /// A claim of that node to its own node number is sent back to it as an echo. An echo received by this relay
+    /// shows a claim to this relay's node number; the claim is compared with this relay's own.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -86,8 +86,8 @@ impl Node {
 
     /// Returns the destination of a due claim to this relay's node number, and marks the claim as sent.
     ///
-    /// Claims go to the two neighbours in turn. Without neighbours, on a shared channel, they are addressed to this
-    /// relay's own number.
+    /// `None` if no claim is due. Claims go to the two neighbours in turn. Without neighbours, on a shared channel,
+    /// they are addressed to this relay's own number.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;
@@ -99,8 +99,8 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if the authentication sessions must be restarted. New nonces then count up from
-    /// it.
+    /// Returns the new claim number if the authentication sessions must be restarted; else `None`. New nonces then
+    /// count up from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }

@@ -30,7 +30,7 @@ impl Node {
             .schedule_hello(distance, ask);
     }
 
-    /// Returns the next pending hello with its side and its destination node.
+    /// Returns the next pending hello with its side and its destination node; `None` if none is pending.
     pub(super) fn next_hello(&mut self, now: Instant) -> Option<(Side, u16, Hello)> {
         let (own, all) = (self.member.node, self.member.all);
         for side in [Side::Upstream, Side::Downstream] {
@@ -101,8 +101,8 @@ impl Node {
     /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`. Node `other`
     /// is at `side`.
     ///
-    /// This relay and that neighbour must receive each other. Otherwise this relay must be linked to a node nearer
-    /// than that neighbour, and this node is inserted together with this relay.
+    /// The neighbour of `other` is on the opposite side of this relay, and the two must receive each other. Otherwise
+    /// this relay must be linked to a node nearer than that neighbour; both are then inserted together.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -264,7 +264,7 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay as its own neighbour (`mutual`). If it has so now,
+    /// Records if the neighbour at `side` has selected this relay as its own neighbour (`mutual`). If that is new,
     /// outstanding messages are sent again.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {

@@ -111,8 +111,8 @@ impl Node {
         known
     }
 
-    /// Returns true if node `from` uses the same x axis, between the same positions of Tx and Rx. Otherwise the
-    /// message is counted.
+    /// Returns true if node `from` uses the same x axis, between the same positions of Tx and Rx. `digest`, in its
+    /// message, shows that. If it differs, the message is counted as rejected.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.layers.update.line_digest(&self.member);
         if !same && self.layers.neighbours.at(side).latest_mission.is_some() {

@@ -208,7 +208,7 @@ impl Node {
         }
     }
 
-    /// Replaces the interference in the active mission by the current estimate, and reports it.
+    /// Replaces the interference in the active mission by the current estimate, and reports the change.
     fn apply_estimate(&mut self) {
         let estimate = self.layers.round.sensing().estimate();
         let Member {
@@ -348,7 +348,8 @@ impl Layers {
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
-    /// Schedules all messages whose reply is outstanding again. Called when the next relay can be reached again.
+    /// Schedules retransmissions of all messages whose reply is outstanding. Called when the next relay can be
+    /// reached again.
     pub(super) fn resend(&mut self) {
         self.view.resend();
         self.round.resend();

@@ -126,8 +126,8 @@ impl Node {
         }
     }
 
-    /// Stores `upload` if it is newer than the stored mission. Refuses it, counts it, and reports it once if it does
-    /// not fit the line from Tx to Rx or the geofence.
+    /// Stores `upload` if it is newer than the stored mission. If it does not fit the line from Tx to Rx or the
+    /// geofence, it is refused and counted instead, and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
             Offered::Stored => self.on_stored(now),
@@ -174,8 +174,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles a neighbour's report that the mission `refused` is refused. That neighbour refuses it, or a relay
-    /// beyond.
+    /// Handles a neighbour's report that the mission `refused` is refused. The neighbour itself refuses it, or a
+    /// relay beyond the neighbour.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {
@@ -218,8 +218,8 @@ impl Node {
         }
     }
 
-    /// Returns the pending mission offer to the neighbour at `side`. An offer must answer a recent hello; without
-    /// one, a hello that requests a hello is returned instead.
+    /// Returns the pending mission offer to the neighbour at `side`; `None` if no offer is pending. An offer must
+    /// answer a recent hello; without one, a hello that requests a hello is returned instead.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

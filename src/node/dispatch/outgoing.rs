@@ -52,7 +52,7 @@ impl Node {
     }
 
     /// Returns the next message of a view change, a lease renewal or an agreement on positions. It comes with its
-    /// side and its destination.
+    /// side and its destination. `None` if no such message is pending.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {

@@ -93,8 +93,8 @@ impl Hearing {
         self.now |= mask(distance);
     }
 
-    /// Returns the nodes received recently, as a bit mask; bit 0 is the nearest node. A node counts for one to two
-    /// times `probe_after`.
+    /// Returns the nodes received recently, as a bit mask; bit 0 is the nearest node. A node stays in the mask for
+    /// one to two times `probe_after` after its last frame.
     pub(super) fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
         self.age(now, settings);
         self.now | self.before

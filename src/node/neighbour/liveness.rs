@@ -74,12 +74,12 @@ pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Number of the last heartbeat requests to which an answer is accepted.
+/// Number of heartbeat requests to which an answer is still accepted: the last four.
 const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Time of the neighbour's last sign of life; at first the time of this relay's start.
+    /// Time of the neighbour's last sign of life; before the first one, the time of this relay's start.
     last_sign: Instant,
     lost: bool,
     /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.
@@ -202,7 +202,8 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Measures the neighbour's silence from `now` on, unless the neighbour is lost. Returns true if it is not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, unless the neighbour is lost. Returns true if it
+    /// is not lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.last_sign = now;

@@ -63,7 +63,7 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
     dropped: u16,
-    /// Previous neighbour, if the selected node has replaced it as the nearer one; 0 for none.
+    /// Previous neighbour that the selected node has replaced because it is nearer; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
@@ -74,7 +74,7 @@ pub(crate) struct Neighbour {
     /// Node that each of the four nearest nodes on this side has selected on its side toward this relay. 0 for none;
     /// the nearest node is first.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame from a node on this side that is not selected.
+    /// Time of the last frame from a node on this side that is not selected; `None` before any.
     unselected_at: Option<Instant>,
     /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
@@ -95,7 +95,8 @@ pub(crate) struct Neighbour {
     pub(super) heartbeat: PendingHeartbeat,
     /// Newest mission that the selected node has reported to have stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
-    /// Time of the next check of the neighbour's silence, or of the next hellos of the search.
+    /// Time of the next check of the neighbour's silence, or of the next hellos of the search. `None` on a side that
+    /// needs neither.
     check_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
@@ -233,8 +234,8 @@ impl Neighbour {
         self.reported_found != before
     }
 
-    /// Measures the neighbour's silence from `now` on, if the neighbour is linked and a member of the view. Returns
-    /// true if so, and if the neighbour is not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, if it is linked and in the view. Returns true if
+    /// so, and if the neighbour is not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -471,8 +472,8 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between the candidate and the lost next node. This relay waits longer for each of
-    /// them before it selects the candidate, because a nearer node may still answer.
+    /// Returns the number of nodes that are nearer than the candidate, without the lost next node. This relay waits
+    /// longer for each of them before it selects the candidate, because a nearer node may still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -716,7 +717,8 @@ impl Neighbour {
     }
 
     /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is that of a
-    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
+    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers. `None` if no
+    /// heartbeat is pending.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {

@@ -24,8 +24,8 @@ use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdi
 
 /// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2.
 ///
-/// The second value is for traffic in both directions. A call also completes the current altitude, which is at most
-/// 24 or 194 positions more.
+/// The second value is for traffic in both directions. A call also completes the current altitude of the search grid,
+/// which is at most 24 or 194 positions more.
 pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 /// True if the feature `altitude` (joint method) is on. Without it the code of the joint method is unreachable.
@@ -51,8 +51,8 @@ pub(super) struct JointPlace {
     /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
     /// used in an interference field.
     pub(super) end_m: f32,
-    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of that x to help the
-    /// next hop.
+    /// True if every relay goes as far along the pass as the target SIR permits (a plain pass). False if relays may
+    /// stop before that x to help the next hop.
     pub(super) plain: bool,
 }
 
@@ -76,14 +76,14 @@ pub(crate) struct Computation {
     /// the end of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Meter of the interference at the agreed position. Used only if the interference is a field (a known
+    /// Average of the measured interference at the agreed position. Used only if the interference is a field (a known
     /// distribution along x).
     pub(super) meter: Meter,
     /// Measurements of the unknown interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// Upper bound of the worst hop's SIR for any positions at the configured altitudes, linear. Known at the leader
-    /// only.
+    /// Upper bound of the worst hop's SIR for any positions at the configured altitudes, linear. `None` at other
+    /// relays than the leader, and until it is known.
     pub(super) bound: Option<f32>,
 }
 
@@ -329,7 +329,7 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 pub(crate) enum LeaderTask {
     /// Idle: not the leader, not started, or finished.
     Idle,
-    /// Prediction of the chain's target SIR from the mission; the first sweep of targets starts there.
+    /// Prediction of the chain's target SIR from the mission; the first sweep tries targets around it.
     Predicting(Planner),
     /// Solution of the whole chain by the joint method. Every relay computes it for itself.
     Solving(ChainSolver),

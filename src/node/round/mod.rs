@@ -62,8 +62,8 @@ impl Round {
         }
     }
 
-    /// Handles a message of the current mission and view that comes from the right neighbour. Work: at most this
-    /// relay's positions for 16 target SIRs.
+    /// Handles a message of the current mission and view. A pass message comes from the previous relay, a reply from
+    /// the next one. Work: at most this relay's positions for 16 target SIRs.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let before = computation.state;
@@ -241,7 +241,7 @@ impl Round {
         self.computation.discard_agreed_place();
     }
 
-    /// Schedules the message of an outstanding pass again. Called when the next relay can be reached again.
+    /// Schedules a retransmission of an outstanding pass message. Called when the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
@@ -299,7 +299,7 @@ impl Round {
         self.computation.is_untouched()
     }
 
-    /// Returns the agreed position. The guard may limit the setpoint on the way there.
+    /// Returns the agreed position; `None` before an agreement. The guard may limit the setpoint on the way there.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
     }

@@ -338,7 +338,7 @@ pub(super) struct SensorState {
     pub(super) transmitter: Average,
     /// Average of the interference power that Rx, on the ground, has reported to this relay.
     pub(super) receiver: Average,
-    /// True while this relay does not report its measurements, because they contradict the others.
+    /// True while this relay does not report its measurements, which contradict those of the other nodes.
     pub(super) off: bool,
     /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
     /// measurements.
@@ -494,8 +494,8 @@ impl Sensing {
 }
 
 impl SensorState {
-    /// Returns the interference level at a ground station at time `now`, from the station's `average`. Its weight
-    /// decreases with the age of the last report.
+    /// Returns the interference level at a ground station at time `now`, from the station's `average`. The level's
+    /// weight in an estimate decreases with the age of the station's last report.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {

@@ -203,7 +203,7 @@ impl RoundState {
         }
     }
 
-    /// Counts a late pass message. Too many in a row are foreign, because their leader has restarted.
+    /// Counts a late pass message. Too many in a row count as foreign, because their leader has restarted.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign
@@ -223,8 +223,8 @@ impl RoundState {
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass was received after the state `before`. In that state the result of its pass was
-    /// known.
+    /// Returns true if a new pass was received after the state `before`. The pass of that state must have had its
+    /// result then.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }

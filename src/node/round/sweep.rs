@@ -46,7 +46,7 @@ impl Computation {
     }
 
     /// Starts this relay's computation in a sweep, a pass along the chain that tries target SIRs. `from` has the
-    /// farthest x of the previous node for each target, m.
+    /// previous node's farthest x in the direction of the pass for each target, m.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -183,16 +183,17 @@ pub(crate) struct SweepPass {
     /// True if a later relay of this pass has another power or fixed altitude than the common profile.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x at which the previous node meets each target SIR, m.
+    /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
     from: PerTarget,
-    /// Farthest x at which this relay meets each target SIR, m.
+    /// Farthest x in the direction of the pass at which this relay meets each target SIR, m.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
     /// x that this relay takes for the committed target, m; `None` without a committed target.
     place: Option<f32>,
-    /// Required x of the previous relay for the committed target, m. `None` if that relay takes its farthest x.
+    /// x that the previous relay must take for the committed target, m. `None` if that relay must take the farthest x
+    /// at which it meets this target.
     required_x_m: Option<f32>,
 }
 
@@ -277,8 +278,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores `place`, this relay's x for the committed target SIR, m. Derives the required x of the previous relay;
-    /// if there is no suitable one, the commitment is revoked.
+    /// Stores `place`, this relay's x for the committed target SIR, m. Computes from it the x that the previous relay
+    /// must take; if there is no suitable one, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
@@ -338,8 +339,8 @@ impl SweepPass {
     }
 }
 
-/// Returns a checksum of the previous relay's data in a sweep. It distinguishes a duplicate from a sweep that a
-/// restarted relay sends with other data.
+/// Returns a checksum of the previous relay's data in a sweep; `behind` is `None` after Tx or Rx. It distinguishes a
+/// duplicate from a sweep that a restarted relay sends with other data.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {

@@ -106,8 +106,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Completes this relay's turn in Algorithm 2. `worst` is the worst SIR of the hops between the next relay and
-    /// Rx, linear.
+    /// Ends this relay's turn in Algorithm 2: reports the worst SIR of the hops from this relay to Rx. `worst` is the
+    /// worst SIR of the hops from the next relay to Rx, linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,
@@ -149,7 +149,7 @@ impl Computation {
 pub(crate) struct TurnPass {
     /// Action of this pass of Algorithm 2: look, move or stop.
     pub(crate) turn: AdjustStep,
-    /// SIR of the chain before this pass of Algorithm 2, linear.
+    /// SIR of the chain's worst hop before this pass of Algorithm 2, linear.
     pub(crate) sir: f32,
     /// Position and power of the previous relay, from which the hop to this relay starts; `None` for Tx.
     before: Option<HopEnd>,

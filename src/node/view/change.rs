@@ -125,13 +125,13 @@ impl ViewChange {
         self.proposed.filter(|_| self.circulation.is_outstanding())
     }
 
-    /// Returns the last view proposal that this relay has voted on.
+    /// Returns the last view proposal that this relay has voted on; `None` before any.
     pub(crate) const fn proposed(&self) -> Option<Proposed> {
         self.proposed
     }
 
-    /// Returns this relay's rank and the number of relays, as of the last view proposal. Ranks count from 1 at the
-    /// leader.
+    /// Returns this relay's rank and the number of relays, as of the last view proposal. `None` before any. Ranks
+    /// count from 1 at the leader.
     pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
@@ -373,7 +373,7 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Schedules the outstanding view proposal again. Called when the next relay can be reached again.
+    /// Schedules a retransmission of the outstanding view proposal. Called when the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
@@ -452,7 +452,8 @@ impl ViewChange {
         Effects { resent, ..effects }
     }
 
-    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads.
+    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads. `fresh` is
+    /// true if this relay has taken part in no pass or view since its start.
     fn request_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
         let settings = &context.member.settings;
         if !self.request.poll_due(context.now, fresh, settings) {
@@ -535,7 +536,7 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive view proposals that were refused.
     refusals: u8,
-    /// Earliest time of the next view request after a refusal, if anything has changed. `None` without a refusal.
+    /// Earliest time to which a new reason can advance the next view request. Set after a refusal, else `None`.
     not_before: Option<Instant>,
     jitter: Jitter,
 }

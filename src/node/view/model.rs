@@ -60,7 +60,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Checks more events than the usual test does; takes some minutes.
+/// Checks the view change with more events than in the usual test; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {
@@ -72,7 +72,7 @@ fn chains_of_three_and_four_in_more_states() {
 }
 
 /// Checks that the model check finds a broken quorum rule. If all reachable relays could vote, two views would be in
-/// force at once.
+/// force at the same time.
 #[test]
 fn the_check_finds_the_fault_of_counting_all_votes() {
     for relays in [3, 4] {
@@ -293,8 +293,8 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Broken rule, for a test: every reachable relay votes. The quorum is half of the newest view that any of them
-    /// knows.
+    /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view that any of
+    /// them knows.
     Everybody,
 }
 
@@ -599,9 +599,9 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals until the relays in the bit mask `there` agree on one view. The view has all
-    /// these relays as members. Links between them are restored, all other links are cut. `Some(0)` if they are no
-    /// quorum; `None` if [`MAX_PROPOSALS`] are not enough.
+    /// Returns the number of proposals after which the relays in the bit mask `there` agree on a view. Its members
+    /// are exactly these relays. Only the links between them work. `keeps_air` keeps the frames under way. `Some(0)`
+    /// if the relays are no quorum; `None` if [`MAX_PROPOSALS`] are not enough.
     pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {

@@ -28,8 +28,8 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could be inserted between the destination and the destination's neighbour. That is the
-    /// neighbour on the side of the sender; the sender and that neighbour must receive each other.
+    /// True if the sender could be inserted between the destination and the destination's neighbour. That is its
+    /// neighbour on the side of the sender. The sender and that neighbour must receive each other.
     pub ready: bool,
     /// Number of connected relays from the sender to the end of the chain away from the destination. It includes the
     /// sender: 1 to 1000.
@@ -46,7 +46,7 @@ pub struct Hello {
     /// True if the mission `latest_mission` is refused. The sender refuses it, or a relay farther from the
     /// destination.
     pub refused: bool,
-    /// Number that the reply to this hello must repeat if it is a mission offer. 0 if the sender accepts no offer.
+    /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,
 }
 
@@ -58,7 +58,8 @@ impl Hello {
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes the hello into `buffer`; returns its length. The seven flags share one byte.
+    /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The seven flags share one
+    /// byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let Self {
             requests_reply: ask,
@@ -132,7 +133,7 @@ impl Hello {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Claim number of the claiming node: drawn at its start, raised at most once while it is active.
+    /// Random claim number of the claiming node. Drawn at its start, and raised at most once while it is active.
     pub number: u32,
     /// Last claim number that the claiming node received from another node with its number; 0 for none.
     pub other_number: u32,
@@ -143,7 +144,8 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// Encodes the claim into `buffer`; returns its length. Its flags from bit 0: passive, echo.
+    /// Encodes the claim into `buffer`; returns its length, or `None` if it does not fit. Its flags from bit 0:
+    /// passive, echo.
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let flags = u8::from(self.passive) | u8::from(self.echo) << 1;
         let numbers = [self.number, self.other_number].map(u32::to_le_bytes);
@@ -164,8 +166,8 @@ impl Claim {
     }
 }
 
-/// Encodes a fence message into `buffer`; returns its length. A fence is the limit along x that keeps two neighbours
-/// apart; `mission` is the digest in the message.
+/// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit
+/// along x that keeps two neighbours apart; `mission` is the digest in the message.
 pub(super) fn encode_fence(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, mission);
     let numbers = [fence.echo, fence.number].map(Word::new);

@@ -50,7 +50,7 @@ pub const MAX_BODY: usize = LONG;
 /// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Message to the next relay of a pass: target SIRs, and the sender's farthest x for each target.
+    /// Message to the next relay of a pass: target SIRs, and the farthest x at which the sender meets each.
     Sweep(Sweep),
     /// Reply to a sweep: its verdict, the result for each target. It acknowledges the sweep of the same number.
     Verdict(SweepVerdict),
@@ -102,7 +102,7 @@ pub enum Message {
     Offer {
         /// Uploaded mission that the sender offers.
         upload: Upload,
-        /// Number of the destination's hello that the offer answers, 0 for none.
+        /// Nonce in the destination's hello that the offer answers, 0 for none.
         offer_number: u16,
     },
     /// Ground to relay: interference level measured at Tx or Rx.

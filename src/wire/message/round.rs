@@ -18,7 +18,8 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each target.
+/// Sweep message of a pass along the chain: target SIRs, and the farthest x of the sender for each. Farthest means in
+/// the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, wrapping.
@@ -34,8 +35,8 @@ pub struct Sweep {
     /// Upsilon = E[1/I] measured by the sender at its position, 1/W. `None` if receivers must use the field, the
     /// mission's known distribution of interference along x.
     pub measured_per_w: Option<f32>,
-    /// Farthest x at which the sender meets each target SIR, m, from the lowest target. The list ends at the first
-    /// target that cannot be met.
+    /// Farthest x in the direction of the pass at which the sender meets each target SIR, m. The list begins with the
+    /// lowest target, and ends at the first one that cannot be met.
     pub reaches: PerTarget,
 }
 
@@ -71,8 +72,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length. The measured Upsilon or the lateral offset is encoded
-    /// between the head and the list of farthest x.
+    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured Upsilon or the
+    /// lateral offset is encoded between the head and the list of farthest x.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -140,8 +141,8 @@ pub struct SweepVerdict {
     pub view_digest: u16,
     /// Slack (spare length of the chain) of each target, and the committed target, if any.
     pub verdict: Verdict,
-    /// Required x of the destination if a target is committed, m. `None` if the destination must take the farthest x
-    /// that it has reported for this target.
+    /// x that the destination must take if a target is committed, m. `None` if the destination must take the farthest
+    /// x that it has reported for this target.
     pub required_x_m: Option<f32>,
     /// True if the sender or a later relay of the pass has its own power or its own fixed altitude. They differ from
     /// the profile that the mission has in common for all relays.
@@ -272,7 +273,7 @@ pub struct Token {
     pub power_w: f32,
     /// Action that each relay performs when it receives the token in this pass.
     pub turn: AdjustStep,
-    /// SIR of the chain before this pass, linear; 0 if unknown.
+    /// SIR of the chain's worst hop before this pass, linear; 0 if unknown.
     pub sir: f32,
 }
 
@@ -455,8 +456,8 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict the others; 0 for none. They are left out of `sums`. Set
-    /// in replies only.
+    /// Node number of a relay whose measurements contradict those of the other relays; 0 for none. The measurements
+    /// of that relay are left out of `sums`. Set in replies only.
     pub excluded: u16,
 }
 

@@ -37,7 +37,8 @@ pub struct Poll {
     /// Time until leases of views before `agreed` have expired, in tenths of a second; 65535 if unknown. Positions of
     /// the new view may be used only after that time.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on.
+    /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on. `None` without such
+    /// a view.
     pub successor: Option<Successor>,
 }
 
@@ -266,7 +267,8 @@ pub struct Pulse {
     pub number: u16,
     /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
-    /// Duration of the lease, in tenths of a second: 1 to 65535. It starts when a member takes part in a renewal.
+    /// Duration of the lease, in tenths of a second: 1 to 65535. The lease of each member starts when that member
+    /// takes part in the renewal.
     pub lease: u16,
 }
 

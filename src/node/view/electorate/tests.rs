@@ -49,8 +49,8 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the decision on `proposal` after it has visited `nodes` in this order. Only the last `accept` of these
-    /// nodes receive the decision.
+    /// Returns the view decided on `proposal` after it has visited `nodes` in this order. `None` without a quorum.
+    /// Only the last `accept` of these nodes receive the decision.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
