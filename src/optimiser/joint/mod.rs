@@ -15,6 +15,7 @@
 
 mod ascent;
 mod hop;
+mod interior;
 mod outlook;
 mod site;
 pub mod solver;
