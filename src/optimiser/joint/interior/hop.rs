@@ -153,7 +153,12 @@ impl Gains {
         let [there, back] = weights;
         let flat = 2.0 * (there + back) / l;
         let mut bend = [[0.0; 3]; 3];
-        add_product(&mut bend, v, v, if convex { -flat / l } else { -2.0 * flat / l });
+        add_product(
+            &mut bend,
+            v,
+            v,
+            if convex { -flat / l } else { -2.0 * flat / l },
+        );
         add_to_diagonal(&mut bend, flat);
         let mut hop = Derivatives {
             by_from: [slope.map(|x| -x); 2],

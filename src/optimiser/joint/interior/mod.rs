@@ -67,7 +67,11 @@ const INSIDE: f32 = 0.02;
 const AT_ONCE: u16 = 10;
 const SEGMENT: usize = 10;
 /// Relays of a segment in memory; 0 without the feature `altitude`.
-const STAGES: usize = if cfg!(feature = "altitude") { SEGMENT } else { 0 };
+const STAGES: usize = if cfg!(feature = "altitude") {
+    SEGMENT
+} else {
+    0
+};
 
 /// Levels of a hop, and their multipliers.
 #[derive(Clone, Copy, Debug, Default)]
@@ -170,7 +174,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let mut at = [0.0; 3];
         let ends = wanted.into_iter().zip(low.into_iter().zip(width));
         for (cell, (wanted, (low, width))) in at.iter_mut().zip(ends) {
-            *cell = wanted.max(low + INSIDE * width).min(low + (1.0 - INSIDE) * width);
+            *cell = wanted
+                .max(low + INSIDE * width)
+                .min(low + (1.0 - INSIDE) * width);
         }
         if let Some(node) = self.node(index) {
             node.at = at;
@@ -235,14 +241,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Processes one portion of the work; ready with T, the logarithm of an SIR, at the end. Ends early if it is to remain below
-    /// `best`.
-    pub(super) fn step(
-        &mut self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
-        best: f32,
-    ) -> Poll<f32> {
+    /// Processes one portion of the work; ready with T, the logarithm of an SIR, at the end.
+    pub(super) fn step(&mut self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat) -> Poll<f32> {
         let relays = mission.relays();
         match self.work {
             Work::Levels(k) => self.levels(mission, seat_of, k),
@@ -256,7 +256,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                 }
                 self.work = Work::Merit(end);
                 if end > relays + 1 {
-                    return self.judge(mission, best);
+                    return self.judge(mission);
                 }
             }
             Work::Eliminate(segment) => {
@@ -361,7 +361,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Accepts or refuses a step, and begins the next one.
-    fn judge(&mut self, mission: &Mission, best: f32) -> Poll<f32> {
+    fn judge(&mut self, mission: &Mission) -> Poll<f32> {
         let relays = mission.relays();
         let merit = self.target + self.mu * self.sum;
         let whole = self.mu * levels(mission);
@@ -377,7 +377,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             let was_convex = self.convex;
             self.convex = true;
             if was_convex {
-                return self.lower(whole, true, best);
+                return self.lower(whole, true);
             }
             self.look(true);
             return Poll::Pending;
@@ -392,7 +392,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
         self.keep_multipliers(relays);
         if is_step && (self.share > 0.5 && gain < SETTLED * whole || gain < STUCK * whole) {
-            return self.lower(whole, false, best);
+            return self.lower(whole, false);
         }
         self.merit = merit;
         if self.iterations >= ITERATIONS {
@@ -405,8 +405,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Lowers mu, or ends. `resets` is for multipliers that no step was found with.
-    fn lower(&mut self, whole: f32, resets: bool, best: f32) -> Poll<f32> {
-        if whole <= 1.001 * LAST_MU || self.target + whole < best {
+    fn lower(&mut self, whole: f32, resets: bool) -> Poll<f32> {
+        if whole <= 1.001 * LAST_MU {
             return Poll::Ready(self.target);
         }
         self.mu *= LESS.max(LAST_MU / whole);
@@ -433,11 +433,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.resets = false;
     }
 
-    fn derivatives(
-        &mut self,
-        relays: u16,
-        k: u16,
-    ) -> (Derivatives, Weights) {
+    fn derivatives(&mut self, relays: u16, k: u16) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
         let ends = [self.at(relays, k - 1), self.at(relays, k)];
         let hop = self
@@ -516,7 +512,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
         for index in indices.rev() {
             let ahead = self.nodes.get(usize::from(index));
-            let ahead = ahead.filter(|_| index < relays).map_or([0.0; 3], |node| node.step);
+            let ahead = ahead
+                .filter(|_| index < relays)
+                .map_or([0.0; 3], |node| node.step);
             let k = usize::from(index - first - 1);
             let step = self.factors.get(k)?.step(self.by_target, ahead);
             if !dot(step, step).is_finite() {
@@ -555,12 +553,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Updates the multipliers of hop `k`, whose ends move by `steps`.
-    fn follow(
-        &mut self,
-        relays: u16,
-        k: u16,
-        [from, to]: [Triple; 2],
-    ) {
+    fn follow(&mut self, relays: u16, k: u16, [from, to]: [Triple; 2]) {
         let (hop, weights) = self.derivatives(relays, k);
         let ([a, b], [c, d]) = (hop.by_from, hop.by_to);
         let change = [

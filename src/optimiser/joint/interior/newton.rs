@@ -85,7 +85,12 @@ impl Weights {
 
 impl Front {
     /// Returns the rows of a relay at `at` in a box, after the hop to it.
-    pub(super) fn start(hop: &Derivatives, weights: &Weights, at: Triple, room: [Triple; 2]) -> Self {
+    pub(super) fn start(
+        hop: &Derivatives,
+        weights: &Weights,
+        at: Triple,
+        room: [Triple; 2],
+    ) -> Self {
         let mut front = Self {
             bend: hop.bend_to,
             ..Self::default()

@@ -5,21 +5,15 @@
 //! nearest local optimum, and Algorithm 1 at the new cross-sections gives the target that the relays will agree on, with their
 //! separation. The best chain is kept.
 //!
-//! The initial chains were chosen from 216 by the number of random scenes in which the best of them misses the optimum:
-//!
-//! | start | cross-sections | x |
-//! | --- | --- | --- |
-//! | `Given` | common altitude; compared only, so that the result is not below Algorithm 1's | Algorithm 1 |
-//! | `Away` | highest, at the end of the room away from the interferer | Algorithm 1 |
-//! | `Slope` | altitude rises, or falls, from Tx to Rx | Algorithm 1 |
-//! | `Half` | lowest | even between the middle and the end with less power |
-//! | `Arch` | low at the ends, high in the middle | even |
-//!
-//! `Half` finds chains whose first hop from a strong Tx passes the interferer.
+//! The first chain is that of the common altitude, which is compared only: the result is not below that of Algorithm 1. The other
+//! five were chosen from 216 one after another, by the number of 3 840 random scenes in which the best result so far misses the
+//! optimum. They are given from the end with more power on, whose signal may pass the interferer in one hop; relays away from the
+//! interferer or high are mostly better than relays close to it, since the method finds its way down but not around.
 
+use super::Solver;
 use super::chain::{Seat, SolverContext};
 use super::judge::JUDGED;
-use super::Solver;
+use crate::mission::Interferer;
 use crate::optimiser::joint::interior::Interior;
 use crate::optimiser::joint::site::{Cell, Room};
 use crate::optimiser::joint::starts::Seek;
@@ -38,56 +32,67 @@ const LINE: u16 = 4;
 /// Share of even spacing in initial positions, which separates relays that share one.
 const EVEN: f32 = 0.02;
 
+/// Initial chain, from the end with more power to the other one.
 #[derive(Clone, Copy, PartialEq, Debug)]
-enum Start {
-    Given,
-    Away,
-    Slope { rises: bool },
-    Half,
-    Arch,
+struct Start {
+    /// Lateral offset away from the interferer at the first, the middle and the last relay, as a fraction of the room there.
+    aside: [f32; 3],
+    /// Altitude of the first and the last relay, as a fraction of the band.
+    up: [f32; 2],
+    /// Ends of even spacing, in units of D; `None` for the x of Algorithm 1.
+    even: Option<[f32; 2]>,
 }
 
-const STARTS: [Start; 6] = [
-    Start::Given,
-    Start::Away,
-    Start::Slope { rises: true },
-    Start::Slope { rises: false },
-    Start::Half,
-    Start::Arch,
+const STARTS: [Start; 5] = [
+    Start {
+        aside: [0.96, 0.96, 0.96],
+        up: [0.96, 0.96],
+        even: None,
+    },
+    Start {
+        aside: [0.9, 0.45, 0.0],
+        up: [0.96, 0.04],
+        even: None,
+    },
+    Start {
+        aside: [0.96, 0.96, 0.96],
+        up: [0.96, 0.04],
+        even: Some([0.5, 1.0]),
+    },
+    Start {
+        aside: [0.0, 0.9, 0.0],
+        up: [0.96, 0.04],
+        even: Some([0.0, 1.0]),
+    },
+    Start {
+        aside: [0.9, 0.45, 0.0],
+        up: [0.04, 0.96],
+        even: Some([0.0, 0.5]),
+    },
 ];
 
 impl Start {
-    /// Returns the cross-section of a relay; `share` is 0 for the first and 1 for the last one.
-    fn cross_section(self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, share: f32, room: Room) -> CrossSection {
+    /// Returns the cross-section in `room` of the relay at `share` of the chain, 0 to 1.
+    fn cross_section(self, interferer: &Interferer, share: f32, room: Room) -> CrossSection {
         let Room { lateral, band } = room;
-        let up = |share: f32| band.least_m + share * band.span_m();
-        let on_line = |altitude_m| CrossSection { y_m: 0.0, altitude_m };
-        room.nearest(match self {
-            Self::Given => on_line(chain.mission.config().common.altitude_m),
-            Self::Away => CrossSection {
-                y_m: if chain.interferer.y_m > 0.0 {
-                    lateral.least_m
+        let ([near, middle, far], [first, last]) = (self.aside, self.up);
+        let bent = 2.0 * share - 1.0;
+        let aside = middle
+            + bent
+                * if bent < 0.0 {
+                    middle - near
                 } else {
-                    lateral.most_m
-                },
-                altitude_m: band.most_m,
-            },
-            Self::Slope { rises: true } => on_line(up(share)),
-            Self::Slope { rises: false } => on_line(up(1.0 - share)),
-            Self::Half => on_line(band.least_m),
-            Self::Arch => on_line(up(1.0 - (2.0 * share - 1.0).abs())),
+                    far - middle
+                };
+        let away_m = if interferer.y_m > 0.0 {
+            lateral.least_m
+        } else {
+            lateral.most_m
+        };
+        room.nearest(CrossSection {
+            y_m: aside * away_m,
+            altitude_m: band.least_m + (first + share * (last - first)) * band.span_m(),
         })
-    }
-
-    /// Returns the first and the last x of even spacing, in units of D; `None` for Algorithm 1.
-    fn even(self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Option<[f32; 2]> {
-        let config = chain.mission.config();
-        match self {
-            Self::Arch => Some([0.0, 1.0]),
-            Self::Half if config.tx_power_w >= config.rx_power_w => Some([0.5, 1.0]),
-            Self::Half => Some([0.0, 0.5]),
-            _ => None,
-        }
     }
 }
 
@@ -177,11 +182,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 }
             }
             Work::Interior => {
-                let best = self.best.map_or(f32::NEG_INFINITY, |(best, _)| best);
                 let Some(both) = self.both.first_mut() else {
                     return Poll::Ready(Err(Infeasible));
                 };
-                let Poll::Ready(sigma) = both.interior.step(chain.mission, chain.seat_of, best) else {
+                let Poll::Ready(sigma) = both.interior.step(chain.mission, chain.seat_of) else {
                     return Poll::Pending;
                 };
                 for index in 1..=chain.mission.relays() {
@@ -189,11 +193,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                     let at = both.interior.cross_section(chain.mission, index);
                     self.keep(index, 0.0, Cell::of(at, (chain.seat_of)(index).room));
                 }
-                Work::Seek(Seek::down(sigma + ABOVE, ABOVE, 3.0, JUDGED), Purpose::Result)
+                Work::Seek(
+                    Seek::down(sigma + ABOVE, ABOVE, 3.0, JUDGED),
+                    Purpose::Result,
+                )
             }
         };
         if let Work::Begin = next
-            && usize::from(self.number) >= STARTS.len()
+            && usize::from(self.number) > STARTS.len()
             && self.best.is_none()
         {
             return Poll::Ready(Err(Infeasible));
@@ -211,11 +218,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Begins the next start, or the last search after all of them.
     fn begin_start(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Work {
-        let Some(&start) = STARTS.get(usize::from(self.number)) else {
+        // Number 0 is the common altitude.
+        let start = usize::from(self.number).saturating_sub(1);
+        let Some(&start) = STARTS.get(start) else {
             self.cells = self.best_cells;
             let sigma = self.best.map_or(0.0, |(best, _)| best);
             return Work::Seek(Seek::up(sigma, true, 1e-5, 1e-6), Purpose::Last);
         };
+        let config = chain.mission.config();
         let relays = chain.mission.relays();
         for index in 1..=relays {
             let share = if relays > 1 {
@@ -223,10 +233,19 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             } else {
                 0.5
             };
+            let share = if is_turned(chain) { 1.0 - share } else { share };
             let room = (chain.seat_of)(index).room;
-            self.keep(index, 0.0, Cell::of(start.cross_section(chain, share, room), room));
+            let at = if self.number > 0 {
+                start.cross_section(chain.interferer, share, room)
+            } else {
+                room.nearest(config.common.on_line().cross_section)
+            };
+            self.keep(index, 0.0, Cell::of(at, room));
         }
-        match start.even(chain) {
+        match start.even {
+            Some([first, last]) if is_turned(chain) => {
+                self.begin_interior(chain, Some([1.0 - last, 1.0 - first]))
+            }
             Some(ends) => self.begin_interior(chain, Some(ends)),
             None => Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, 0.02), Purpose::Start),
         }
@@ -256,7 +275,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         for index in 1..=relays {
             let seat = (chain.seat_of)(index);
             let place: Placement = self.at(index, seat).at(0.0);
-            let Some(both) = self.both.first_mut() else { break };
+            let Some(both) = self.both.first_mut() else {
+                break;
+            };
             let share = f32::from(index) / f32::from(relays + 1);
             let x_m = match even {
                 Some([first, last]) => (first + share * (last - first)) * distance_m,
@@ -275,7 +296,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Continues Algorithm 1 for `sigma`. Ready with `Some` if all relays have positions; their x is noted.
-    fn line(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, sigma: f32) -> Poll<Option<()>> {
+    fn line(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        sigma: f32,
+    ) -> Poll<Option<()>> {
         let Some(mut pass) = self.both.first().map(|both| both.pass) else {
             return Poll::Ready(None);
         };
@@ -323,7 +348,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             x_m = place;
             pass.is_back = true;
         }
-        self.both.first_mut()?.interior.note(index, [x_m, pass.end_m]);
+        self.both
+            .first_mut()?
+            .interior
+            .note(index, [x_m, pass.end_m]);
         (pass.index, pass.x_m) = (index, x_m);
         Some(())
     }
@@ -345,7 +373,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             RequiredPosition::At(x_m) => x_m,
         };
         pass.index = before;
-        self.both.first_mut()?.interior.note(before, [pass.x_m, before_m]);
+        self.both
+            .first_mut()?
+            .interior
+            .note(before, [pass.x_m, before_m]);
         Some(())
     }
 
@@ -376,6 +407,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             end_m: Some(end_m),
         }
     }
+}
+
+/// Returns true if Rx has more power than Tx.
+fn is_turned(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> bool {
+    let config = chain.mission.config();
+    config.rx_power_w > config.tx_power_w
 }
 
 /// Distance of the first target above the interior-point method's, in ln gamma: its m mu.
