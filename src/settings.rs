@@ -257,7 +257,7 @@ pub enum SetupError {
     /// `method` cannot be used. It chooses altitudes in a field, is the joint method for more than 100 relays, or needs a feature
     /// that the crate was built without.
     Method,
-    /// The mission's `reverse` is above 0, and `method` is not Align, or `listen` is set.
+    /// The mission's `reverse` is above 0, and `method` is Adjust, or `listen` is set.
     Reverse,
     /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
     Adjust,
@@ -288,7 +288,7 @@ impl core::fmt::Display for SetupError {
             }
             Self::Step => "the fixed step must be above 0",
             Self::Method => "method must be Align in a field, or without the feature altitude or adjust; Joint is for at most 100 relays",
-            Self::Reverse => "a mission with a reverse above 0 needs the method Align, which places relays for both directions, and no listen",
+            Self::Reverse => "a mission with a reverse above 0 needs the method Align or Joint, which place relays for both directions, and no listen",
             Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
             Self::Measure => {
                 "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field on"
@@ -336,8 +336,8 @@ pub(crate) fn check(
     if !able {
         return Err(SetupError::Method);
     }
-    let is_one_way = !(mission.reverse() > 0.0);
-    if !(is_one_way || settings.method == Method::Align && settings.listen.is_none()) {
+    let adjusts = matches!(settings.method, Method::Adjust(_));
+    if mission.reverse() > 0.0 && (adjusts || settings.listen.is_some()) {
         return Err(SetupError::Reverse);
     }
     if let Method::Adjust(Adjust {

@@ -195,8 +195,8 @@ pub fn read(block: &Block, room: &'static mut Room) -> Result<Config, ConfigErro
     if method != Method::Align && raw.points > 0 {
         return Err(ConfigError::Method);
     }
-    let is_one_way = !(mission.config().reverse > 0.0);
-    if !(is_one_way || method == Method::Align && listen.is_none()) {
+    let adjusts = matches!(method, Method::Adjust(_));
+    if mission.config().reverse > 0.0 && (adjusts || listen.is_some()) {
         return Err(ConfigError::Reverse);
     }
     Ok(Config {

@@ -5,4 +5,6 @@ mod judge;
 mod placed;
 mod refused;
 mod scenes;
+mod space;
+mod space_judge;
 mod unchanged;

@@ -76,11 +76,12 @@ fn methods_for_one_direction_are_refused() {
         Relay::new(mission, identity, settings, 1, Instant::ZERO).err()
     };
     assert_eq!(with(Settings::default()), None);
+    let joint = Settings {
+        method: Method::Joint,
+        ..Settings::default()
+    };
+    assert_eq!(with(joint), None);
     let refused = [
-        Settings {
-            method: Method::Joint,
-            ..Settings::default()
-        },
         Settings {
             method: Method::Adjust(uav_relay::Adjust::default()),
             ..Settings::default()

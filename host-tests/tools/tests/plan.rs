@@ -352,7 +352,6 @@ fn relays_are_planned_for_both_directions_on_request() {
     assert!(!table.contains("not optimised"), "{table}");
     for (options, what) in [
         ("--uavs 1 --x-m 5", "--x-m"),
-        ("--uavs 3 --altitude free", "--altitude free"),
         ("--uavs 3 --bandwidth-hz 1e6", "data rates"),
     ] {
         let (status, line) = refusal(&format!("{options} --scenario {path}"));

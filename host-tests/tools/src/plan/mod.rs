@@ -49,15 +49,14 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     if scenario.reverse > 0.0 && is_several {
         return Err(Refusal::ReverseSources.into());
     }
-    if ask.x_m.is_some() {
-        both_ways_only_by_align(scenario, "--x-m")?;
-    }
-    if ask.free_altitude {
-        both_ways_only_by_align(scenario, "--altitude free")?;
-    }
     let Some(x_m) = ask.x_m else { return Ok(()) };
     let d = scenario.distance_m;
-    let wrong = if !(0.0..=d).contains(&x_m) {
+    let wrong = if scenario.reverse > 0.0 {
+        format!(
+            "--x-m is for one direction, and link.reverse = {:?}: allowed: link.reverse = 0.0 or no --x-m",
+            scenario.reverse
+        )
+    } else if !(0.0..=d).contains(&x_m) {
         format!("--x-m {x_m:?}: must be within 0.0 to {d:?} (geometry.distance_m)")
     } else if ask.number != Number::Of(1) {
         "--x-m is for one relay: it needs --uavs 1".to_owned()
@@ -68,18 +67,6 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
         return Ok(());
     };
     Err(NoPlan::Wrong(wrong))
-}
-
-/// Refuses `what` for a scenario with a way back.
-fn both_ways_only_by_align(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
-    if scenario.reverse > 0.0 {
-        return Err(NoPlan::Wrong(format!(
-            "{what} is for one direction, and link.reverse = {:?}: Algorithm 1 places relays at their own altitudes for both directions; \
-             allowed: link.reverse = 0.0 or no {what}",
-            scenario.reverse
-        )));
-    }
-    Ok(())
 }
 
 /// Requested number of relays.
