@@ -133,6 +133,9 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     interior: Interior<RELAYS, SEGMENTS>,
     work: Work,
     pass: Pass,
+    /// Result of the interior-point method, in ln gamma, and number of its repetitions from this start.
+    reached: f32,
+    again: u8,
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
@@ -141,6 +144,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
             interior: Interior::new(),
             work: Work::Begin,
             pass: Pass::default(),
+            reached: 0.0,
+            again: 0,
         }
     }
 }
@@ -188,6 +193,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 let Poll::Ready(sigma) = both.interior.step(chain.mission, chain.seat_of) else {
                     return Poll::Pending;
                 };
+                both.reached = sigma;
                 for index in 1..=chain.mission.relays() {
                     let Some(both) = self.both.first() else { break };
                     let at = both.interior.cross_section(chain.mission, index);
@@ -213,6 +219,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     fn next_start(&mut self) -> Work {
         self.number += 1;
+        if let Some(both) = self.both.first_mut() {
+            both.again = 0;
+        }
         Work::Begin
     }
 
@@ -251,13 +260,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Keeps the current cells if they are the best, and returns what follows.
+    /// Keeps the current cells if they are the best, and returns what follows: the interior-point method from the positions of
+    /// Algorithm 1, if they are new.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|(best, _)| sigma > best) {
             self.best = Some((sigma, self.number));
             self.best_cells = self.cells;
         }
-        if purpose == Purpose::Start && self.number > 0 {
+        let Some(both) = self.both.first_mut() else {
+            return Work::Begin;
+        };
+        let is_new = match purpose {
+            Purpose::Start => self.number > 0,
+            Purpose::Result => sigma > both.reached + NEW && both.again < AGAIN,
+            Purpose::Last => false,
+        };
+        if is_new {
+            both.again += 1;
             Work::Settle(sigma)
         } else {
             self.next_start()
@@ -414,6 +433,10 @@ fn is_turned(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> bool {
     let config = chain.mission.config();
     config.rx_power_w > config.tx_power_w
 }
+
+/// Gain of Algorithm 1 over the interior-point method, in ln gamma, for which that is repeated, and how often it is.
+const NEW: f32 = 3e-4;
+const AGAIN: u8 = 4;
 
 /// Distance of the first target above the interior-point method's, in ln gamma: its m mu.
 const ABOVE: f32 = 1e-4;
