@@ -31,8 +31,9 @@ use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First and last mu, times the number of levels.
+/// First mu, from a distant and from a close start, and last mu; times the number of levels.
 const FIRST_MU: f32 = 0.03;
+const CLOSE_MU: f32 = 3e-3;
 const LAST_MU: f32 = 1e-4;
 
 /// Factor from one mu to the next.
@@ -59,9 +60,6 @@ const DAMPING: f32 = 1e-5;
 /// Steps of T, and the relative error of the sum at which they end.
 const TARGETS: u8 = 12;
 const EXACT: f32 = 5e-4;
-
-/// Margin of an initial position to the box, as a fraction of its width.
-const INSIDE: f32 = 0.02;
 
 /// Relays of a portion.
 const AT_ONCE: u16 = 10;
@@ -156,17 +154,24 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts from the positions given by [`Interior::put`].
-    pub(super) fn start(&mut self, mission: &Mission, interferer: &Interferer) {
+    /// Starts from the positions given by [`Interior::put`], which may be `close` to the result.
+    pub(super) fn start(&mut self, mission: &Mission, interferer: &Interferer, close: bool) {
         self.gains = Gains::new(mission, interferer);
-        self.mu = FIRST_MU / levels(mission);
+        self.mu = if close { CLOSE_MU } else { FIRST_MU } / levels(mission);
         self.iterations = 0;
         self.convex = false;
         self.look(true);
     }
 
-    /// Sets the position of relay `index`, kept off the box.
-    pub(super) fn put(&mut self, mission: &Mission, seat: Seat, index: u16, place: Placement) {
+    /// Sets the position of relay `index`, with a margin to the box as a fraction of its width.
+    pub(super) fn put(
+        &mut self,
+        mission: &Mission,
+        seat: Seat,
+        index: u16,
+        place: Placement,
+        margin: f32,
+    ) {
         let [low, high] = room(mission, seat);
         let unit = 1.0 / mission.config().distance_m;
         let wanted = [place.x_m, place.y_m, place.altitude_m].map(|m| m * unit);
@@ -175,8 +180,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let ends = wanted.into_iter().zip(low.into_iter().zip(width));
         for (cell, (wanted, (low, width))) in at.iter_mut().zip(ends) {
             *cell = wanted
-                .max(low + INSIDE * width)
-                .min(low + (1.0 - INSIDE) * width);
+                .max(low + margin * width)
+                .min(low + (1.0 - margin) * width);
         }
         if let Some(node) = self.node(index) {
             node.at = at;

@@ -29,8 +29,9 @@ pub(super) const BOTH: usize = if cfg!(feature = "reverse") { 1 } else { 0 };
 /// Relays of one portion of Algorithm 1.
 const LINE: u16 = 4;
 
-/// Share of even spacing in initial positions, which separates relays that share one.
-const EVEN: f32 = 0.02;
+/// Share of even spacing in initial positions, which separates relays that share one, and their margin to the box. At a start,
+/// and for a repetition.
+const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Initial chain, from the end with more power to the other one.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -291,6 +292,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     ) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.mission.relays();
+        let is_again = self.both.first().is_some_and(|both| both.again > 1);
+        let [far, close] = OFF;
+        let off = if is_again { close } else { far };
         for index in 1..=relays {
             let seat = (chain.seat_of)(index);
             let place: Placement = self.at(index, seat).at(0.0);
@@ -302,14 +306,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 Some([first, last]) => (first + share * (last - first)) * distance_m,
                 None => {
                     let [x_m, _] = both.interior.noted(index);
-                    x_m + EVEN * (share * distance_m - x_m)
+                    x_m + off * (share * distance_m - x_m)
                 }
             };
             both.interior
-                .put(chain.mission, seat, index, Placement { x_m, ..place });
+                .put(chain.mission, seat, index, Placement { x_m, ..place }, off);
         }
         if let Some(both) = self.both.first_mut() {
-            both.interior.start(chain.mission, chain.interferer);
+            both.interior
+                .start(chain.mission, chain.interferer, is_again);
         }
         Work::Interior
     }
