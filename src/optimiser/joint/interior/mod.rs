@@ -531,13 +531,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                 self.follow(relays, 1, [[0.0; 3], step]);
             }
         }
-        self.work = match segment.checked_sub(1) {
-            Some(before) => Work::Substitute(before),
-            None => {
-                self.try_step();
-                return Some(());
-            }
-        };
+        if let Some(before) = segment.checked_sub(1) {
+            self.work = Work::Substitute(before);
+        } else {
+            self.try_step();
+        }
         Some(())
     }
 

@@ -302,12 +302,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 break;
             };
             let share = f32::from(index) / f32::from(relays + 1);
-            let x_m = match even {
-                Some([first, last]) => (first + share * (last - first)) * distance_m,
-                None => {
-                    let [x_m, _] = both.interior.noted(index);
-                    x_m + off * (share * distance_m - x_m)
-                }
+            let x_m = if let Some([first, last]) = even {
+                (first + share * (last - first)) * distance_m
+            } else {
+                let [x_m, _] = both.interior.noted(index);
+                x_m + off * (share * distance_m - x_m)
             };
             both.interior
                 .put(chain.mission, seat, index, Placement { x_m, ..place }, off);
