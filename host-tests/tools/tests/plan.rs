@@ -344,6 +344,12 @@ fn relays_are_planned_for_both_directions_on_request() {
         assert_eq!(fewest["uavs"], uavs, "{fewest}");
         assert!(number(&fewest["sir"]) > sir * 0.9985, "{fewest}");
     }
+    let free = json(&format!("--uavs 3 --altitude free --scenario {path}"));
+    assert_eq!(free["how"], "the joint method for both directions");
+    assert!(
+        (both(&free) / number(&free["sir"]) - 1.0).abs() < 1e-5,
+        "{free}"
+    );
     let table = String::from_utf8(plan(&format!("--uavs 3 --scenario {path}")).stdout).unwrap();
     assert!(
         table.contains("it needs 0.5 of the SIR of the way there (link.reverse)\n"),

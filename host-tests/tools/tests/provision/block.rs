@@ -405,15 +405,15 @@ fn a_way_back_is_stored_and_is_for_align_and_joint_without_sensing() {
     assert!((mission.reverse, mission.rx_power_w) == (0.25, 5.0));
     flies(&config);
     assert_eq!(
-        reads(&changed(block, 14, &[1])).map(|config| config.settings.method),
+        reads(&changed(block, 14, &[1])).map(|config| config.method),
         Ok(Method::Joint)
     );
-    flight.by(Method::Joint).block(3).unwrap();
-    let adjust = Method::Adjust(uav_relay::Adjust::default());
-    for error in [flight.by(adjust).block(3).unwrap_err()] {
-        assert_eq!(error, BlockError::Config(ConfigError::Reverse));
-        assert!(error.to_string().contains("link.reverse"), "{error}");
-    }
+    let flight = flight.by(Method::Joint);
+    flight.block(3).unwrap();
+    let adjust = Method::Adjust(Adjust::default());
+    let error = flight.by(adjust).block(3).unwrap_err();
+    assert_eq!(error, BlockError::Config(ConfigError::Reverse));
+    assert!(error.to_string().contains("link.reverse"), "{error}");
     let higher = 1.0_f32.next_up().to_le_bytes();
     let error = ConfigError::Mission(MissionError::Reverse);
     assert_eq!(reads(&changed(block, 376, &higher)), Err(error));
