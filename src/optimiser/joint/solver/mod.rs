@@ -11,10 +11,12 @@
 //! | --- | --- |
 //! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
 //! | `judge` | the steps after a target is found: the next start, or the polish |
+//! | `both` | the joint method with a way back |
 //! | `chain` | data shared by the passes; a segment of the chain; the profile of one relay |
 //!
 //! This file has the state of a solver, its current work and its purpose, and one portion of its work.
 
+mod both;
 mod chain;
 mod judge;
 mod passes;
@@ -25,6 +27,7 @@ use crate::optimiser::joint::site::Cell;
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
+use both::{BOTH, Both};
 use chain::{Mark, SEGMENT, STAGES, SolverContext, Stage};
 use core::task::Poll;
 
@@ -133,6 +136,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
     cells: [Cell; RELAYS],
+    both: [Both<RELAYS, SEGMENTS>; BOTH],
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -162,6 +166,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             stages: [Stage::default(); STAGES],
             marks: [Mark::default(); SEGMENTS],
             cells: [Cell::default(); RELAYS],
+            both: [(); BOTH].map(|()| Both::new()),
         })
     }
 
@@ -198,6 +203,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             seat_of: &seat_of,
             gain: mission.relay_gain(mission.config().common.power_w),
         };
+        if mission.reverse() > 0.0 {
+            self.holds_back = true;
+            return self.step_both_ways(&chain);
+        }
         match self.work {
             Work::Begin => self.begin(&chain),
             Work::Seek(seek, purpose) => self.seek(&chain, seek, purpose),
