@@ -25,7 +25,7 @@ pub(super) struct FenceOwner {
     follower_low_m: f32,
     /// Agreed x of the neighbour downstream, m.
     target_m: f32,
-    /// Lateral offset and altitude of the neighbour's setpoint; `arrived` is true once it has arrived there.
+    /// Lateral offset and altitude of the neighbour's setpoint. `arrived` is true once it has arrived there.
     across: CrossSection,
     arrived: bool,
     /// True if the neighbour has received the newest fence plane.

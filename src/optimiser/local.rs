@@ -242,7 +242,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus one row of 24, with a way back of 106.
+    /// Continues the search by at most `budget` evaluations of both hops, plus one row. A row has 24 evaluations, for
+    /// both directions 106.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {

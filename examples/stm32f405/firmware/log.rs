@@ -172,7 +172,7 @@ pub(crate) fn refused(error: ConfigError) {
     match error {
         ConfigError::Blank => warn!("no configuration: the configuration block in flash is blank"),
         ConfigError::Magic => {
-            error!("configuration refused: the configuration block does not begin with UAVR")
+            error!("configuration refused: the configuration block does not begin with UAVR");
         }
         ConfigError::Version => {
             error!(
@@ -180,7 +180,7 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Crc => {
-            error!("configuration refused: the block is damaged, its CRC does not match")
+            error!("configuration refused: the block is damaged, its CRC does not match");
         }
         ConfigError::Index => {
             error!(
@@ -191,7 +191,7 @@ pub(crate) fn refused(error: ConfigError) {
             error!("configuration refused: this relay's altitude or power is out of range");
         }
         ConfigError::Hold => {
-            error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1")
+            error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1");
         }
         ConfigError::Method => {
             error!(
@@ -303,7 +303,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     }
 }
 
-/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (`is_stored` is false).
+/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
         info!("votes on the chain's membership can be stored again");

@@ -53,7 +53,7 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots in which a chain of `relays` relays sends once per hop and direction.
+    /// Returns the number of time slots in which each hop of `relays` relays sends once per direction.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
@@ -108,7 +108,7 @@ impl RateModel {
         }
     }
 
-    /// Returns the lowest SINR (linear) with at least `bits_per_hz` bit/s/Hz, above 0; `None` if no SINR carries that.
+    /// Returns the lowest SINR (linear) that carries `bits_per_hz` bit/s/Hz, above 0. `None` if none does.
     pub fn sinr(&self, bits_per_hz: f64) -> Option<f64> {
         match self {
             Self::Shannon { gap_db } => {
@@ -123,7 +123,8 @@ impl RateModel {
     }
 }
 
-/// Returns the smaller of the rate to Rx and of the rate back divided by `reverse`, bit/s; the rate to Rx if `reverse` is 0.
+/// Returns the smaller of the rate to Rx and the rate back divided by `reverse`, bit/s. If `reverse` is 0, that is
+/// the rate to Rx.
 pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
     if reverse > 0.0 {
         there_bps.min(back_bps / reverse)

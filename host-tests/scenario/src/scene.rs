@@ -52,7 +52,7 @@ pub struct Scene {
     pub tx_w: f64,
     /// Transmit power of Rx when it sends toward Tx, W, > 0.
     pub rx_w: f64,
-    /// SIR that a hop needs in the direction from Rx to Tx, relative to the one from Tx to Rx; 0 for one direction.
+    /// SIR that a hop needs from Rx to Tx, relative to that from Tx to Rx; 0 for one direction.
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,

@@ -288,7 +288,8 @@ impl Scene {
             }
         };
         let task = async move {
-            let _: ((Infallible, Infallible), (), (), Infallible) = task.await;
+            // Boxed, because all relays and links are in it.
+            let _: ((Infallible, Infallible), (), (), Infallible) = Box::pin(task).await;
         };
         pool.spawner().spawn_local(task).unwrap();
         Self {

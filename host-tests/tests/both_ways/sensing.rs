@@ -1,4 +1,4 @@
-//! Relays with a way back that have to locate the interferer, compared with the judge's best places for the true one.
+//! Two-way chains that have to locate the interferer, compared with the judge's best positions.
 
 use host_tests::placing::xs;
 use uav_relay::Interference;

@@ -1,4 +1,5 @@
-//! Several interferers and a way back: places by the one that replaces them, compared with the judge's for their sum.
+//! Two-way chains with several interferers, placed by the hypothetical one that replaces them. The judge places
+//! relays for the sum.
 
 use host_tests::placing::{generator, places, solve, xs};
 use rand::RngExt;

@@ -19,7 +19,8 @@ use super::space_judge::{Place, Space};
 /// Altitudes of all scenes, m.
 const BAND_M: [f64; 2] = [20.0, 300.0];
 
-/// Draws scene `number` and the name of its kind: free altitude, or side as well; r = 1 or drawn; without noise or with it.
+/// Draws scene `number`, and the name of its kind. Kinds have free altitudes, or side as well; r = 1 or drawn; and
+/// noise or none.
 fn scene(rng: &mut ChaCha8Rng, number: usize, wild: bool) -> (String, Space) {
     let is_free = number / 3 % 2 == 1;
     let is_drawn = number / 6 % 2 == 1;
@@ -142,7 +143,7 @@ fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     shares.remove("all").unwrap()
 }
 
-/// Compares scenes of the feature's specification with the judge: 99.5 % reach 0.999 of it, none is below 0.98.
+/// Checks that 99.5 % of the specified scenes reach 0.999 of the judge, and all of them 0.98.
 #[test]
 fn the_joint_method_is_near_the_best_places() {
     let shares = compared(3310, 24, false);
@@ -188,7 +189,7 @@ fn the_joint_method_is_not_below_algorithm_1() {
     assert!(gains[number * 9 / 10] > 1.2);
 }
 
-/// Checks that relays, each of which solves the chain, agree by messages on the places and the target of the planner.
+/// Checks that relays that each solve the chain agree on the positions and the SIR of the planner.
 #[test]
 fn a_chain_agrees_on_the_joint_places() {
     let mut seeds = generator(3313);

@@ -1,4 +1,4 @@
-//! Algorithm 2 with a way back: each turn compared with a grid search in f64, and chains with such turns.
+//! Algorithm 2 for both directions: each turn compared with a grid search in f64, and whole chains.
 
 use core::task::Poll;
 

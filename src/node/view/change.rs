@@ -100,7 +100,7 @@ impl ViewChange {
         self.newest
     }
 
-    /// Records that another relay knows `view`; this advances the latest view by at most [`MAX_ADVANCE`] numbers. One
+    /// Records that another relay knows `view`. This advances the latest view by at most [`MAX_ADVANCE`] numbers. One
     /// message could otherwise use up all view numbers; a relay that was away for long repeats its view often enough.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {

@@ -16,7 +16,7 @@ use crate::drone::Refused;
 pub(crate) fn started(reset: Reset) {
     match reset {
         Reset::Watchdog => {
-            error!("restarted by the watchdog: the main loop hung, or the clock stopped")
+            error!("restarted by the watchdog: the main loop hung, or the clock stopped");
         }
         reset => info!("started: {}", reset.text()),
     }
@@ -76,7 +76,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     }
 }
 
-/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (`is_stored` is false).
+/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
         info!("votes on the chain's membership can be stored again");
@@ -94,7 +94,7 @@ pub(crate) fn refused(why: Refused) {
             );
         }
         Refused::NoEpoch => {
-            error!("frames cannot be signed: the epoch (start counter) has reached its maximum")
+            error!("frames cannot be signed: the epoch (start counter) has reached its maximum");
         }
         Refused::NoAutopilot => {
             error!(

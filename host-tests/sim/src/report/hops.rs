@@ -124,7 +124,8 @@ pub struct WorstBack {
     pub rx_sir_back: f64,
     /// The smaller of the worst SIR on the way there and of that on the way back divided by `reverse`.
     pub worst_both: f64,
-    /// Direction of the worst hop, the way back divided by `reverse`: `forward`, from Tx to Rx, `backward`, or `both` if equal.
+    /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. The SIR of the way back
+    /// is divided by `reverse`.
     pub worst_direction: &'static str,
 }
 
@@ -155,10 +156,12 @@ impl WorstBack {
     }
 }
 
-/// Relative difference up to which the worst SIRs of both directions count as equal: 0.004 dB, above the rounding errors.
+/// Relative difference up to which the worst SIRs of both directions count as equal. It is 0.004 dB, above the
+/// rounding errors.
 const EQUAL: f64 = 1e-3;
 
-/// Returns the name of the direction with the lower SIR, `both` if they are equal; `back` is divided by `reverse`.
+/// Returns the name of the direction with the lower SIR, `both` if they are equal. `back` is the SIR of the way back
+/// divided by `reverse`.
 pub const fn direction(there: f64, back: f64) -> &'static str {
     if back < there * (1.0 - EQUAL) {
         "backward"

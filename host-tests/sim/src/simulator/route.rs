@@ -104,7 +104,7 @@ impl Track {
         }
     }
 
-    /// Returns the record of relays that agree on `places`, m, in place of their own positions, at the same times.
+    /// Returns this record with the agreed positions replaced by `places`, m, at the same times.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -427,7 +427,7 @@ pub struct DataLink {
     pub packet_bits: f64,
     /// True if data goes from Tx to Rx and from Rx to Tx; false if only to Rx.
     pub both: bool,
-    /// Rate of the way back relative to that to Rx, 0 to 1, for which the positions are chosen; 0 if for one direction.
+    /// Data rate back relative to that to Rx, 0 to 1, for which the positions are chosen. 0 for one direction.
     pub reverse: f64,
 }
 

@@ -148,7 +148,8 @@ pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
 
-/// Returns the linear SIR of hop `number`, from 1, that counts: the smaller of both directions, the way back divided by `reverse`.
+/// Returns the smaller SIR (linear) of both directions of hop `number`, from 1. That of the way back is divided by
+/// `reverse`.
 pub(super) fn counted(picture: &Picture, number: usize) -> Option<f64> {
     let at = number.checked_sub(1)?;
     let there = picture.hop_sir.get(at).copied()?;

@@ -38,13 +38,13 @@ const ROUNDING: f64 = 1e-9;
 /// SIRs (linear) that every hop has to meet.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Targets {
-    /// On the way from Tx to Rx, above 0.
+    /// SIR from Tx to Rx, above 0.
     pub there: f64,
-    /// On the way back; 0 if that does not count.
+    /// SIR from Rx to Tx; 0 if that direction does not count.
     pub back: f64,
 }
 
-/// Returns true if no positions of the scene's relays along the line, at their own altitudes, meet `targets`.
+/// Returns true if no positions along the line, at the relays' own altitudes, meet `targets`.
 ///
 /// False also if that is not proven.
 pub fn excludes(scene: &Scene, targets: Targets) -> bool {
@@ -117,7 +117,7 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns, for each cell at one end of hop `hop`, true if the hop is possible from any cell at the other end.
+    /// Returns for each cell at one end of `hop` whether the hop is possible from any cell at the other.
     ///
     /// The cells are those of the receiver if `of_receiver` is true, otherwise those of the sender, on the way from Tx to Rx.
     fn reached(

@@ -74,14 +74,14 @@ impl<'a> Carried<'a> {
         table.as_ref()
     }
 
-    /// Returns the largest number of relays, up to that of the table, that is worth a search in fitted slots.
+    /// Returns the largest number of relays, up to the table's, that is worth a search in fitted slots.
     ///
     /// More relays take so much longer on the grid that no refinement makes up for it.
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }
 
-    /// Returns the positions of `relays` relays with the largest data rate; at most as many as in [`Carried::new`].
+    /// Returns the positions of `relays` relays with the largest data rate. At most as many as in [`Carried::new`].
     ///
     /// # Errors
     /// [`NoPlan`] if there is no mission, or if no positions give every hop an SIR above 0.
@@ -143,7 +143,8 @@ impl<'a> Carried<'a> {
         Plan { proven, ..plan }
     }
 
-    /// Returns the positions of Algorithm 1 with the ratio of SIRs that both rates need; `least`, bit/s/Hz, is a rate that is met.
+    /// Returns the positions of Algorithm 1 for the ratio of SIRs that both rates need. `least` is a rate that is
+    /// met, bit/s/Hz.
     fn by_ratio(&self, briefed: &ProfiledMission, least: f64) -> Option<Vec<Placement>> {
         let reverse = self.scenario.reverse;
         let model = &self.radio.link.model;
@@ -192,7 +193,7 @@ fn chain(
         .then_some(places)
 }
 
-/// Returns true if it is proven that no positions give every hop the rate `bits_per_hz`, and `reverse` times it on the way back.
+/// Returns true if provably no positions carry `bits_per_hz` on every hop to Rx, and `reverse` times it back.
 pub fn carries_no(scene: &Scene, radio: &Radio, reverse: f64, bits_per_hz: f64) -> bool {
     let model = &radio.link.model;
     let Some(there) = model.sinr(bits_per_hz) else {

@@ -1,4 +1,4 @@
-//! Best position of one relay for both directions against one interferer, at its altitude above the line: closed forms.
+//! Closed forms of the best position of one relay for both directions, at its altitude above the line.
 //!
 //! With l1 and l2 the squared lengths of the hops, s the relay's squared distance from the interferer, nu = N eta / P and constants
 //! a, b, c, e of the powers and of the interference at Tx and Rx, the SIRs that count are

@@ -10,11 +10,11 @@
 //!
 //! is the smallest. Each term depends on the positions of two neighbours only, so the best positions on a grid are found by dynamic
 //! programming over the relays, one table for all numbers of relays ([`Table`]). Then the same is repeated in windows about the
-//! positions found, which become narrower ([`refined`]). The grid has dense points near Tx, Rx and the interferers, where the best
+//! positions found, which become narrower (`refined`). The grid has dense points near Tx, Rx and the interferers, where the best
 //! positions for rates gather.
 //!
 //! Steps of a radio make the times constant between thresholds. So that ties are decided toward the next threshold, the search adds a
-//! small share of a time that falls everywhere ([`Times::guide`]). The result is compared by the true times.
+//! small share of a time that falls everywhere (`Times::guide`). The result is compared by the true times.
 
 use uav_relay_scenario::link::{Access, Radio, RateModel};
 use uav_relay_scenario::number::{factor, narrow};
@@ -146,7 +146,8 @@ impl<'a> Times<'a> {
         }
     }
 
-    /// Returns the time of a hop, infinite if it carries nothing, and with `guide` a little more that falls with every SIR.
+    /// Returns the time of a hop; infinite if it carries nothing. With `guide` it is a little more, which falls with
+    /// every SIR.
     fn time(&self, hop: &Hop, from: Point, to: Point, guide: bool) -> f64 {
         let apart = to.x - from.x;
         if apart < hop.least_m - ROUNDING * self.scene.distance_m || apart < 0.0 {
@@ -179,7 +180,8 @@ impl<'a> Times<'a> {
         GUIDE / libm::log1p(sir)
     }
 
-    /// Returns the time of a chain with relays at `x`, m; infinite if it carries nothing or relays are too close.
+    /// Returns the time of a chain with relays at `x`, m. It is infinite if it carries nothing, or relays are too
+    /// close.
     ///
     /// Distances may be less than the least separation by the rounding of positions.
     pub fn total(&self, x: &[f64]) -> f64 {
@@ -416,7 +418,8 @@ impl Table {
         Self { starts }
     }
 
-    /// Returns the largest number of relays whose time on the grid is within a fraction `loss` of the best one; 0 if none is finite.
+    /// Returns the largest number of relays whose time on the grid is within `loss` of the best one. 0 if no time is
+    /// finite.
     pub fn largest_within(&self, loss: f64) -> u16 {
         let times = || self.starts.iter().map(|(time, _)| *time);
         let best = times().fold(f64::INFINITY, f64::min);

@@ -31,9 +31,9 @@ const LEAST_LISTED: u16 = 10;
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Rate {
-    /// From Tx to Rx, with all of the time.
+    /// Rate from Tx to Rx, bit/s, with all of the time.
     There(f64),
-    /// To Rx and back at the same time, of a chain that is planned for both directions.
+    /// Rates to Rx and back at the same time, bit/s, of a chain planned for both directions.
     Both([f64; 2]),
 }
 
@@ -67,7 +67,7 @@ impl Rate {
         Some([scene.hop_sirs(&places), scene.hop_sirs_back(&places)])
     }
 
-    /// Returns the rate that counts: the smaller of the rate to Rx and of the rate back divided by `reverse`.
+    /// Returns the smaller of the rate to Rx and the rate back divided by `reverse`, bit/s.
     pub fn worse(self, reverse: f64) -> f64 {
         match self {
             Self::There(rate_bps) => rate_bps,
@@ -212,13 +212,15 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     }
 }
 
-/// Relative gain of a larger number of relays that counts as more: without a least separation more relays never carry less.
+/// Relative gain above which a larger number of relays counts as better. Without a least separation more relays never
+/// carry less.
 const RISE: f64 = 1e-4;
 
 /// Largest number of relays for which [`carry_no_more`] looks for a proof.
 const MOST_PROVEN: u16 = MOST_FAST;
 
-/// Returns true if it is proven that no tried number of relays carries more than the best one, both ways in equal slots or channels.
+/// Returns true if provably no tried number of relays carries more than the best one. For both directions, in equal
+/// slots or channels.
 fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: f64) -> bool {
     let more_bps = best.best_rate_bps * (1.0 + 2.0 * tolerance);
     best.tried_uavs <= MOST_PROVEN
@@ -233,11 +235,11 @@ fn carry_no_more(scenario: &Scenario, radio: &Radio, best: BestRate, tolerance: 
 /// Upper bounds on the data rates of hops, bit/s, for any number of relays and any positions.
 #[derive(Clone, Copy, Default)]
 struct MostRate {
-    /// Of the hop to Rx.
+    /// Bound of the hop to Rx.
     receiver_bps: f64,
-    /// Of the hop from Tx.
+    /// Bound of the hop from Tx.
     first_bps: f64,
-    /// Of a hop between relays, which keep their least separation.
+    /// Bound of a hop between relays, which keep their least separation.
     relay_bps: f64,
     /// Number of directions.
     ways: f64,
@@ -269,7 +271,7 @@ impl MostRate {
     }
 }
 
-/// Returns upper bounds on the SIR (linear) of the first hop and of a hop between relays, for any positions.
+/// Returns upper bounds on the SIR (linear) of the first hop and of a hop between relays.
 ///
 /// Relays keep their least separation, and the interferers are at most as far as from the farther end of the line. In a field: no
 /// bound.

@@ -48,7 +48,8 @@ pub struct RateReport {
     /// Data rate of the worst hop while it sends, bit/s; as `rate_bps`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hop_rate_bps: Option<Rate>,
-    /// Number of time slots: one per hop and direction on one frequency, one per direction with a frequency for each hop.
+    /// Number of time slots. One per hop and direction on one frequency; one per direction with a frequency for each
+    /// hop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
     /// Access of the hops to the radio, as in the file.
@@ -215,10 +216,12 @@ pub struct WayBack {
     /// SIR needed on the way back, relative to that on the way there, if the positions are chosen for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
-    /// The smaller of the worst SIR to Rx and of that of the way back divided by `reverse`, if the positions are chosen for both.
+    /// Smaller of the worst SIR to Rx and of that back divided by `reverse`. Absent if the positions are chosen for
+    /// one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_both: Option<f64>,
-    /// Direction of the worst hop, the way back divided by `reverse`: `forward`, from Tx to Rx, `backward`, or `both` if equal.
+    /// Direction of the worst hop: `forward` (from Tx to Rx), `backward`, or `both` if equal. The SIR of the way back
+    /// is divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_direction: Option<&'static str>,
     /// Node that receives the worst hop: 0 for Tx, otherwise the relay.
@@ -304,7 +307,7 @@ pub struct PlanReport {
     /// True if no positions are better and no fewer relays suffice; false if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
-    /// Theorem that placed the only relay, 1 to 3; 4 for one relay beside the line, 5 for one relay both ways.
+    /// Theorem that placed the only relay, 1 to 3. 4 for one relay beside the line, 5 for one relay both ways.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub theorem: Option<u8>,
     /// Case number of the theorem in the paper; 0 for a case that the paper omits.

@@ -56,7 +56,8 @@ fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> 
     })
 }
 
-/// Returns true if no positions of `relays` relays meet `target` both ways, by a bound that shares no code with Algorithm 1.
+/// Returns true if no positions of `relays` relays meet `target` both ways. The bound shares no code with Algorithm
+/// 1.
 fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
     let targets = Targets {
         there: target,

@@ -1,5 +1,5 @@
-//! Judge of data rates: dynamic programming on a grid of its own in f64, then one relay after the other. It shares no code with the
-//! planner or the crate.
+//! Judge of data rates: dynamic programming on its own grid in f64, then one relay after the other. It shares no code
+//! with the planner or the crate.
 
 /// Spectral efficiency.
 #[derive(Debug, Clone)]
@@ -67,7 +67,8 @@ impl Chain {
         power_w / (loss * ((x - xi).powi(2) + yi * yi + h * h)) + self.noise_w
     }
 
-    /// Returns the time of a bit on the hop between nodes `node` - 1 at `from` and `node` at `to`; the last node is `last`.
+    /// Returns the time of a bit on the hop from node `node` - 1 at `from` to `node` at `to`. The last node is
+    /// `last`.
     fn time(&self, node: usize, last: usize, from: f64, to: f64) -> f64 {
         let (first, end) = (node == 1, node == last);
         let least = if first || end { 0.0 } else { self.apart_m };
@@ -113,7 +114,8 @@ impl Chain {
         total
     }
 
-    /// Returns the rate of relays at `x` in bit/s/Hz: both ways the smaller one to Rx, and back divided by `reverse`.
+    /// Returns the rate of relays at `x` in bit/s/Hz. Both ways that is the smaller of the rate to Rx and the rate
+    /// back divided by `reverse`.
     pub(crate) fn rate(&self, x: &[f64]) -> f64 {
         self.rate_of(self.total(x), x.len())
     }

@@ -1,4 +1,4 @@
-//! One relay for both directions, compared with a scan in f64 that shares no code with the closed forms.
+//! Closed forms of one relay for both directions, compared with a scan in f64 that shares no code with the crate.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};

@@ -138,7 +138,7 @@ impl Gains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of both levels of hop `k` from `from` to `to`, with second ones summed by the `weights`.
+    /// Returns the derivatives of both SIR levels of hop `k`. The second ones are summed by the `weights`.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -205,7 +205,8 @@ impl Gains {
     }
 }
 
-/// Derivatives of ln F and ln (B / r) of a hop by the positions of its ends; the second ones negative, and summed.
+/// Derivatives of ln F and ln (B / r) of a hop by the positions of its ends. The second ones are negative, and
+/// summed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {
     pub(super) by_from: [Triple; 2],

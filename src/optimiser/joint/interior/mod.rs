@@ -1,4 +1,4 @@
-//! Interior-point method: positions of all relays that maximise the worst of all SIRs, in both directions.
+//! Interior-point method for the positions that maximise the worst SIR of both directions.
 //!
 //! Differential dynamic programming follows one reach per hop. With a way back a hop has two, and in a sixth of the chains some
 //! hop is limited by both at once, where neither has a derivative. So all positions move together here. With the levels
@@ -39,7 +39,7 @@ const LAST_MU: f32 = 1e-4;
 /// Factor from one mu to the next.
 const LESS: f32 = 0.3;
 
-/// Gain of merit, in units of m mu, below which mu falls: after a step of more than half, and after any step.
+/// Gain of merit, in units of m mu, below which mu falls. First after a step of more than half, then after any step.
 const SETTLED: f32 = 0.1;
 const STUCK: f32 = 1e-3;
 
@@ -90,7 +90,7 @@ struct Node {
 enum Work {
     /// Levels of this hop and the next ones, after a fraction of the step.
     Levels(u16),
-    /// One step of T.
+    /// Newton step of T.
     Target(u8),
     /// Merit, from this hop on.
     Merit(u16),

@@ -37,7 +37,7 @@ pub(super) struct Front {
     bend: Square,
     slope: Triple,
     column: Triple,
-    /// What the elimination has taken from the diagonal.
+    /// Amount that the elimination has subtracted from the diagonal.
     taken: Triple,
 }
 

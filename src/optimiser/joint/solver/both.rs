@@ -1,4 +1,4 @@
-//! Joint method with a way back: initial chains, the interior-point method, and Algorithm 1 at the found cross-sections.
+//! Joint method for both directions: initial chains, interior-point method, and Algorithm 1 at the end.
 //!
 //! From a cross-section of each relay Algorithm 1 finds the best x of all relays for both directions, which is a global optimum
 //! along the line. The interior-point method ([`interior`](crate::optimiser::joint::interior)) then moves all coordinates to the
@@ -29,14 +29,15 @@ pub(super) const BOTH: usize = if cfg!(feature = "reverse") { 1 } else { 0 };
 /// Relays of one portion of Algorithm 1.
 const LINE: u16 = 4;
 
-/// Share of even spacing in initial positions, which separates relays that share one, and their margin to the box. At a start,
-/// and for a repetition.
+/// Share of even spacing in initial positions, which separates relays that share one. Also their margin to the
+/// limits. At a start, and for a repetition.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Initial chain, from the end with more power to the other one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offset away from the interferer at the first, the middle and the last relay, as a fraction of the room there.
+    /// Lateral offset away from the interferer, as a fraction of the permitted one. At the first, the middle and the
+    /// last relay.
     aside: [f32; 3],
     /// Altitude of the first and the last relay, as a fraction of the band.
     up: [f32; 2],
@@ -265,8 +266,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Keeps the current cells if they are the best, and returns what follows: the interior-point method from the positions of
-    /// Algorithm 1, if they are new.
+    /// Keeps the current positions if they are the best, and returns the next step of the work. If Algorithm 1 has
+    /// found new positions, that is the interior-point method from there.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|(best, _)| sigma > best) {
             self.best = Some((sigma, self.number));
@@ -442,7 +443,8 @@ fn is_turned(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> bool {
     config.rx_power_w > config.tx_power_w
 }
 
-/// Gain of Algorithm 1 over the interior-point method, in ln gamma, for which that is repeated, and how often it is.
+/// Gain of Algorithm 1, in ln(SIR), above which the interior-point method is repeated. Then the number of
+/// repetitions.
 const NEW: f32 = 3e-4;
 const AGAIN: u8 = 4;
 
