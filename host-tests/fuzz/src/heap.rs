@@ -1,6 +1,6 @@
 //! Allocation counter of this thread, to show that the crate never allocates.
 //!
-//! It counts if [`Counting`] is the global allocator: in the fuzz targets of relays and in `tests/fuzz.rs`. Elsewhere [`without`]
+//! It counts if [`Counting`] is the global allocator: in the fuzz targets of relays and in `tests/fuzz.rs`. Elsewhere [`without_allocation`]
 //! checks nothing.
 
 use std::alloc::{GlobalAlloc, Layout, System};

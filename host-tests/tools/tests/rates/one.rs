@@ -1,4 +1,4 @@
-//! Closed forms of one relay for both directions, compared with a scan in f64 that shares no code with the crate.
+//! Closed forms of one relay for both directions, compared with an independent scan in f64.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
