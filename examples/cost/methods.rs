@@ -17,7 +17,12 @@ pub(crate) struct Flight {
 impl Flight {
     fn new(mission: Mission, settings: Settings) -> Self {
         Self {
-            relays: [1, 2, 3].map(|index| relay(index, settings, mission)),
+            // Not by `map`, which copies the relays on the stack.
+            relays: [
+                relay(1, settings, mission),
+                relay(2, settings, mission),
+                relay(3, settings, mission),
+            ],
             most: 0,
             longest: 0,
         }

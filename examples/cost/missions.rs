@@ -55,6 +55,12 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
+/// Mission with altitudes to choose from, for both directions.
+pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
+    reverse: 1.0,
+    ..*HIGH.config()
+});
+
 /// Mission with altitudes and lateral positions to choose from.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {

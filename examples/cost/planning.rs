@@ -8,7 +8,7 @@ use uav_relay::planning::fleet::Fewest;
 use uav_relay::planning::single::theorems;
 
 use super::counter::instructions;
-use super::missions::{HIGH, MISSION, WIDE};
+use super::missions::{BOTH, HIGH, MISSION, WIDE};
 
 /// Measures the theorems with a band of altitudes, and the search for the fewest relays for a target.
 pub(crate) fn planning() {
@@ -67,5 +67,21 @@ pub(crate) fn joint() {
     hprintln!("solved_50_wide {}", all);
     hprintln!("portion_50_wide {}", most);
     hprintln!("portions_50_wide {}", portions);
+    let (all, most, portions) = solved(&HIGH, 20);
+    hprintln!("solved_20 {}", all);
+    hprintln!("portion_20 {}", most);
+    hprintln!("portions_20 {}", portions);
+    let (all, most, portions) = solved(&BOTH, 8);
+    hprintln!("solved_8_both {}", all);
+    hprintln!("portion_8_both {}", most);
+    hprintln!("portions_8_both {}", portions);
+    let (all, most, portions) = solved(&BOTH, 20);
+    hprintln!("solved_20_both {}", all);
+    hprintln!("portion_20_both {}", most);
+    hprintln!("portions_20_both {}", portions);
+    let (all, most, portions) = solved(&BOTH, 50);
+    hprintln!("solved_50_both {}", all);
+    hprintln!("portion_50_both {}", most);
+    hprintln!("portions_50_both {}", portions);
     hprintln!("size_of_solver {}", size_of::<Solver<100, 10>>());
 }

@@ -27,7 +27,7 @@ use core::task::Poll;
 pub(super) const BOTH: usize = if cfg!(feature = "reverse") { 1 } else { 0 };
 
 /// Relays of one portion of Algorithm 1.
-const LINE: u16 = 4;
+const LINE: u16 = 2;
 
 /// Share of even spacing in initial positions, which separates relays that share one, and their margin to the box. At a start,
 /// and for a repetition.
@@ -152,7 +152,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Processes one portion with a way back: four reaches, ten relays of a step, or twenty of a merit.
+    /// Processes one portion with a way back: two relays of Algorithm 1, ten relays of a step, or twenty of a merit.
     pub(super) fn step_both_ways(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
