@@ -34,6 +34,7 @@ fn settle(upper: &mut Relay, lower: &mut Relay, now: Instant) {
 }
 
 /// Measures a full sweep through a middle relay, and a frame that this relay rejects.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));

@@ -8,7 +8,7 @@ use super::missions::{HIGH, UNEVEN};
 
 /// Chain of three relays, and the cost of its calls.
 pub(crate) struct Flight {
-    relays: [Relay; 3],
+    relays: heapless::Vec<Relay, 3>,
     /// Cost of the most expensive call, and length of the longest frame.
     most: u32,
     longest: usize,
@@ -16,13 +16,13 @@ pub(crate) struct Flight {
 
 impl Flight {
     fn new(mission: Mission, settings: Settings) -> Self {
+        let mut relays = heapless::Vec::new();
+        for index in [1, 2, 3] {
+            // One relay at a time on the stack.
+            _ = relays.push(relay(index, settings, mission));
+        }
         Self {
-            // Not by `map`, which copies the relays on the stack.
-            relays: [
-                relay(1, settings, mission),
-                relay(2, settings, mission),
-                relay(3, settings, mission),
-            ],
+            relays,
             most: 0,
             longest: 0,
         }

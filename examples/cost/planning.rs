@@ -3,7 +3,7 @@
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
-use uav_relay::optimiser::joint::{Seat, Solver};
+use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
 use uav_relay::planning::fleet::Fewest;
 use uav_relay::planning::single::theorems;
 
@@ -11,6 +11,7 @@ use super::counter::instructions;
 use super::missions::{BOTH, HIGH, MISSION, WIDE};
 
 /// Measures the theorems with a band of altitudes, and the search for the fewest relays for a target.
+#[inline(never)]
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
@@ -36,6 +37,7 @@ fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
     };
+    let mut space = Workspace::new();
     let Some(mut solver) = Solver::<100, 10>::new(&mission) else {
         return (0, 0, 0);
     };
@@ -43,7 +45,7 @@ fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let (mut all, mut most, mut portions) = (0_u32, 0, 0);
     loop {
         let mut over = false;
-        let cost = instructions(|| over = solver.step(&mission, |_| seat).is_ready());
+        let cost = instructions(|| over = solver.step(&mission, |_| seat, &mut space).is_ready());
         all = all.saturating_add(cost);
         most = most.max(cost);
         portions += 1;
@@ -54,6 +56,7 @@ fn solved(of: &Mission, relays: u16) -> (u32, u32, u32) {
 }
 
 /// Measures the joint method without messages.
+#[inline(never)]
 pub(crate) fn joint() {
     let (all, most, portions) = solved(&HIGH, 8);
     hprintln!("solved_8 {}", all);

@@ -12,6 +12,7 @@ use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
 
 /// Measures the local search of Algorithm 2, and an estimate of the interference.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn shares() {
     let place = Placement::on_line;
     let beside = |place| HopEnd {

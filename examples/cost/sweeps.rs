@@ -11,6 +11,7 @@ use uav_relay::{Instant, MAX_FRAME, Mission, MissionConfig, Phase, Port, Setting
 use super::counter::{instructions, relay, sends};
 use super::missions::{INTERFERER, MISSION, mission};
 
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn reach() {
     let common = MISSION.config().common;
     let middle = Hop::new(
@@ -64,6 +65,7 @@ fn reach_in_noise() {
 }
 
 /// Measures a full sweep through a middle and the last relay of three, and the verdict on its way back.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -133,6 +135,7 @@ pub(crate) fn sweep() {
 }
 
 /// Measures a full frame through the deframer and the checks.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn deframe() {
     let settings = Settings {
         predict: false,
@@ -162,6 +165,7 @@ pub(crate) fn deframe() {
 }
 
 /// Measures the largest portion of the leader's prediction for a hundred relays; counts the portions.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

@@ -73,14 +73,21 @@ const STAGES: usize = if cfg!(feature = "altitude") {
 };
 
 /// Levels of a hop, and their multipliers with three digits.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Hop {
     level: [f32; 2],
     lambda: [u16; 2],
 }
 
+impl Hop {
+    const NONE: Self = Self {
+        level: [0.0; 2],
+        lambda: [0; 2],
+    };
+}
+
 /// Relay, its step with three digits, and the hop to it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Node {
     at: Triple,
     step: [u16; 3],
@@ -131,30 +138,32 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
-    pub(super) fn new() -> Self {
-        Self {
-            gains: Gains::default(),
-            nodes: [Node::default(); RELAYS],
-            last: Hop::default(),
-            fronts: [Front::default(); SEGMENTS],
-            factors: [Factor::default(); STAGES],
-            work: Work::Levels(1),
-            mu: 0.0,
-            target: 0.0,
-            least: 0.0,
-            merit: 0.0,
-            sum: 0.0,
-            share: 0.0,
-            sums: Sums::default(),
-            by_target: 0.0,
-            resets: true,
-            convex: false,
-            damping: 0.0,
-            tries: 0,
-            attempts: 0,
-            iterations: 0,
-        }
-    }
+    pub(super) const NEW: Self = Self {
+        gains: Gains::NONE,
+        nodes: [Node {
+            at: [0.0; 3],
+            step: [0; 3],
+            hop: Hop::NONE,
+        }; RELAYS],
+        last: Hop::NONE,
+        fronts: [Front::NONE; SEGMENTS],
+        factors: [Factor::NONE; STAGES],
+        work: Work::Levels(1),
+        mu: 0.0,
+        target: 0.0,
+        least: 0.0,
+        merit: 0.0,
+        sum: 0.0,
+        share: 0.0,
+        sums: Sums::NONE,
+        by_target: 0.0,
+        resets: true,
+        convex: false,
+        damping: 0.0,
+        tries: 0,
+        attempts: 0,
+        iterations: 0,
+    };
 
     /// Starts from the positions given by [`Interior::put`], which may be `close` to the result.
     pub(super) fn start(&mut self, mission: &Mission, interferer: &Interferer, close: bool) {
@@ -483,7 +492,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let relays = mission.relays();
         if segment == 0 {
             let (hop, weights) = self.derivatives(relays, 1);
-            self.sums = Sums::default();
+            self.sums = Sums::NONE;
             weights.sum(&mut self.sums);
             let room = room(mission, (seat_of)(1));
             *self.fronts.first_mut()? = Front::start(&hop, &weights, self.at(relays, 1), room);
