@@ -12,6 +12,7 @@ use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
 
 /// Measures the instructions for one relay's local search (Algorithm 2) and interference estimate.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn local_search() {
     let place = Placement::on_line;
     let beside = |place| HopEnd {

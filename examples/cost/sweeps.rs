@@ -11,6 +11,7 @@ use uav_relay::{Instant, MAX_FRAME, Mission, MissionConfig, Phase, Port, Setting
 use super::counter::{instructions, next_frame, relay};
 use super::missions::{INTERFERER, MISSION, mission};
 
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn reach() {
     let common = MISSION.config().common;
     let middle = Hop::new(
@@ -78,6 +79,7 @@ struct SweepCost {
 }
 
 /// Prints the costs of sweeps of one direction and of both.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     const BOTH_WAYS: Mission = Mission::new(MissionConfig {
@@ -173,6 +175,7 @@ fn measured(mission: Mission) -> SweepCost {
 }
 
 /// Measures the instructions for deframing and checking one sweep message, the first of eight relays.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn deframe() {
     let settings = Settings {
         predict: false,
@@ -203,6 +206,7 @@ pub(crate) fn deframe() {
 
 /// Measures the instructions of the calls in which a leader of 100 relays solves its chain in advance. Prints the
 /// largest cost and the number of calls.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

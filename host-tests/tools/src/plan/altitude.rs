@@ -5,7 +5,7 @@
 use core::task::Poll;
 
 use uav_relay::optimiser::PerTarget;
-use uav_relay::optimiser::joint::{Seat, Solver};
+use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
 use uav_relay::optimiser::pass::{Behind, Link};
 use uav_relay::optimiser::spacing::RequiredPosition;
 use uav_relay::place::Station;
@@ -14,7 +14,9 @@ use uav_relay::{Mission, Placement};
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
 use uav_relay_scenario::Scenario;
 
-type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as usize / 10 }>;
+const MOST: usize = Mission::MAX_RELAYS as usize;
+
+type Chain = Solver<MOST, { MOST / 10 }>;
 
 /// Returns the best positions of `relays` relays with free altitudes and sides, by the joint method.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
@@ -47,8 +49,9 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
 /// Computes what a relay on board solves for the whole chain, and the sweep that follows.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
+    let mut space = Box::new(Workspace::new());
     let target = loop {
-        if let Poll::Ready(solved) = solver.step(mission, &seat_of) {
+        if let Poll::Ready(solved) = solver.step(mission, &seat_of, &mut space) {
             break solved.ok()?;
         }
     };

@@ -193,7 +193,7 @@ fn chain(
         .then_some(places)
 }
 
-    /// Returns true if provably no positions carry `bits_per_hz` per hop to Rx and `reverse` times it back.
+/// Returns true if provably no positions carry `bits_per_hz` per hop to Rx and `reverse` times it back.
 pub fn carries_no(scene: &Scene, radio: &Radio, reverse: f64, bits_per_hz: f64) -> bool {
     let model = &radio.link.model;
     let Some(there) = model.sinr(bits_per_hz) else {

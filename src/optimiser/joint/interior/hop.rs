@@ -55,7 +55,7 @@ fn add_to_diagonal([x, y, z]: &mut Square, value: f32) {
 }
 
 /// Logarithms of the gains of a chain, for lengths in units of D.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
     /// Position of the interferer.
     source: Triple,
@@ -74,6 +74,18 @@ pub(super) struct Gains {
 }
 
 impl Gains {
+    pub(super) const NONE: Self = Self {
+        source: [0.0; 3],
+        noise: 0.0,
+        common_w: 0.0,
+        relay: 0.0,
+        to_rx: 0.0,
+        to_tx: 0.0,
+        from_tx: 0.0,
+        from_rx: 0.0,
+        reverse: 0.0,
+    };
+
     pub(super) fn new(mission: &Mission, interferer: &Interferer) -> Self {
         let d = mission.config().distance_m;
         let common_w = mission.config().common.power_w;

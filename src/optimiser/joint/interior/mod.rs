@@ -24,6 +24,7 @@ mod hop;
 mod newton;
 
 use super::hop::{Triple, minus};
+use super::outlook::{upper_half, widened};
 use super::solver::Seat;
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement};
@@ -71,18 +72,25 @@ const STAGES: usize = if cfg!(feature = "altitude") {
     0
 };
 
-/// Levels of a hop, and their multipliers.
-#[derive(Clone, Copy, Debug, Default)]
+/// Levels of a hop, and their multipliers with three digits.
+#[derive(Clone, Copy, Debug)]
 struct Hop {
     level: [f32; 2],
-    lambda: [f32; 2],
+    lambda: [u16; 2],
 }
 
-/// Relay, its step, and the hop to it.
-#[derive(Clone, Copy, Debug, Default)]
+impl Hop {
+    const NONE: Self = Self {
+        level: [0.0; 2],
+        lambda: [0; 2],
+    };
+}
+
+/// Relay, its step with three digits, and the hop to it.
+#[derive(Clone, Copy, Debug)]
 struct Node {
     at: Triple,
-    step: Triple,
+    step: [u16; 3],
     hop: Hop,
 }
 
@@ -96,7 +104,8 @@ enum Work {
     Merit(u16),
     /// Elimination of a segment.
     Eliminate(u16),
-    /// Steps of a segment.
+    /// Factors of a segment, and then its steps.
+    Factorise(u16),
     Substitute(u16),
 }
 
@@ -129,30 +138,32 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
-    pub(super) fn new() -> Self {
-        Self {
-            gains: Gains::default(),
-            nodes: [Node::default(); RELAYS],
-            last: Hop::default(),
-            fronts: [Front::default(); SEGMENTS],
-            factors: [Factor::default(); STAGES],
-            work: Work::Levels(1),
-            mu: 0.0,
-            target: 0.0,
-            least: 0.0,
-            merit: 0.0,
-            sum: 0.0,
-            share: 0.0,
-            sums: Sums::default(),
-            by_target: 0.0,
-            resets: true,
-            convex: false,
-            damping: 0.0,
-            tries: 0,
-            attempts: 0,
-            iterations: 0,
-        }
-    }
+    pub(super) const NEW: Self = Self {
+        gains: Gains::NONE,
+        nodes: [Node {
+            at: [0.0; 3],
+            step: [0; 3],
+            hop: Hop::NONE,
+        }; RELAYS],
+        last: Hop::NONE,
+        fronts: [Front::NONE; SEGMENTS],
+        factors: [Factor::NONE; STAGES],
+        work: Work::Levels(1),
+        mu: 0.0,
+        target: 0.0,
+        least: 0.0,
+        merit: 0.0,
+        sum: 0.0,
+        share: 0.0,
+        sums: Sums::NONE,
+        by_target: 0.0,
+        resets: true,
+        convex: false,
+        damping: 0.0,
+        tries: 0,
+        attempts: 0,
+        iterations: 0,
+    };
 
     /// Starts from the positions given by [`Interior::put`], which may be `close` to the result.
     pub(super) fn start(&mut self, mission: &Mission, interferer: &Interferer, close: bool) {
@@ -185,7 +196,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
         if let Some(node) = self.node(index) {
             node.at = at;
-            node.step = [0.0; 3];
+            node.step = [0; 3];
         }
     }
 
@@ -277,6 +288,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                     self.work = Work::Eliminate(0);
                 }
             }
+            Work::Factorise(segment) => {
+                if self.factorise(mission, seat_of, segment).is_none() {
+                    return Poll::Ready(self.target);
+                }
+            }
             Work::Substitute(segment) => {
                 if self.substitute(mission, seat_of, segment).is_none() {
                     return Poll::Ready(self.target);
@@ -322,7 +338,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let mut at = self.at(mission.relays(), index);
         let node = self.nodes.get(usize::from(index).wrapping_sub(1));
         if let Some(node) = node.filter(|_| index <= mission.relays()) {
-            add_scaled(&mut at, node.step, self.share);
+            add_scaled(&mut at, node.step.map(widened), self.share);
             let [low, high] = room(mission, (seat_of)(index));
             for (cell, (low, high)) in at.iter_mut().zip(low.into_iter().zip(high)) {
                 *cell = cell.max(low).min(high);
@@ -359,7 +375,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let (target, mu) = (self.target, self.mu);
         let Hop { level, lambda } = *self.hop(relays, k);
         Weights {
-            lambda,
+            lambda: lambda.map(widened),
             slack: level.map(|level| level - target),
             mu,
         }
@@ -391,7 +407,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         if is_step {
             let share = self.share;
             for node in self.nodes.iter_mut().take(relays.into()) {
-                add_scaled(&mut node.at, node.step, share);
+                add_scaled(&mut node.at, node.step.map(widened), share);
             }
             self.convex = false;
         }
@@ -428,11 +444,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             let hop = self.hop(relays, k);
             for (lambda, slack) in hop.lambda.iter_mut().zip(slack) {
                 let central = mu / slack;
-                *lambda = if resets {
+                *lambda = upper_half(if resets {
                     central
                 } else {
-                    lambda.max(central / APART).min(central * APART)
-                };
+                    widened(*lambda).max(central / APART).min(central * APART)
+                });
             }
         }
         self.resets = false;
@@ -476,7 +492,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let relays = mission.relays();
         if segment == 0 {
             let (hop, weights) = self.derivatives(relays, 1);
-            self.sums = Sums::default();
+            self.sums = Sums::NONE;
             weights.sum(&mut self.sums);
             let room = room(mission, (seat_of)(1));
             *self.fronts.first_mut()? = Front::start(&hop, &weights, self.at(relays, 1), room);
@@ -495,11 +511,30 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         } else {
             self.by_target = self.sums.by_target()?;
             (self.share, self.tries) = (1.0, 0);
-            Work::Substitute(segment)
+            Work::Factorise(segment)
         };
         Some(())
     }
 
+    /// Computes the factors of a segment again.
+    fn factorise(
+        &mut self,
+        mission: &Mission,
+        seat_of: &impl Fn(u16) -> Seat,
+        segment: u16,
+    ) -> Option<()> {
+        let first = segment * AT_ONCE;
+        let mut front = *self.fronts.get(usize::from(segment))?;
+        for index in first + 1..=(first + AT_ONCE).min(mission.relays()) {
+            let (factor, next, _) = self.pass(mission, seat_of, index, front)?;
+            *self.factors.get_mut(usize::from(index - first - 1))? = factor;
+            front = next;
+        }
+        self.work = Work::Substitute(segment);
+        Some(())
+    }
+
+    /// Computes the steps of a segment from its last relay to its first. `None` if one is not finite.
     fn substitute(
         &mut self,
         mission: &Mission,
@@ -508,18 +543,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     ) -> Option<()> {
         let relays = mission.relays();
         let first = segment * AT_ONCE;
-        let indices = first + 1..=(first + AT_ONCE).min(relays);
-        let mut front = *self.fronts.get(usize::from(segment))?;
-        for index in indices.clone() {
-            let (factor, next, _) = self.pass(mission, seat_of, index, front)?;
-            *self.factors.get_mut(usize::from(index - first - 1))? = factor;
-            front = next;
-        }
-        for index in indices.rev() {
+        for index in (first + 1..=(first + AT_ONCE).min(relays)).rev() {
             let ahead = self.nodes.get(usize::from(index));
             let ahead = ahead
                 .filter(|_| index < relays)
-                .map_or([0.0; 3], |node| node.step);
+                .map_or([0.0; 3], |node| node.step.map(widened));
             let k = usize::from(index - first - 1);
             let step = self.factors.get(k)?.step(self.by_target, ahead);
             if !dot(step, step).is_finite() {
@@ -532,7 +560,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             }
         }
         if let Some(before) = segment.checked_sub(1) {
-            self.work = Work::Substitute(before);
+            self.work = Work::Factorise(before);
         } else {
             self.try_step();
         }
@@ -543,7 +571,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     fn limit(&mut self, [low, high]: [Triple; 2], index: u16, step: Triple) {
         let mut share = self.share;
         if let Some(node) = self.node(index) {
-            node.step = step;
+            node.step = step.map(upper_half);
             let ends = minus(node.at, low).into_iter().zip(minus(high, node.at));
             for (step, (below, above)) in step.into_iter().zip(ends) {
                 let room = if step < 0.0 { below } else { above };
@@ -563,7 +591,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             dot(a, from) + dot(c, to) - self.by_target,
             dot(b, from) + dot(d, to) - self.by_target,
         ];
-        self.hop(relays, k).lambda = weights.after(change);
+        self.hop(relays, k).lambda = weights.after(change).map(upper_half);
     }
 }
 

@@ -32,7 +32,7 @@ const LEAST_PIVOT: f32 = 1e-6;
 const STIFF: f32 = 1e18;
 
 /// Rows of one relay, without the hop to the next relay, after the elimination of all relays before.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Square,
     slope: Triple,
@@ -42,7 +42,7 @@ pub(super) struct Front {
 }
 
 /// Factors of one relay.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
     /// L: inverse of xx, yx, zx, inverse of yy, zy, inverse of zz.
     lower: [f32; 6],
@@ -54,7 +54,7 @@ pub(super) struct Factor {
 }
 
 /// Sums that give dT.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     pub(super) sigma: f32,
     pub(super) slope: f32,
@@ -84,6 +84,13 @@ impl Weights {
 }
 
 impl Front {
+    pub(super) const NONE: Self = Self {
+        bend: [[0.0; 3]; 3],
+        slope: [0.0; 3],
+        column: [0.0; 3],
+        taken: [0.0; 3],
+    };
+
     /// Returns the rows of a relay at `at` in a box, after the hop to it.
     pub(super) fn start(
         hop: &Derivatives,
@@ -93,7 +100,7 @@ impl Front {
     ) -> Self {
         let mut front = Self {
             bend: hop.bend_to,
-            ..Self::default()
+            ..Self::NONE
         };
         front.add(hop.by_to, weights);
         front.enclose(weights.mu, at, room);
@@ -184,6 +191,13 @@ fn backward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
 }
 
 impl Factor {
+    pub(super) const NONE: Self = Self {
+        lower: [0.0; 6],
+        next: [[0.0; 3]; 3],
+        slope: [0.0; 3],
+        column: [0.0; 3],
+    };
+
     /// Subtracts this relay's part from the `front` of the next relay.
     pub(super) fn carry(&self, front: &mut Front) {
         let [a, b, c] = self.next;
@@ -223,6 +237,12 @@ impl Weights {
 }
 
 impl Sums {
+    pub(super) const NONE: Self = Self {
+        sigma: 0.0,
+        slope: 0.0,
+        column: 0.0,
+    };
+
     /// Returns dT. `None` if the system is singular.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;

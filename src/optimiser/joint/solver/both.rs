@@ -27,7 +27,7 @@ use core::task::Poll;
 pub(super) const BOTH: usize = if cfg!(feature = "reverse") { 1 } else { 0 };
 
 /// Relays of one portion of Algorithm 1.
-const LINE: u16 = 4;
+const LINE: u16 = 2;
 
 /// Share of even spacing in initial positions, which separates relays that share one. Also their margin to the
 /// limits. At a start, and for a repetition.
@@ -119,7 +119,7 @@ enum Work {
 }
 
 /// Current relay of a pass of Algorithm 1 for one target.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Pass {
     /// Next relay, from 0 on, and true on the way back.
     index: u16,
@@ -127,6 +127,38 @@ struct Pass {
     /// Reach of the relay before, or required position of the relay, m.
     x_m: f32,
     end_m: f32,
+}
+
+impl Pass {
+    const NONE: Self = Self {
+        index: 0,
+        is_back: false,
+        x_m: 0.0,
+        end_m: 0.0,
+    };
+}
+
+/// Workspace of the joint method with a way back; empty without the feature `reverse`.
+///
+/// It is not part of a [`Solver`], which is built on the stack when a relay starts to solve.
+#[derive(Clone, Debug)]
+pub struct Workspace<const RELAYS: usize, const SEGMENTS: usize> {
+    pub(super) both: [Both<RELAYS, SEGMENTS>; BOTH],
+}
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Workspace<RELAYS, SEGMENTS> {
+    /// Creates a workspace; a solver resets it.
+    pub const fn new() -> Self {
+        Self {
+            both: [const { Both::NEW }; BOTH],
+        }
+    }
+}
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Default for Workspace<RELAYS, SEGMENTS> {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 /// State of the joint method with a way back.
@@ -141,30 +173,29 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
-    pub(super) fn new() -> Self {
-        Self {
-            interior: Interior::new(),
-            work: Work::Begin,
-            pass: Pass::default(),
-            reached: 0.0,
-            again: 0,
-        }
-    }
+    const NEW: Self = Self {
+        interior: Interior::NEW,
+        work: Work::Begin,
+        pass: Pass::NONE,
+        reached: 0.0,
+        again: 0,
+    };
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Processes one portion with a way back: four reaches, ten relays of a step, or twenty of a merit.
+    /// Processes one portion with a way back: two relays of Algorithm 1, ten relays of a step, or twenty of a merit.
     pub(super) fn step_both_ways(
         &mut self,
+        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
     ) -> Poll<Result<f32, Infeasible>> {
-        let Some(Both { work, .. }) = self.both.first() else {
-            return Poll::Ready(Err(Infeasible));
-        };
-        let next = match *work {
-            Work::Begin => self.begin_start(chain),
+        if core::mem::replace(&mut self.is_new, false) {
+            (both.work, both.pass, both.again) = (Work::Begin, Pass::NONE, 0);
+        }
+        let next = match both.work {
+            Work::Begin => self.begin_start(both, chain),
             Work::Seek(mut seek, purpose) => {
-                let Poll::Ready(met) = self.line(chain, seek.sigma) else {
+                let Poll::Ready(met) = self.line(both, chain, seek.sigma) else {
                     return Poll::Pending;
                 };
                 if seek.tried(met.map(|()| true)) {
@@ -174,30 +205,26 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                         (Some((sigma, _)), Purpose::Last) => {
                             return Poll::Ready(Ok(libm::expf(sigma)));
                         }
-                        (Some((sigma, _)), _) => self.found(sigma, purpose),
-                        (None, _) => self.next_start(),
+                        (Some((sigma, _)), _) => self.found(both, sigma, purpose),
+                        (None, _) => self.next_start(both),
                     }
                 }
             }
             Work::Settle(sigma) => {
-                let Poll::Ready(met) = self.line(chain, sigma) else {
+                let Poll::Ready(met) = self.line(both, chain, sigma) else {
                     return Poll::Pending;
                 };
                 match met {
-                    Some(()) => self.begin_interior(chain, None),
-                    None => self.next_start(),
+                    Some(()) => self.begin_interior(both, chain, None),
+                    None => self.next_start(both),
                 }
             }
             Work::Interior => {
-                let Some(both) = self.both.first_mut() else {
-                    return Poll::Ready(Err(Infeasible));
-                };
                 let Poll::Ready(sigma) = both.interior.step(chain.mission, chain.seat_of) else {
                     return Poll::Pending;
                 };
                 both.reached = sigma;
                 for index in 1..=chain.mission.relays() {
-                    let Some(both) = self.both.first() else { break };
                     let at = both.interior.cross_section(chain.mission, index);
                     self.keep(index, 0.0, Cell::of(at, (chain.seat_of)(index).room));
                 }
@@ -213,22 +240,22 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         {
             return Poll::Ready(Err(Infeasible));
         }
-        if let Some(both) = self.both.first_mut() {
-            both.work = next;
-        }
+        both.work = next;
         Poll::Pending
     }
 
-    fn next_start(&mut self) -> Work {
+    fn next_start(&mut self, both: &mut Both<RELAYS, SEGMENTS>) -> Work {
         self.number += 1;
-        if let Some(both) = self.both.first_mut() {
-            both.again = 0;
-        }
+        both.again = 0;
         Work::Begin
     }
 
     /// Begins the next start, or the last search after all of them.
-    fn begin_start(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Work {
+    fn begin_start(
+        &mut self,
+        both: &mut Both<RELAYS, SEGMENTS>,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+    ) -> Work {
         // Number 0 is the common altitude.
         let start = usize::from(self.number).saturating_sub(1);
         let Some(&start) = STARTS.get(start) else {
@@ -255,9 +282,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
         match start.even {
             Some([first, last]) if is_turned(chain) => {
-                self.begin_interior(chain, Some([1.0 - last, 1.0 - first]))
+                self.begin_interior(both, chain, Some([1.0 - last, 1.0 - first]))
             }
-            Some(ends) => self.begin_interior(chain, Some(ends)),
+            Some(ends) => self.begin_interior(both, chain, Some(ends)),
             None => {
                 // The common altitude is compared, so its target is as exact as those of results.
                 let width = if self.number > 0 { 0.02 } else { JUDGED };
@@ -268,14 +295,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Keeps the current positions if they are the best, and returns the next step of the work. If Algorithm 1 has
     /// found new positions, that is the interior-point method from there.
-    fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
+    fn found(&mut self, both: &mut Both<RELAYS, SEGMENTS>, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|(best, _)| sigma > best) {
             self.best = Some((sigma, self.number));
             self.best_cells = self.cells;
         }
-        let Some(both) = self.both.first_mut() else {
-            return Work::Begin;
-        };
         let is_new = match purpose {
             Purpose::Start => self.number > 0,
             Purpose::Result => sigma > both.reached + NEW && both.again < AGAIN,
@@ -285,27 +309,25 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             both.again += 1;
             Work::Settle(sigma)
         } else {
-            self.next_start()
+            self.next_start(both)
         }
     }
 
     /// Starts the interior-point method at the cells, with x of a pass or between `even` ends.
     fn begin_interior(
         &mut self,
+        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         even: Option<[f32; 2]>,
     ) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.mission.relays();
-        let is_again = self.both.first().is_some_and(|both| both.again > 1);
+        let is_again = both.again > 1;
         let [far, close] = OFF;
         let off = if is_again { close } else { far };
         for index in 1..=relays {
             let seat = (chain.seat_of)(index);
             let place: Placement = self.at(index, seat).at(0.0);
-            let Some(both) = self.both.first_mut() else {
-                break;
-            };
             let share = f32::from(index) / f32::from(relays + 1);
             let x_m = if let Some([first, last]) = even {
                 (first + share * (last - first)) * distance_m
@@ -316,49 +338,43 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             both.interior
                 .put(chain.mission, seat, index, Placement { x_m, ..place }, off);
         }
-        if let Some(both) = self.both.first_mut() {
-            both.interior
-                .start(chain.mission, chain.interferer, is_again);
-        }
+        both.interior
+            .start(chain.mission, chain.interferer, is_again);
         Work::Interior
     }
 
     /// Continues Algorithm 1 for `sigma`. Ready with `Some` if all relays have positions; their x is noted.
     fn line(
         &mut self,
+        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         sigma: f32,
     ) -> Poll<Option<()>> {
-        let Some(mut pass) = self.both.first().map(|both| both.pass) else {
-            return Poll::Ready(None);
-        };
+        let mut pass = both.pass;
         let target = libm::expf(sigma);
         if pass.index == 0 && !pass.is_back {
             pass.end_m = self.end_m(chain.mission, chain.seat_of, 0);
         }
         for _ in 0..LINE {
             let met = if pass.is_back {
-                self.line_back(chain, target, &mut pass)
+                self.line_back(both, chain, target, &mut pass)
             } else {
-                self.line_there(chain, target, &mut pass)
+                self.line_there(both, chain, target, &mut pass)
             };
             let over = pass.is_back && pass.index == 0;
             if over || met.is_none() {
-                if let Some(both) = self.both.first_mut() {
-                    both.pass = Pass::default();
-                }
+                both.pass = Pass::NONE;
                 return Poll::Ready(met);
             }
         }
-        if let Some(both) = self.both.first_mut() {
-            both.pass = pass;
-        }
+        both.pass = pass;
         Poll::Pending
     }
 
     /// Computes the reach of the next relay.
     fn line_there(
         &mut self,
+        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         target: f32,
         pass: &mut Pass,
@@ -376,10 +392,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             x_m = place;
             pass.is_back = true;
         }
-        self.both
-            .first_mut()?
-            .interior
-            .note(index, [x_m, pass.end_m]);
+        both.interior.note(index, [x_m, pass.end_m]);
         (pass.index, pass.x_m) = (index, x_m);
         Some(())
     }
@@ -387,11 +400,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Computes the position of the relay before the current one, which is at `pass.x_m`.
     fn line_back(
         &mut self,
+        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         target: f32,
         pass: &mut Pass,
     ) -> Option<()> {
-        let both = self.both.first()?;
         let [_, end_m] = both.interior.noted(pass.index);
         let before = pass.index.saturating_sub(1);
         let [reach, before_m] = both.interior.noted(before);
@@ -401,10 +414,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             RequiredPosition::At(x_m) => x_m,
         };
         pass.index = before;
-        self.both
-            .first_mut()?
-            .interior
-            .note(before, [pass.x_m, before_m]);
+        both.interior.note(before, [pass.x_m, before_m]);
         Some(())
     }
 

@@ -27,10 +27,10 @@ use crate::optimiser::joint::site::Cell;
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
-use both::{BOTH, Both};
 use chain::{Mark, SEGMENT, STAGES, SolverContext, Stage};
 use core::task::Poll;
 
+pub use both::Workspace;
 pub use chain::Seat;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -136,7 +136,8 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
     cells: [Cell; RELAYS],
-    both: [Both<RELAYS, SEGMENTS>; BOTH],
+    /// True until the first portion with a way back.
+    is_new: bool,
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -166,7 +167,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             stages: [Stage::default(); STAGES],
             marks: [Mark::default(); SEGMENTS],
             cells: [Cell::default(); RELAYS],
-            both: [(); BOTH].map(|()| Both::new()),
+            is_new: true,
         })
     }
 
@@ -193,6 +194,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         &mut self,
         mission: &Mission,
         seat_of: impl Fn(u16) -> Seat,
+        space: &mut Workspace<RELAYS, SEGMENTS>,
     ) -> Poll<Result<f32, Infeasible>> {
         let Some(interferer) = mission.interferer() else {
             return Poll::Ready(Err(Infeasible));
@@ -205,7 +207,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         };
         if mission.reverse() > 0.0 {
             self.holds_back = true;
-            return self.step_both_ways(&chain);
+            return match space.both.first_mut() {
+                Some(both) => self.step_both_ways(both, &chain),
+                None => Poll::Ready(Err(Infeasible)),
+            };
         }
         match self.work {
             Work::Begin => self.begin(&chain),
@@ -269,7 +274,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 mod tests {
     use core::task::Poll;
 
-    use super::{Seat, Solver};
+    use super::{Seat, Solver, Workspace};
     use crate::channel::{AirGround, Channel};
     use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
@@ -356,7 +361,7 @@ mod tests {
             if once_more {
                 solver.best_judged = None;
             }
-            if let Poll::Ready(target) = solver.step(mission, seat) {
+            if let Poll::Ready(target) = solver.step(mission, seat, &mut Workspace::new()) {
                 break target.unwrap_or(-1.0);
             }
             portions += 1;
