@@ -18,14 +18,13 @@ pub(crate) fn local_search() {
     let beside = |place| HopEnd {
         place,
         apart_m: 4.0,
+        power_w: 1.0,
     };
-    let gain = HIGH.relay_gain(1.0);
     let (before, after) = (place(250.0, 100.0), place(320.0, 110.0));
     let hops = Hops::new(
         &HIGH,
         &INTERFERER,
-        beside(before),
-        gain,
+        Some(beside(before)),
         1.0,
         Some(beside(after)),
     );

@@ -49,7 +49,7 @@ fn an_unread_link_does_not_starve_the_other_link() {
         let [up, down] = End::wire(16);
         let [last, _rx] = End::wire(16);
         let none = ReadErrors::default();
-        let mut nodes = [
+        let mut nodes = vec![
             Node::new(kind, relay(3, 2, Wiring::Pair), &[deaf, up], &none),
             Node::new(kind, relay(3, 3, Wiring::Pair), &[down, last], &none),
         ];

@@ -183,7 +183,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Processes one portion with a way back: two relays of Algorithm 1, ten relays of a step, or twenty of a merit.
+    /// Processes one portion for both directions. It is two relays of Algorithm 1, ten of a step, or twenty of a merit.
     pub(super) fn step_both_ways(
         &mut self,
         both: &mut Both<RELAYS, SEGMENTS>,
