@@ -3,14 +3,15 @@
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
-use uav_relay::optimiser::joint::{Seat, Solver};
+use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
 use uav_relay::planning::fleet::Fewest;
 use uav_relay::planning::single::theorems;
 
 use super::counter::instructions;
-use super::missions::{HIGH, MISSION, WIDE};
+use super::missions::{BOTH, HIGH, MISSION, WIDE};
 
 /// Measures the instructions for Theorems 1 to 3 and for finding the fewest relays that reach an SIR.
+#[inline(never)]
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
@@ -36,6 +37,7 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
     };
+    let mut space = Workspace::new();
     let Some(mut solver) = Solver::<100, 10>::new(&mission) else {
         return (0, 0, 0);
     };
@@ -43,7 +45,8 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let (mut total, mut longest_call, mut calls) = (0_u32, 0, 0);
     loop {
         let mut is_finished = false;
-        let cost = instructions(|| is_finished = solver.step(&mission, |_| seat).is_ready());
+        let cost =
+            instructions(|| is_finished = solver.step(&mission, |_| seat, &mut space).is_ready());
         total = total.saturating_add(cost);
         longest_call = longest_call.max(cost);
         calls += 1;
@@ -54,6 +57,7 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
 }
 
 /// Measures the instructions of the joint method's solver alone, without messages between relays.
+#[inline(never)]
 pub(crate) fn joint() {
     let (total, longest_call, calls) = solve_instructions(&HIGH, 8);
     hprintln!("solved_8 {}", total);
@@ -67,5 +71,21 @@ pub(crate) fn joint() {
     hprintln!("solved_50_wide {}", total);
     hprintln!("portion_50_wide {}", longest_call);
     hprintln!("portions_50_wide {}", calls);
+    let (all, most, portions) = solve_instructions(&HIGH, 20);
+    hprintln!("solved_20 {}", all);
+    hprintln!("portion_20 {}", most);
+    hprintln!("portions_20 {}", portions);
+    let (all, most, portions) = solve_instructions(&BOTH, 8);
+    hprintln!("solved_8_both {}", all);
+    hprintln!("portion_8_both {}", most);
+    hprintln!("portions_8_both {}", portions);
+    let (all, most, portions) = solve_instructions(&BOTH, 20);
+    hprintln!("solved_20_both {}", all);
+    hprintln!("portion_20_both {}", most);
+    hprintln!("portions_20_both {}", portions);
+    let (all, most, portions) = solve_instructions(&BOTH, 50);
+    hprintln!("solved_50_both {}", all);
+    hprintln!("portion_50_both {}", most);
+    hprintln!("portions_50_both {}", portions);
     hprintln!("size_of_solver {}", size_of::<Solver<100, 10>>());
 }

@@ -11,7 +11,7 @@ use super::turn::TurnPass;
 use crate::mission::Profile;
 use crate::node::context::Context;
 use crate::node::sample::Meter;
-use crate::optimiser::joint::{MOST_SOLVED, Solver};
+use crate::optimiser::joint::{MOST_SOLVED, Solver, Workspace};
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::local::HopEnd;
 use crate::optimiser::pass::origins;
@@ -65,6 +65,8 @@ pub(crate) struct Computation {
     pub(super) profile: Profile,
     /// Profiles (altitude and power) of the relays of this view, for the joint method.
     pub(super) seats: Seats,
+    /// Workspace of the joint method for both directions.
+    pub(super) space: ChainWorkspace,
     /// Position that the joint method has computed for this relay in this view; `None` before.
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude of the agreed position.
@@ -98,6 +100,7 @@ impl Computation {
             began: false,
             profile,
             seats: Seats::UNKNOWN,
+            space: ChainWorkspace::new(),
             chosen: None,
             cross_section: profile.on_line().cross_section,
             after: None,
@@ -310,6 +313,7 @@ impl Computation {
 
 /// Solver of the joint method for a whole chain.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
+type ChainWorkspace = Workspace<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// Current task of the leader: prediction, joint method, search for the target SIR, or Algorithm 2.
 #[cfg_attr(

@@ -225,7 +225,7 @@ impl Computation {
         };
         let seats = &self.seats;
         let seat_of = |index| seats.of(mission, index);
-        let Poll::Ready(solved) = chain.step(mission, seat_of) else {
+        let Poll::Ready(solved) = chain.step(mission, seat_of, &mut self.space) else {
             return None;
         };
         let index = context.index();

@@ -304,16 +304,20 @@ impl Brief {
     }
 
     pub(super) fn policy(self) -> Policy {
-        let whole = |half: u16| f32::from_bits(u32::from(half) << 16);
         Policy {
             axis: self.axis,
             rising: self.rising,
             step: self.step,
-            follow: self.follow.map(|row| row.map(whole)),
+            follow: self.follow.map(|row| row.map(widened)),
         }
     }
 }
 
-const fn upper_half(value: f32) -> u16 {
+/// Returns a finite value rounded to three digits.
+pub(super) const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
+}
+
+pub(super) const fn widened(half: u16) -> f32 {
+    f32::from_bits((half as u32) << 16)
 }

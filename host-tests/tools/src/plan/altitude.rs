@@ -5,7 +5,7 @@
 use core::task::Poll;
 
 use uav_relay::optimiser::PerTarget;
-use uav_relay::optimiser::joint::{Seat, Solver};
+use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
 use uav_relay::optimiser::pass::{Behind, Link};
 use uav_relay::optimiser::spacing::RequiredPosition;
 use uav_relay::place::Station;
@@ -14,14 +14,23 @@ use uav_relay::{Mission, Placement};
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
 use uav_relay_scenario::Scenario;
 
-type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as usize / 10 }>;
+const MOST: usize = Mission::MAX_RELAYS as usize;
+
+type Chain = Solver<MOST, { MOST / 10 }>;
 
 /// Returns the plan of the joint method, which chooses x, side and altitude of each of `relays` relays. If that finds
 /// none, the relays stay at their own altitudes.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     match joint(&briefed) {
-        Some(places) => Ok(briefed.plan(&places, "the joint method", false)),
+        Some(places) => {
+            let how = if scenario.reverse > 0.0 {
+                "the joint method for both directions"
+            } else {
+                "the joint method"
+            };
+            Ok(briefed.plan(&places, how, false))
+        }
         // The relays do the same: they stay at their own altitudes.
         None => source::best(scenario, relays, tolerance),
     }
@@ -42,8 +51,9 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
 /// returns a relay's data.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
+    let mut space = Box::new(Workspace::new());
     let target = loop {
-        if let Poll::Ready(solved) = solver.step(mission, &seat_of) {
+        if let Poll::Ready(solved) = solver.step(mission, &seat_of, &mut space) {
             break solved.ok()?;
         }
     };
@@ -71,7 +81,12 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
         let from_m = places.last().map_or(0.0, |place| place.x_m);
         let mut reaches = PerTarget::new();
         link_of(index).extend(&[target], &[from_m], &mut reaches);
-        places.push(own_of(index).cross_section.at(*reaches.first()?));
+        let mut x_m = *reaches.first()?;
+        if index == mission.relays() {
+            // With a way back the last relay may stop before its reach.
+            (_, x_m) = link_of(index).ending(target, from_m, x_m)?;
+        }
+        places.push(own_of(index).cross_section.at(x_m));
     }
     for index in (2..=mission.relays()).rev() {
         let before = usize::from(index) - 2;

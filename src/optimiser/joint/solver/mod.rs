@@ -11,10 +11,12 @@
 //! | --- | --- |
 //! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
 //! | `judge` | the steps after a target is found: the next start, or the polish |
+//! | `both` | the joint method with a way back |
 //! | `chain` | data shared by the passes; a segment of the chain; the profile of one relay |
 //!
 //! This file has the state of a solver, its current work and its purpose, and one portion of its work.
 
+mod both;
 mod chain;
 mod judge;
 mod passes;
@@ -28,6 +30,7 @@ use crate::place::{CrossSection, Placement};
 use chain::{Mark, SEGMENT, STAGES, SolverContext, Stage};
 use core::task::Poll;
 
+pub use both::Workspace;
 pub use chain::Seat;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -133,6 +136,8 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
     cells: [Cell; RELAYS],
+    /// True until the first portion with a way back.
+    is_new: bool,
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
@@ -162,6 +167,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             stages: [Stage::default(); STAGES],
             marks: [Mark::default(); SEGMENTS],
             cells: [Cell::default(); RELAYS],
+            is_new: true,
         })
     }
 
@@ -188,6 +194,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         &mut self,
         mission: &Mission,
         seat_of: impl Fn(u16) -> Seat,
+        space: &mut Workspace<RELAYS, SEGMENTS>,
     ) -> Poll<Result<f32, Infeasible>> {
         let Some(interferer) = mission.interferer() else {
             return Poll::Ready(Err(Infeasible));
@@ -198,6 +205,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             seat_of: &seat_of,
             gain: mission.relay_gain(mission.config().common.power_w),
         };
+        if mission.reverse() > 0.0 {
+            self.holds_back = true;
+            return match space.both.first_mut() {
+                Some(both) => self.step_both_ways(both, &chain),
+                None => Poll::Ready(Err(Infeasible)),
+            };
+        }
         match self.work {
             Work::Begin => self.begin(&chain),
             Work::Seek(seek, purpose) => self.seek(&chain, seek, purpose),
@@ -260,7 +274,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 mod tests {
     use core::task::Poll;
 
-    use super::{Seat, Solver};
+    use super::{Seat, Solver, Workspace};
     use crate::channel::{AirGround, Channel};
     use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
@@ -347,7 +361,7 @@ mod tests {
             if once_more {
                 solver.best_judged = None;
             }
-            if let Poll::Ready(target) = solver.step(mission, seat) {
+            if let Poll::Ready(target) = solver.step(mission, seat, &mut Workspace::new()) {
                 break target.unwrap_or(-1.0);
             }
             portions += 1;
