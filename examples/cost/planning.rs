@@ -3,7 +3,7 @@
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
-use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
+use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::planning::fleet::Fewest;
 use uav_relay::planning::single::theorems;
 
@@ -37,7 +37,6 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
     };
-    let mut space = Workspace::new();
     let Some(mut solver) = Solver::<100, 10>::new(&mission) else {
         return (0, 0, 0);
     };
@@ -45,8 +44,7 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let (mut total, mut longest_call, mut calls) = (0_u32, 0, 0);
     loop {
         let mut is_finished = false;
-        let cost =
-            instructions(|| is_finished = solver.step(&mission, |_| seat, &mut space).is_ready());
+        let cost = instructions(|| is_finished = solver.step(&mission, |_| seat).is_ready());
         total = total.saturating_add(cost);
         longest_call = longest_call.max(cost);
         calls += 1;

@@ -5,7 +5,7 @@ use std::task::Poll;
 use chacha20::ChaCha8Rng;
 use host_tests::flights::unharmed;
 use rand::{RngExt, SeedableRng};
-use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
+use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::{Adjust, Method, Mission, MissionConfig, Profile};
 use uav_relay_oracle::mission::as_relays_know_it;
 use uav_relay_oracle::random::joint::{CROWDED, ROOMY, Scenario, scenario, with_own};
@@ -266,12 +266,11 @@ fn few_portions_lead_to_the_joint_optimum() {
     ] {
         let (link, corridor) = roomy(relays, 500.0, 150.0, lateral_m, 300.0);
         let mission = setup(&link, corridor).unwrap().mission;
-        let mut space = Workspace::new();
         let mut solver = Solver::<100, 10>::new(&mission).unwrap();
         let seat = Seat::common(&mission);
         let mut portions = 1;
         let target = loop {
-            if let Poll::Ready(solved) = solver.step(&mission, |_| seat, &mut space) {
+            if let Poll::Ready(solved) = solver.step(&mission, |_| seat) {
                 break f64::from(solved.unwrap());
             }
             portions += 1;

@@ -7,7 +7,7 @@ use host_tests::flights::{unharmed, with_room};
 use rand::SeedableRng;
 use rayon::prelude::*;
 use uav_relay::Method;
-use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
+use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random::joint::{CROWDED, Scenario, in_space, scenario};
 use uav_relay_oracle::random::{count, in_noise};
@@ -36,11 +36,10 @@ fn ratio(number: u64) -> Option<f64> {
     let (mission, _) = of_link(&of.link, 1e-4)?;
     let mission = with_room(mission.config(), of.corridor)?;
     let best = optimum(&of.link, of.corridor, &of.held).unwrap()?;
-    let mut space = Workspace::new();
     let mut solver = Solver::<100, 10>::new(&mission)?;
     let seat = Seat::common(&mission);
     let target = loop {
-        if let Poll::Ready(solved) = solver.step(&mission, |_| seat, &mut space) {
+        if let Poll::Ready(solved) = solver.step(&mission, |_| seat) {
             break f64::from(solved.unwrap());
         }
     };

@@ -8,10 +8,10 @@ use super::sense::{SENSING, Sense, Sensing};
 use super::state::{Action, Phase, RoundState};
 use super::sweep::SweepPass;
 use super::turn::TurnPass;
-use crate::mission::Profile;
+use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
 use crate::node::sample::Meter;
-use crate::optimiser::joint::{MOST_SOLVED, Solver, Workspace};
+use crate::optimiser::joint::{MOST_SOLVED, Solver};
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::local::HopEnd;
 use crate::optimiser::pass::origins;
@@ -65,8 +65,6 @@ pub(crate) struct Computation {
     pub(super) profile: Profile,
     /// Profiles (altitude and power) of the relays of this view, for the joint method.
     pub(super) seats: Seats,
-    /// Workspace of the joint method for both directions.
-    pub(super) space: ChainWorkspace,
     /// Position that the joint method has computed for this relay in this view; `None` before.
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude of the agreed position.
@@ -100,7 +98,6 @@ impl Computation {
             began: false,
             profile,
             seats: Seats::UNKNOWN,
-            space: ChainWorkspace::new(),
             chosen: None,
             cross_section: profile.on_line().cross_section,
             after: None,
@@ -313,7 +310,6 @@ impl Computation {
 
 /// Solver of the joint method for a whole chain.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
-type ChainWorkspace = Workspace<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// Current task of the leader: prediction, joint method, search for the target SIR, or Algorithm 2.
 #[cfg_attr(
@@ -405,8 +401,13 @@ impl LeaderTask {
         *self = Self::Predicting(planner);
     }
 
-    pub(crate) fn solve(&mut self, chain: ChainSolver) {
-        *self = Self::Solving(chain);
+    /// Starts the joint method, whose state is built in place; returns false if it cannot solve the chain.
+    pub(crate) fn solve(&mut self, mission: &Mission) -> bool {
+        *self = Self::Solving(ChainSolver::NEW);
+        match self {
+            Self::Solving(chain) => chain.begin(mission),
+            _ => false,
+        }
     }
 
     /// Starts a search for the highest target SIR. `last` is true if no other algorithm follows; `given` if the

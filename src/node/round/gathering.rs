@@ -5,7 +5,7 @@
 //!
 //! Then each relay solves the whole chain without further messages, and uses its own position in the solution.
 
-use super::computation::{ChainSolver, LeaderTask};
+use super::computation::LeaderTask;
 use super::computation::{Computation, JointPlace, PassKind};
 use super::state::Action;
 use crate::mission::{Mission, Profile};
@@ -216,7 +216,8 @@ impl Computation {
     #[inline(never)]
     pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
         let mission = context.mission();
-        if !matches!(self.task, LeaderTask::Solving(_)) && !self.begin_solving(mission) {
+        if !matches!(self.task, LeaderTask::Solving(_)) && !self.task.solve(mission) {
+            self.task.clear();
             self.choose_configured(context);
             return Some(0.0);
         }
@@ -225,7 +226,7 @@ impl Computation {
         };
         let seats = &self.seats;
         let seat_of = |index| seats.of(mission, index);
-        let Poll::Ready(solved) = chain.step(mission, seat_of, &mut self.space) else {
+        let Poll::Ready(solved) = chain.step(mission, seat_of) else {
             return None;
         };
         let index = context.index();
@@ -246,16 +247,6 @@ impl Computation {
         };
         self.task.clear();
         Some(target)
-    }
-
-    /// Starts the solver of the joint method; returns false if it cannot solve this chain.
-    #[inline(never)] // a solver is built here once
-    fn begin_solving(&mut self, mission: &Mission) -> bool {
-        let Some(chain) = ChainSolver::new(mission) else {
-            return false;
-        };
-        self.task.solve(chain);
-        true
     }
 
     fn choose_configured(&mut self, context: &Context<'_>) {

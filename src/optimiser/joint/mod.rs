@@ -23,7 +23,7 @@ pub mod solver;
 mod starts;
 
 pub use site::Room;
-pub use solver::{Seat, Solver, Workspace};
+pub use solver::{Seat, Solver};
 
 /// Maximum number of relays for which the joint method works; 0 without the feature `altitude`.
 pub const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };

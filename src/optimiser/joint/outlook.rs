@@ -279,7 +279,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
 }
 
 /// Compressed [`Policy`]: the derivatives are stored with three digits, which is sufficient.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Brief {
     axis: Coordinate,
     rising: bool,
@@ -288,6 +288,13 @@ pub(super) struct Brief {
 }
 
 impl Brief {
+    pub(super) const NONE: Self = Self {
+        axis: Coordinate::X,
+        rising: false,
+        step: [0.0; 2],
+        follow: [[0; 3]; 2],
+    };
+
     pub(super) fn of(policy: &Policy) -> Self {
         let Policy {
             axis,

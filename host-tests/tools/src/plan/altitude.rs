@@ -5,7 +5,7 @@
 use core::task::Poll;
 
 use uav_relay::optimiser::PerTarget;
-use uav_relay::optimiser::joint::{Seat, Solver, Workspace};
+use uav_relay::optimiser::joint::{Seat, Solver};
 use uav_relay::optimiser::pass::{Behind, Link};
 use uav_relay::optimiser::spacing::RequiredPosition;
 use uav_relay::place::Station;
@@ -51,9 +51,8 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
 /// returns a relay's data.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
-    let mut space = Box::new(Workspace::new());
     let target = loop {
-        if let Poll::Ready(solved) = solver.step(mission, &seat_of, &mut space) {
+        if let Poll::Ready(solved) = solver.step(mission, &seat_of) {
             break solved.ok()?;
         }
     };

@@ -18,8 +18,7 @@
 //! those are left out, so that the matrix of [`newton`](super::newton) is positive definite.
 
 use super::super::hop::{Triple, minus};
-use super::super::solver::Seat;
-use crate::mission::{Interferer, Mission};
+use super::super::solver::{Seat, SolverContext};
 use crate::sir::{Sender, transmitter_gain};
 
 /// Square of a length below which a hop counts as longer, in units of D^2. Relays may share a position.
@@ -27,31 +26,43 @@ const SHORTEST: f32 = 1e-8;
 
 pub(super) type Square = [Triple; 3];
 
+/// Symmetric matrix: xx, xy, xh, yy, yh, hh.
+pub(super) type Symmetric = [f32; 6];
+
+#[inline(never)]
 pub(super) fn dot([a, b, c]: Triple, [x, y, z]: Triple) -> f32 {
     a * x + b * y + c * z
+}
+
+/// Adds `weight` v v' to `to`.
+#[inline(never)]
+pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: Triple, weight: f32) {
+    let (a, b) = (weight * x, weight * y);
+    let parts = [a * x, a * y, a * h, b * y, b * h, weight * h * h];
+    for (cell, part) in to.iter_mut().zip(parts) {
+        *cell += part;
+    }
 }
 
 /// Adds `weight` a b' to `to`.
 pub(super) fn add_product(to: &mut Square, a: Triple, b: Triple, weight: f32) {
     for (row, x) in to.iter_mut().zip(a) {
-        for (cell, y) in row.iter_mut().zip(b) {
-            *cell += weight * x * y;
-        }
+        add_scaled(row, b, weight * x);
     }
 }
 
 /// Adds `weight` v to `to`.
+#[inline(never)]
 pub(super) fn add_scaled(to: &mut Triple, v: Triple, weight: f32) {
     for (cell, x) in to.iter_mut().zip(v) {
         *cell += weight * x;
     }
 }
 
-fn add_to_diagonal([x, y, z]: &mut Square, value: f32) {
-    let ([xx, ..], [_, yy, _], [.., zz]) = (x, y, z);
+fn add_to_diagonal([xx, _, _, yy, _, hh]: &mut Symmetric, value: f32) {
     *xx += value;
     *yy += value;
-    *zz += value;
+    *hh += value;
 }
 
 /// Logarithms of the gains of a chain, for lengths in units of D.
@@ -86,10 +97,12 @@ impl Gains {
         reverse: 0.0,
     };
 
-    pub(super) fn new(mission: &Mission, interferer: &Interferer) -> Self {
+    pub(super) fn new(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Self {
+        let (mission, interferer) = (chain.mission, chain.interferer);
         let d = mission.config().distance_m;
         let common_w = mission.config().common.power_w;
         let on_ground = |gain: f32| libm::logf(gain / d / d);
+        let from_rx = Sender::receiver(mission).gain.value();
         Self {
             source: [interferer.x_m / d, interferer.y_m / d, 0.0],
             noise: mission.noise_at_a_metre() * d * d,
@@ -98,15 +111,16 @@ impl Gains {
             to_rx: on_ground(mission.receiver_gain(common_w)),
             to_tx: on_ground(transmitter_gain(mission, common_w)),
             from_tx: libm::logf(mission.tx_gain().value()),
-            from_rx: libm::logf(Sender::receiver(mission).gain.value()),
+            from_rx: libm::logf(from_rx),
             reverse: libm::logf(mission.reverse()),
         }
     }
 
     /// Returns ln of the gains a and a' of hop `k`, 1..=N + 1, of `relays`.
-    fn of(&self, k: u16, relays: u16, seat_of: &impl Fn(u16) -> Seat) -> [f32; 2] {
+    fn of(&self, k: u16, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> [f32; 2] {
+        let relays = chain.mission.relays();
         let power = |index: u16| {
-            let power_w = (seat_of)(index).power_w;
+            let power_w = (chain.seat_of)(index).power_w;
             if power_w.to_bits() == self.common_w.to_bits() {
                 0.0
             } else {
@@ -137,15 +151,19 @@ impl Gains {
     pub(super) fn levels(
         &self,
         k: u16,
-        relays: u16,
-        seat_of: &impl Fn(u16) -> Seat,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         [from, to]: [Triple; 2],
         [quiet_from, quiet_to]: [f32; 2],
     ) -> [f32; 2] {
         let v = minus(to, from);
         let length = libm::logf(dot(v, v) + SHORTEST);
-        let [there, back] = self.of(k, relays, seat_of);
-        let there = there + if k > relays { 0.0 } else { quiet_to };
+        let [there, back] = self.of(k, chain);
+        let there = there
+            + if k > chain.mission.relays() {
+                0.0
+            } else {
+                quiet_to
+            };
         let back = back + if k > 1 { quiet_from } else { 0.0 };
         [there - length, back - length]
     }
@@ -164,10 +182,9 @@ impl Gains {
         let slope = v.map(|x| -2.0 * x / l);
         let [there, back] = weights;
         let flat = 2.0 * (there + back) / l;
-        let mut bend = [[0.0; 3]; 3];
-        add_product(
+        let mut bend = [0.0; 6];
+        add_square(
             &mut bend,
-            v,
             v,
             if convex { -flat / l } else { -2.0 * flat / l },
         );
@@ -177,7 +194,7 @@ impl Gains {
             by_to: [slope; 2],
             bend_from: bend,
             bend_to: bend,
-            between: bend.map(|row| row.map(|x| -x)),
+            bend,
         };
         let [by_to, _] = &mut hop.by_to;
         if k <= relays {
@@ -197,7 +214,7 @@ impl Gains {
         weight: f32,
         convex: bool,
         slope: &mut Triple,
-        bend: &mut Square,
+        bend: &mut Symmetric,
     ) {
         let w = minus(at, self.source);
         let s = dot(w, w) + SHORTEST * SHORTEST;
@@ -209,9 +226,9 @@ impl Gains {
         add_scaled(slope, w, 2.0 * first);
         if convex {
             let radial = -weight * (2.0 * first + 4.0 * second * s);
-            add_product(bend, w, w, radial.max(0.0) / s);
+            add_square(bend, w, radial.max(0.0) / s);
         } else {
-            add_product(bend, w, w, -4.0 * weight * second);
+            add_square(bend, w, -4.0 * weight * second);
             add_to_diagonal(bend, -2.0 * weight * first);
         }
     }
@@ -223,8 +240,8 @@ impl Gains {
 pub(super) struct Derivatives {
     pub(super) by_from: [Triple; 2],
     pub(super) by_to: [Triple; 2],
-    pub(super) bend_from: Square,
-    pub(super) bend_to: Square,
-    /// Mixed ones: rows by the end, columns by the start.
-    pub(super) between: Square,
+    pub(super) bend_from: Symmetric,
+    pub(super) bend_to: Symmetric,
+    /// Part of both by the length, which is the negative of the mixed ones by both ends.
+    pub(super) bend: Symmetric,
 }

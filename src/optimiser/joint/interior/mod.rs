@@ -18,15 +18,17 @@
 //! | `hop` | levels of a hop and their derivatives |
 //! | `newton` | block tridiagonal system of a step |
 //!
-//! This file has the state and one portion of the work. Lengths are in units of D.
+//! This file has the state and one portion of the work. Lengths are in units of D; across the line the positions are stored as
+//! those of the other solver, six bytes each. The memory of a segment of ten relays has its front during the elimination, and
+//! then its steps.
 
 mod hop;
 mod newton;
 
 use super::hop::{Triple, minus};
 use super::outlook::{upper_half, widened};
-use super::solver::Seat;
-use crate::mission::{Interferer, Mission};
+use super::site::{Cell, Cells};
+use super::solver::{Seat, SolverContext};
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};
@@ -62,15 +64,11 @@ const DAMPING: f32 = 1e-5;
 const TARGETS: u8 = 12;
 const EXACT: f32 = 5e-4;
 
-/// Relays of a portion.
+/// Relays of a segment, and of half of it.
 const AT_ONCE: u16 = 10;
 const SEGMENT: usize = 10;
-/// Relays of a segment in memory; 0 without the feature `altitude`.
-const STAGES: usize = if cfg!(feature = "altitude") {
-    SEGMENT
-} else {
-    0
-};
+const HALF: u16 = 5;
+const FACTORS: usize = 5;
 
 /// Levels of a hop, and their multipliers with three digits.
 #[derive(Clone, Copy, Debug)]
@@ -86,26 +84,66 @@ impl Hop {
     };
 }
 
-/// Relay, its step with three digits, and the hop to it.
+/// x of a relay, and the hop to it.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    at: Triple,
-    step: [u16; 3],
+    x: f32,
     hop: Hop,
+}
+
+/// Steps of a segment's relays, with three digits.
+type Steps = [[u16; 3]; SEGMENT];
+
+#[derive(Clone, Copy, Debug)]
+enum Segment {
+    /// Rows of the segment's first relay.
+    Front(Front),
+    Steps(Steps),
+}
+
+/// Position of a node, and the corners of its box.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    at: Triple,
+    low: Triple,
+    high: Triple,
+}
+
+impl Spot {
+    const fn fixed(at: Triple) -> Self {
+        Self {
+            at,
+            low: at,
+            high: at,
+        }
+    }
+
+    /// Returns the distances to both corners.
+    fn spans(&self) -> [Triple; 2] {
+        [minus(self.at, self.low), minus(self.high, self.at)]
+    }
+
+    /// Moves the position into the box, with a `margin` as a fraction of its width.
+    fn enclose(&mut self, margin: f32) {
+        let limits = self.low.into_iter().zip(self.high);
+        for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
+            let margin = margin * (high - low);
+            *cell = cell.max(low + margin).min(high - margin);
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
     /// Levels of this hop and the next ones, after a fraction of the step.
     Levels(u16),
-    /// Newton step of T.
-    Target(u8),
+    /// T of these levels.
+    Target,
     /// Merit, from this hop on.
     Merit(u16),
     /// Elimination of a segment.
     Eliminate(u16),
-    /// Factors of a segment, and then its steps.
-    Factorise(u16),
+    /// Factors of half a segment, and then its steps.
     Substitute(u16),
 }
 
@@ -113,10 +151,14 @@ enum Work {
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: Gains,
+    /// Lateral offsets and altitudes of the relays.
+    pub(super) cells: Cells<RELAYS>,
     nodes: [Node; RELAYS],
     last: Hop,
-    fronts: [Front; SEGMENTS],
-    factors: [Factor; STAGES],
+    segments: [Segment; SEGMENTS],
+    /// Steps of the segment that is substituted, and that of the relay after the current one.
+    steps: Steps,
+    ahead: Triple,
     work: Work,
     mu: f32,
     target: f32,
@@ -140,15 +182,16 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
 impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     pub(super) const NEW: Self = Self {
         gains: Gains::NONE,
+        cells: Cells::NEW,
         nodes: [Node {
-            at: [0.0; 3],
-            step: [0; 3],
+            x: 0.0,
             hop: Hop::NONE,
         }; RELAYS],
         last: Hop::NONE,
-        fronts: [Front::NONE; SEGMENTS],
-        factors: [Factor::NONE; STAGES],
-        work: Work::Levels(1),
+        segments: [Segment::Front(Front::NONE); SEGMENTS],
+        steps: [[0; 3]; SEGMENT],
+        ahead: [0.0; 3],
+        work: Work::Levels(0),
         mu: 0.0,
         target: 0.0,
         least: 0.0,
@@ -157,7 +200,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         share: 0.0,
         sums: Sums::NONE,
         by_target: 0.0,
-        resets: true,
+        resets: false,
         convex: false,
         damping: 0.0,
         tries: 0,
@@ -166,9 +209,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     };
 
     /// Starts from the positions given by [`Interior::put`], which may be `close` to the result.
-    pub(super) fn start(&mut self, mission: &Mission, interferer: &Interferer, close: bool) {
-        self.gains = Gains::new(mission, interferer);
-        self.mu = if close { CLOSE_MU } else { FIRST_MU } / levels(mission);
+    pub(super) fn start(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        is_close: bool,
+    ) {
+        self.gains = Gains::new(chain);
+        self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
         self.iterations = 0;
         self.convex = false;
         self.look(true);
@@ -177,26 +224,34 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Sets the position of relay `index`, with a margin to the box as a fraction of its width.
     pub(super) fn put(
         &mut self,
-        mission: &Mission,
-        seat: Seat,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         index: u16,
         place: Placement,
         margin: f32,
     ) {
-        let [low, high] = room(mission, seat);
-        let unit = 1.0 / mission.config().distance_m;
-        let wanted = [place.x_m, place.y_m, place.altitude_m].map(|m| m * unit);
-        let width = minus(high, low);
-        let mut at = [0.0; 3];
-        let ends = wanted.into_iter().zip(low.into_iter().zip(width));
-        for (cell, (wanted, (low, width))) in at.iter_mut().zip(ends) {
-            *cell = wanted
-                .max(low + margin * width)
-                .min(low + (1.0 - margin) * width);
-        }
+        let mut spot = self.spot(chain, index);
+        let unit = 1.0 / chain.distance_m();
+        spot.at = [place.x_m, place.y_m, place.altitude_m].map(|m| m * unit);
+        spot.enclose(margin);
+        self.settle(chain, index, spot.at);
+    }
+
+    /// Stores the position of relay `index`.
+    #[inline(never)]
+    fn settle(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+        [x, y, h]: Triple,
+    ) {
+        let distance_m = chain.distance_m();
+        let at = CrossSection {
+            y_m: y * distance_m,
+            altitude_m: h * distance_m,
+        };
+        (self.cells).set(index, Cell::of(at, (chain.seat_of)(index).room));
         if let Some(node) = self.node(index) {
-            node.at = at;
-            node.step = [0; 3];
+            node.x = x;
         }
     }
 
@@ -213,30 +268,54 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         node.map_or([0.0; 2], |node| node.hop.level)
     }
 
-    /// Returns the cross-section of relay `index`.
-    pub(super) fn cross_section(&self, mission: &Mission, index: u16) -> CrossSection {
-        let [_, y, h] = self.at(mission.relays(), index);
-        let distance_m = mission.config().distance_m;
-        CrossSection {
-            y_m: y * distance_m,
-            altitude_m: h * distance_m,
-        }
-    }
-
     fn node(&mut self, index: u16) -> Option<&mut Node> {
         self.nodes.get_mut(usize::from(index).wrapping_sub(1))
     }
 
-    /// Returns the position of node `index`, 0 for Tx and N + 1 for Rx.
-    fn at(&self, relays: u16, index: u16) -> Triple {
-        if index > relays {
-            return [1.0, 0.0, 0.0];
+    /// Returns the position and the box of node `index`, 0 for Tx and N + 1 for Rx.
+    #[inline(never)]
+    fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
+        if index > chain.mission.relays() {
+            return Spot::fixed([1.0, 0.0, 0.0]);
         }
-        let node = self.nodes.get(usize::from(index).wrapping_sub(1));
-        node.map_or([0.0; 3], |node| node.at)
+        let Some(node) = self.nodes.get(usize::from(index).wrapping_sub(1)) else {
+            return Spot::fixed([0.0; 3]);
+        };
+        let unit = 1.0 / chain.distance_m();
+        let room = (chain.seat_of)(index).room;
+        let at = self.cells.get(index).place(room);
+        let (lateral, band) = (room.lateral, room.band);
+        Spot {
+            at: [node.x, at.y_m * unit, at.altitude_m * unit],
+            low: [0.0, lateral.least_m * unit, band.least_m * unit],
+            high: [1.0, lateral.most_m * unit, band.most_m * unit],
+        }
+    }
+
+    /// Returns the step of relay `index`.
+    fn step_of(&self, index: u16) -> Triple {
+        let at = usize::from(index).wrapping_sub(1);
+        match self.segments.get(at / SEGMENT) {
+            Some(Segment::Steps(steps)) => steps
+                .get(at % SEGMENT)
+                .map_or([0.0; 3], |step| step.map(widened)),
+            _ => [0.0; 3],
+        }
+    }
+
+    /// Returns the position of node `index` after the fraction of its step.
+    #[inline(never)]
+    fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
+        let mut spot = self.spot(chain, index);
+        if self.share > 0.0 {
+            add_scaled(&mut spot.at, self.step_of(index), self.share);
+            spot.enclose(0.0);
+        }
+        spot
     }
 
     /// Returns hop `k`, 1..=N + 1.
+    #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
             Some(node) if k <= relays => &mut node.hop,
@@ -258,11 +337,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Processes one portion of the work; ready with T, the logarithm of an SIR, at the end.
-    pub(super) fn step(&mut self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat) -> Poll<f32> {
-        let relays = mission.relays();
-        match self.work {
-            Work::Levels(k) => self.levels(mission, seat_of, k),
-            Work::Target(step) => self.approach(relays, step),
+    pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+        let relays = chain.mission.relays();
+        let done = match self.work {
+            Work::Levels(k) => {
+                self.levels(chain, k);
+                Some(())
+            }
+            Work::Target => {
+                self.approach(relays);
+                Some(())
+            }
             Work::Merit(k) => {
                 let end = k.saturating_add(2 * AT_ONCE).min(relays + 2);
                 for k in k..end {
@@ -272,102 +357,77 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                 }
                 self.work = Work::Merit(end);
                 if end > relays + 1 {
-                    return self.judge(mission);
+                    return self.judge(chain);
                 }
+                Some(())
             }
-            Work::Eliminate(segment) => {
-                if self.eliminate(mission, seat_of, segment).is_none() {
-                    self.attempts += 1;
-                    if self.attempts >= ATTEMPTS {
-                        return Poll::Ready(self.target);
-                    }
-                    if self.convex {
-                        self.damping = (10.0 * self.damping).max(DAMPING);
-                    }
-                    self.convex = true;
-                    self.work = Work::Eliminate(0);
+            Work::Eliminate(segment) => self.forward(chain, segment).or_else(|| {
+                self.attempts += 1;
+                if self.convex {
+                    self.damping = (10.0 * self.damping).max(DAMPING);
                 }
-            }
-            Work::Factorise(segment) => {
-                if self.factorise(mission, seat_of, segment).is_none() {
-                    return Poll::Ready(self.target);
-                }
-            }
-            Work::Substitute(segment) => {
-                if self.substitute(mission, seat_of, segment).is_none() {
-                    return Poll::Ready(self.target);
-                }
-            }
+                self.convex = true;
+                self.work = Work::Eliminate(0);
+                (self.attempts < ATTEMPTS).then_some(())
+            }),
+            Work::Substitute(half) => self.substitute(chain, half),
+        };
+        match done {
+            Some(()) => Poll::Pending,
+            None => Poll::Ready(self.target),
         }
-        Poll::Pending
     }
 
     /// Computes levels from hop `k` on, and the logarithms of the distances to the box.
-    fn levels(&mut self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, k: u16) {
-        let relays = mission.relays();
+    fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
+        let relays = chain.mission.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
-        let mut from = self.moved(mission, seat_of, k - 1);
+        let mut from = self.moved(chain, k - 1).at;
         let mut quiet = self.gains.quiet(from);
         for k in k..end {
-            let to = self.moved(mission, seat_of, k);
+            let spot = self.moved(chain, k);
+            let to = spot.at;
             let ahead = self.gains.quiet(to);
-            let both = self
-                .gains
-                .levels(k, relays, seat_of, [from, to], [quiet, ahead]);
+            let both = self.gains.levels(k, chain, [from, to], [quiet, ahead]);
             let [a, b] = both;
             self.least = self.least.min(a).min(b);
             self.hop(relays, k).level = both;
-            if k <= relays {
-                let [low, high] = room(mission, (seat_of)(k));
-                let spans = minus(to, low).into_iter().zip(minus(high, to));
-                let inside = spans.filter(|(a, b)| *a > 0.0 && *b > 0.0);
-                self.sum += libm::logf(inside.map(|(a, b)| a * b).product());
-            }
+            let [below, above] = spot.spans();
+            let inside = below.into_iter().zip(above);
+            let inside = inside.filter(|(a, b)| *a > 0.0 && *b > 0.0);
+            self.sum += libm::logf(inside.map(|(a, b)| a * b).product());
             (from, quiet) = (to, ahead);
         }
         self.work = if end > relays + 1 {
-            self.target = self.least - self.mu;
-            Work::Target(0)
+            Work::Target
         } else {
             Work::Levels(end)
         };
     }
 
-    /// Returns the position of node `index` after the fraction of its step.
-    fn moved(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> Triple {
-        let mut at = self.at(mission.relays(), index);
-        let node = self.nodes.get(usize::from(index).wrapping_sub(1));
-        if let Some(node) = node.filter(|_| index <= mission.relays()) {
-            add_scaled(&mut at, node.step.map(widened), self.share);
-            let [low, high] = room(mission, (seat_of)(index));
-            for (cell, (low, high)) in at.iter_mut().zip(low.into_iter().zip(high)) {
-                *cell = cell.max(low).min(high);
-            }
-        }
-        at
-    }
-
-    /// Moves T toward the solution of its equation, by Newton's method for the inverse of the sum.
+    /// Computes T from its equation, by Newton's method for the inverse of the sum.
     ///
     /// That inverse is concave, and T starts beyond the solution, so T falls to it.
-    fn approach(&mut self, relays: u16, step: u8) {
-        let (mut sum, mut slope) = (0.0, 0.0);
-        for k in 1..=relays + 1 {
-            let target = self.target;
-            for level in self.hop(relays, k).level {
-                let inverse = 1.0 / (level - target);
-                sum += inverse;
-                slope += inverse * inverse;
+    fn approach(&mut self, relays: u16) {
+        self.target = self.least - self.mu;
+        for _ in 0..TARGETS {
+            let (mut sum, mut slope) = (0.0, 0.0);
+            for k in 1..=relays + 1 {
+                let target = self.target;
+                for level in self.hop(relays, k).level {
+                    let inverse = 1.0 / (level - target);
+                    sum += inverse;
+                    slope += inverse * inverse;
+                }
+            }
+            let (sum, slope) = (self.mu * sum, self.mu * slope);
+            self.target -= (sum * sum - sum) / slope;
+            if sum <= 1.0 + EXACT {
+                break;
             }
         }
-        let (sum, slope) = (self.mu * sum, self.mu * slope);
-        self.target -= (sum * sum - sum) / slope;
-        self.work = if sum <= 1.0 + EXACT || step >= TARGETS {
-            self.target = self.target.min(self.least - 0.5 * self.mu);
-            Work::Merit(1)
-        } else {
-            Work::Target(step + 1)
-        };
+        self.target = self.target.min(self.least - 0.5 * self.mu);
+        self.work = Work::Merit(1);
     }
 
     /// Returns the slacks and multipliers of hop `k`.
@@ -382,10 +442,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Accepts or refuses a step, and begins the next one.
-    fn judge(&mut self, mission: &Mission) -> Poll<f32> {
-        let relays = mission.relays();
+    fn judge(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+        let relays = chain.mission.relays();
         let merit = self.target + self.mu * self.sum;
-        let whole = self.mu * levels(mission);
+        let whole = self.mu * levels(chain);
         let is_step = self.share > 0.0;
         if is_step && !(merit >= self.merit) {
             self.tries += 1;
@@ -405,9 +465,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
         let gain = merit - self.merit;
         if is_step {
-            let share = self.share;
-            for node in self.nodes.iter_mut().take(relays.into()) {
-                add_scaled(&mut node.at, node.step.map(widened), share);
+            for index in 1..=relays {
+                let spot = self.moved(chain, index);
+                self.settle(chain, index, spot.at);
             }
             self.convex = false;
         }
@@ -439,11 +499,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Keeps the multipliers close to mu / s.
     fn keep_multipliers(&mut self, relays: u16) {
         for k in 1..=relays + 1 {
-            let Weights { slack, mu, .. } = self.weights(relays, k);
+            let central = self.weights(relays, k).central();
             let resets = self.resets;
             let hop = self.hop(relays, k);
-            for (lambda, slack) in hop.lambda.iter_mut().zip(slack) {
-                let central = mu / slack;
+            for (lambda, central) in hop.lambda.iter_mut().zip(central) {
                 *lambda = upper_half(if resets {
                     central
                 } else {
@@ -454,158 +513,139 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.resets = false;
     }
 
-    fn derivatives(&mut self, relays: u16, k: u16) -> (Derivatives, Weights) {
-        let weights = self.weights(relays, k);
-        let ends = [self.at(relays, k - 1), self.at(relays, k)];
-        let hop = self
-            .gains
-            .derivatives(k, relays, ends, weights.lambda, self.convex);
-        (hop, weights)
-    }
-
-    /// Eliminates relay `index` with rows `front`, and returns its factors and the rows of the next relay.
-    fn pass(
+    /// Returns the derivatives of hop `k`, its weights, and the node at its end.
+    #[inline(never)]
+    fn derivatives(
         &mut self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
-        index: u16,
-        front: Front,
-    ) -> Option<(Factor, Front, Weights)> {
-        let relays = mission.relays();
-        let (hop, weights) = self.derivatives(relays, index + 1);
-        let factor = front.eliminate(&hop, &weights, self.damping)?;
-        if index >= relays {
-            return Some((factor, front, weights));
-        }
-        let room = room(mission, (seat_of)(index + 1));
-        let mut next = Front::start(&hop, &weights, self.at(relays, index + 1), room);
-        factor.carry(&mut next);
-        Some((factor, next, weights))
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        k: u16,
+    ) -> (Derivatives, Weights, Spot) {
+        let relays = chain.mission.relays();
+        let weights = self.weights(relays, k);
+        let (from, spot) = (self.spot(chain, k - 1), self.spot(chain, k));
+        let ends = [from.at, spot.at];
+        let hop = (self.gains).derivatives(k, relays, ends, weights.lambda, self.convex);
+        (hop, weights, spot)
     }
 
+    /// Eliminates the first `count` relays of `segment`. Returns the rows of the relay after them, and keeps the last
+    /// factors.
+    #[inline(never)]
     fn eliminate(
         &mut self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u16,
+        count: u16,
+        factors: &mut [Factor; FACTORS],
+    ) -> Option<Front> {
+        let first = segment * AT_ONCE;
+        // The first segment begins with Tx.
+        let (from, mut front) = match self.segments.get(usize::from(segment)) {
+            Some(Segment::Front(front)) if segment > 0 => (first + 1, *front),
+            _ => (0, Front::NONE),
+        };
+        for index in from..=first + count {
+            let (hop, weights, spot) = self.derivatives(chain, index + 1);
+            let (damping, sums) = (self.damping, &mut self.sums);
+            let factor = front.pass(index > 0, &hop, &weights, &spot, damping, sums)?;
+            // Tx has no factors; those of relay 1 take their place.
+            if let Some(kept) = factors.get_mut(usize::from(index + HALF - 1) % FACTORS) {
+                *kept = factor;
+            }
+        }
+        Some(front)
+    }
+
+    /// Eliminates the relays of `segment`, and then begins the next segment or the substitution.
+    fn forward(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u16,
     ) -> Option<()> {
-        let relays = mission.relays();
+        let relays = chain.mission.relays();
         if segment == 0 {
-            let (hop, weights) = self.derivatives(relays, 1);
             self.sums = Sums::NONE;
-            weights.sum(&mut self.sums);
-            let room = room(mission, (seat_of)(1));
-            *self.fronts.first_mut()? = Front::start(&hop, &weights, self.at(relays, 1), room);
         }
-        let mut front = *self.fronts.get(usize::from(segment))?;
-        let first = segment * AT_ONCE;
-        for index in first + 1..=(first + AT_ONCE).min(relays) {
-            let (factor, next, weights) = self.pass(mission, seat_of, index, front)?;
-            weights.sum(&mut self.sums);
-            factor.sum(&mut self.sums);
-            front = next;
-        }
-        self.work = if first + AT_ONCE < relays {
-            *self.fronts.get_mut(usize::from(segment) + 1)? = front;
-            Work::Eliminate(segment + 1)
+        let count = AT_ONCE.min(relays - segment * AT_ONCE);
+        let front = self.eliminate(chain, segment, count, &mut [Factor::NONE; FACTORS])?;
+        let next = segment + 1;
+        self.work = if let Some(segment) = self.segments.get_mut(usize::from(next))
+            && next * AT_ONCE < relays
+        {
+            *segment = Segment::Front(front);
+            Work::Eliminate(next)
         } else {
             self.by_target = self.sums.by_target()?;
-            (self.share, self.tries) = (1.0, 0);
-            Work::Factorise(segment)
+            (self.share, self.tries, self.ahead) = (1.0, 0, [0.0; 3]);
+            Work::Substitute((relays - 1) / HALF)
         };
         Some(())
     }
 
-    /// Computes the factors of a segment again.
-    fn factorise(
-        &mut self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
-        segment: u16,
-    ) -> Option<()> {
-        let first = segment * AT_ONCE;
-        let mut front = *self.fronts.get(usize::from(segment))?;
-        for index in first + 1..=(first + AT_ONCE).min(mission.relays()) {
-            let (factor, next, _) = self.pass(mission, seat_of, index, front)?;
-            *self.factors.get_mut(usize::from(index - first - 1))? = factor;
-            front = next;
-        }
-        self.work = Work::Substitute(segment);
-        Some(())
-    }
-
-    /// Computes the steps of a segment from its last relay to its first. `None` if one is not finite.
+    /// Computes the steps of half a segment from its last relay to its first. `None` if one is not finite.
     fn substitute(
         &mut self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
-        segment: u16,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        half: u16,
     ) -> Option<()> {
-        let relays = mission.relays();
-        let first = segment * AT_ONCE;
-        for index in (first + 1..=(first + AT_ONCE).min(relays)).rev() {
-            let ahead = self.nodes.get(usize::from(index));
-            let ahead = ahead
-                .filter(|_| index < relays)
-                .map_or([0.0; 3], |node| node.step.map(widened));
-            let k = usize::from(index - first - 1);
-            let step = self.factors.get(k)?.step(self.by_target, ahead);
+        let segment = half * HALF / AT_ONCE;
+        let (first, begin) = (segment * AT_ONCE, half * HALF);
+        let end = (begin + HALF).min(chain.mission.relays());
+        let mut factors = [Factor::NONE; FACTORS];
+        self.eliminate(chain, segment, end - first, &mut factors)?;
+        for index in (begin + 1..=end).rev() {
+            let k = usize::from(index - 1);
+            let ahead = self.ahead;
+            let step = factors.get(k % FACTORS)?.step(self.by_target, ahead);
             if !dot(step, step).is_finite() {
                 return None;
             }
-            self.limit(room(mission, (seat_of)(index)), index, step);
-            self.follow(relays, index + 1, [step, ahead]);
-            if index == 1 {
-                self.follow(relays, 1, [[0.0; 3], step]);
-            }
+            *self.steps.get_mut(k % SEGMENT)? = step.map(upper_half);
+            self.limit(&self.spot(chain, index), step);
+            self.follow(chain, index + 1, [step, ahead]);
+            self.ahead = step;
         }
-        if let Some(before) = segment.checked_sub(1) {
-            self.work = Work::Factorise(before);
+        if begin == first {
+            *self.segments.get_mut(usize::from(segment))? = Segment::Steps(self.steps);
+        }
+        if let Some(before) = half.checked_sub(1) {
+            self.work = Work::Substitute(before);
         } else {
+            self.follow(chain, 1, [[0.0; 3], self.ahead]);
             self.try_step();
         }
         Some(())
     }
 
-    /// Stores the step of relay `index`, and shortens all steps so that it stays in the box.
-    fn limit(&mut self, [low, high]: [Triple; 2], index: u16, step: Triple) {
-        let mut share = self.share;
-        if let Some(node) = self.node(index) {
-            node.step = step.map(upper_half);
-            let ends = minus(node.at, low).into_iter().zip(minus(high, node.at));
-            for (step, (below, above)) in step.into_iter().zip(ends) {
-                let room = if step < 0.0 { below } else { above };
-                if below > 0.0 && above > 0.0 && step.abs() * share > NEAR_BOX * room {
-                    share = NEAR_BOX * room / step.abs();
-                }
+    /// Shortens all steps so that the `step` from `spot` stays in the box.
+    fn limit(&mut self, spot: &Spot, step: Triple) {
+        let [below, above] = spot.spans();
+        for (step, (below, above)) in step.into_iter().zip(below.into_iter().zip(above)) {
+            let room = if step < 0.0 { below } else { above };
+            if below > 0.0 && above > 0.0 && step.abs() * self.share > NEAR_BOX * room {
+                self.share = NEAR_BOX * room / step.abs();
             }
         }
-        self.share = share;
     }
 
     /// Updates the multipliers of hop `k`, whose ends move by `steps`.
-    fn follow(&mut self, relays: u16, k: u16, [from, to]: [Triple; 2]) {
-        let (hop, weights) = self.derivatives(relays, k);
+    fn follow(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        k: u16,
+        [from, to]: [Triple; 2],
+    ) {
+        let (hop, weights, _) = self.derivatives(chain, k);
         let ([a, b], [c, d]) = (hop.by_from, hop.by_to);
         let change = [
             dot(a, from) + dot(c, to) - self.by_target,
             dot(b, from) + dot(d, to) - self.by_target,
         ];
-        self.hop(relays, k).lambda = weights.after(change).map(upper_half);
+        self.hop(chain.mission.relays(), k).lambda = weights.after(change).map(upper_half);
     }
 }
 
 /// Returns the number of levels of a chain.
-fn levels(mission: &Mission) -> f32 {
-    2.0 * f32::from(mission.relays() + 1)
-}
-
-/// Returns the lower and the upper corner of a relay's box, in units of D.
-fn room(mission: &Mission, seat: Seat) -> [Triple; 2] {
-    let unit = 1.0 / mission.config().distance_m;
-    let (lateral, band) = (seat.room.lateral, seat.room.band);
-    [
-        [0.0, lateral.least_m * unit, band.least_m * unit],
-        [1.0, lateral.most_m * unit, band.most_m * unit],
-    ]
+fn levels(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> f32 {
+    2.0 * f32::from(chain.mission.relays() + 1)
 }

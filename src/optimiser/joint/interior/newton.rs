@@ -17,12 +17,13 @@
 //! ```
 //!
 //! and the step from the last to the first: L_k' dz_k = u_k - B_(k+1)' dz_(k+1). A [`Front`] is all that the relays after k need
-//! to know of those before. It is stored for one relay in ten; the factors between are computed again on the way back.
+//! to know of those before. It is stored for one relay in ten; the factors are computed again on the way back.
 //!
 //! A pivot that is not positive means that W is not positive definite. The caller then leaves out its negative parts.
 
-use super::super::hop::{Triple, minus};
-use super::hop::{Derivatives, Square, add_product, add_scaled, dot};
+use super::super::hop::Triple;
+use super::Spot;
+use super::hop::{Derivatives, Square, Symmetric, add_product, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
 /// Smallest pivot, relative to the diagonal before the elimination.
@@ -34,7 +35,7 @@ const STIFF: f32 = 1e18;
 /// Rows of one relay, without the hop to the next relay, after the elimination of all relays before.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
-    bend: Square,
+    bend: Symmetric,
     slope: Triple,
     column: Triple,
     /// Amount that the elimination has subtracted from the diagonal.
@@ -56,9 +57,9 @@ pub(super) struct Factor {
 /// Sums that give dT.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
-    pub(super) sigma: f32,
-    pub(super) slope: f32,
-    pub(super) column: f32,
+    sigma: f32,
+    slope: f32,
+    column: f32,
 }
 
 /// Multipliers of both levels of a hop, and their slacks.
@@ -70,10 +71,15 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns lambda / s and mu / s of both levels.
-    fn ratios(&self) -> [(f32, f32); 2] {
+    /// Returns lambda / s of both levels.
+    fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
-        [(a / s, self.mu / s), (b / t, self.mu / t)]
+        [a / s, b / t]
+    }
+
+    /// Returns mu / s of both levels.
+    pub(super) fn central(&self) -> [f32; 2] {
+        self.slack.map(|slack| self.mu / slack)
     }
 
     /// Returns the multipliers after a step that changes the slacks by `change`.
@@ -85,45 +91,65 @@ impl Weights {
 
 impl Front {
     pub(super) const NONE: Self = Self {
-        bend: [[0.0; 3]; 3],
+        bend: [0.0; 6],
         slope: [0.0; 3],
         column: [0.0; 3],
         taken: [0.0; 3],
     };
 
-    /// Returns the rows of a relay at `at` in a box, after the hop to it.
-    pub(super) fn start(
+    /// Eliminates a relay with these rows, and makes them those of the next node, which is at `spot`.
+    ///
+    /// `hop` leads to that node. `damping` is a relative increase of the diagonal. Without a relay before the hop, its
+    /// factors are 0. `None` if a pivot is not positive.
+    pub(super) fn pass(
+        &mut self,
+        is_relay: bool,
         hop: &Derivatives,
         weights: &Weights,
-        at: Triple,
-        room: [Triple; 2],
-    ) -> Self {
-        let mut front = Self {
+        spot: &Spot,
+        damping: f32,
+        sums: &mut Sums,
+    ) -> Option<Factor> {
+        let ratios = weights.ratios();
+        let factor = if is_relay {
+            self.eliminate(hop, weights, ratios, damping)?
+        } else {
+            Factor::NONE
+        };
+        let [a, b] = ratios;
+        sums.sigma += a + b;
+        sums.slope += dot(factor.slope, factor.column);
+        sums.column += dot(factor.column, factor.column);
+        *self = Self {
             bend: hop.bend_to,
             ..Self::NONE
         };
-        front.add(hop.by_to, weights);
-        front.enclose(weights.mu, at, room);
-        front
+        self.add(hop.by_to, weights, ratios);
+        self.enclose(weights.mu, spot);
+        factor.carry(self);
+        Some(factor)
     }
 
-    fn add(&mut self, slopes: [Triple; 2], weights: &Weights) {
-        for (slope, (ratio, pull)) in slopes.into_iter().zip(weights.ratios()) {
-            add_product(&mut self.bend, slope, slope, ratio);
+    #[inline(never)]
+    fn add(&mut self, slopes: [Triple; 2], weights: &Weights, ratios: [f32; 2]) {
+        let pulls = weights.central();
+        for ((slope, pull), ratio) in slopes.into_iter().zip(pulls).zip(ratios) {
+            add_square(&mut self.bend, slope, ratio);
             add_scaled(&mut self.slope, slope, pull);
             add_scaled(&mut self.column, slope, ratio);
         }
     }
 
     /// Adds the barrier of the box.
-    fn enclose(&mut self, mu: f32, at: Triple, [low, high]: [Triple; 2]) {
-        let (below, above) = (minus(at, low), minus(high, at));
-        let [[xx, ..], [_, yy, _], [.., hh]] = &mut self.bend;
+    fn enclose(&mut self, mu: f32, spot: &Spot) {
+        let [below, above] = spot.spans();
+        let [xx, _, _, yy, _, hh] = &mut self.bend;
         let cells = [xx, yy, hh].into_iter().zip(&mut self.slope);
         for ((bend, slope), (a, b)) in cells.zip(below.into_iter().zip(above)) {
             if a > 0.0 && b > 0.0 {
-                *slope += mu * (1.0 / a - 1.0 / b);
-                *bend += mu * (1.0 / (a * a) + 1.0 / (b * b));
+                let (a, b) = (1.0 / a, 1.0 / b);
+                *slope += mu * (a - b);
+                *bend += mu * (a * a + b * b);
             } else {
                 *bend += STIFF;
             }
@@ -131,23 +157,21 @@ impl Front {
     }
 
     /// Adds the hop to the next relay, and eliminates this relay. `None` if a pivot is not positive.
-    ///
-    /// Returns the factors, and the part of the next relay's rows that depends on this relay. `damping` is a relative increase of
-    /// the diagonal.
-    pub(super) fn eliminate(
-        mut self,
+    fn eliminate(
+        &mut self,
         hop: &Derivatives,
         weights: &Weights,
+        ratios: [f32; 2],
         damping: f32,
     ) -> Option<Factor> {
-        for (row, more) in self.bend.iter_mut().zip(hop.bend_from) {
-            add_scaled(row, more, 1.0);
+        for (cell, more) in self.bend.iter_mut().zip(hop.bend_from) {
+            *cell += more;
         }
-        self.add(hop.by_from, weights);
+        self.add(hop.by_from, weights, ratios);
         let lower = self.cholesky(damping)?;
-        let mut mixed = hop.between;
-        for ((to, from), (ratio, _)) in hop.by_to.into_iter().zip(hop.by_from).zip(weights.ratios())
-        {
+        let [xx, xy, xh, yy, yh, hh] = hop.bend.map(|cell| -cell);
+        let mut mixed = [[xx, xy, xh], [xy, yy, yh], [xh, yh, hh]];
+        for ((to, from), ratio) in hop.by_to.into_iter().zip(hop.by_from).zip(ratios) {
             add_product(&mut mixed, to, from, ratio);
         }
         Some(Factor {
@@ -159,7 +183,7 @@ impl Front {
     }
 
     fn cholesky(&self, damping: f32) -> Option<[f32; 6]> {
-        let [[xx, ..], [xy, yy, _], [xh, yh, hh]] = self.bend;
+        let [xx, xy, xh, yy, yh, hh] = self.bend;
         let [x, y, h] = self.taken;
         let root = |rest: f32, taken: f32| {
             let whole = rest + taken;
@@ -177,6 +201,7 @@ impl Front {
 }
 
 /// Returns L^-1 v.
+#[inline(never)]
 fn forward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
     let x = x * a;
     let y = (y - b * x) * d;
@@ -199,22 +224,19 @@ impl Factor {
     };
 
     /// Subtracts this relay's part from the `front` of the next relay.
-    pub(super) fn carry(&self, front: &mut Front) {
+    fn carry(&self, front: &mut Front) {
         let [a, b, c] = self.next;
-        for (row, of) in front.bend.iter_mut().zip(self.next) {
-            add_scaled(row, [dot(of, a), dot(of, b), dot(of, c)], -1.0);
+
+        front.taken = [dot(a, a), dot(b, b), dot(c, c)];
+        let [x, y, h] = front.taken;
+        let parts = [x, dot(a, b), dot(a, c), y, dot(b, c), h];
+        for (cell, part) in front.bend.iter_mut().zip(parts) {
+            *cell -= part;
         }
-        front.taken = self.next.map(|row| dot(row, row));
         for ((slope, column), row) in front.slope.iter_mut().zip(&mut front.column).zip(self.next) {
             *slope -= dot(row, self.slope);
             *column -= dot(row, self.column);
         }
-    }
-
-    /// Adds this relay to the sums.
-    pub(super) fn sum(&self, sums: &mut Sums) {
-        sums.slope += dot(self.slope, self.column);
-        sums.column += dot(self.column, self.column);
     }
 
     /// Returns the relay's step, for `by_target` dT and the step of the next relay.
@@ -225,14 +247,6 @@ impl Factor {
             add_scaled(&mut known, row, -moved);
         }
         backward(self.lower, known)
-    }
-}
-
-impl Weights {
-    /// Adds sigma to the sums.
-    pub(super) fn sum(&self, sums: &mut Sums) {
-        let [(a, _), (b, _)] = self.ratios();
-        sums.sigma += a + b;
     }
 }
 

@@ -10,21 +10,18 @@
 //! optimum. They are given from the end with more power on, whose signal may pass the interferer in one hop; relays away from the
 //! interferer or high are mostly better than relays close to it, since the method finds its way down but not around.
 
-use super::Solver;
 use super::chain::{Seat, SolverContext};
 use super::judge::JUDGED;
+use super::passes::end_after;
 use crate::mission::Interferer;
 use crate::optimiser::joint::interior::Interior;
-use crate::optimiser::joint::site::{Cell, Room};
+use crate::optimiser::joint::site::{Cell, Cells, Room};
 use crate::optimiser::joint::starts::Seek;
 use crate::optimiser::pass::{Behind, Link};
 use crate::optimiser::search::Infeasible;
 use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
 use core::task::Poll;
-
-/// Elements of state that exist with the feature `reverse` only.
-pub(super) const BOTH: usize = if cfg!(feature = "reverse") { 1 } else { 0 };
 
 /// Relays of one portion of Algorithm 1.
 const LINE: u16 = 2;
@@ -108,6 +105,7 @@ enum Purpose {
     Last,
 }
 
+#[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
     Begin,
@@ -138,64 +136,44 @@ impl Pass {
     };
 }
 
-/// Workspace of the joint method with a way back; empty without the feature `reverse`.
-///
-/// It is not part of a [`Solver`], which is built on the stack when a relay starts to solve.
-#[derive(Clone, Debug)]
-pub struct Workspace<const RELAYS: usize, const SEGMENTS: usize> {
-    pub(super) both: [Both<RELAYS, SEGMENTS>; BOTH],
-}
-
-impl<const RELAYS: usize, const SEGMENTS: usize> Workspace<RELAYS, SEGMENTS> {
-    /// Creates a workspace; a solver resets it.
-    pub const fn new() -> Self {
-        Self {
-            both: [const { Both::NEW }; BOTH],
-        }
-    }
-}
-
-impl<const RELAYS: usize, const SEGMENTS: usize> Default for Workspace<RELAYS, SEGMENTS> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// State of the joint method with a way back.
+/// Solver of a chain with a way back.
 #[derive(Clone, Debug)]
 pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
-    interior: Interior<RELAYS, SEGMENTS>,
+    pub(super) interior: Interior<RELAYS, SEGMENTS>,
+    /// Best target found, in ln(SIR), and its lateral offsets and altitudes.
+    best: Option<f32>,
+    best_cells: Cells<RELAYS>,
     work: Work,
     pass: Pass,
-    /// Result of the interior-point method, in ln gamma, and number of its repetitions from this start.
+    /// Result of the interior-point method, in ln(SIR), and number of its repetitions from this start.
     reached: f32,
     again: u8,
+    /// Number of the current start; 0 is the common altitude.
+    number: u8,
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
-    const NEW: Self = Self {
+    /// State before the first portion. All its bytes are 0, so it takes no flash.
+    pub(super) const NEW: Self = Self {
         interior: Interior::NEW,
+        best: None,
+        best_cells: Cells::NEW,
         work: Work::Begin,
         pass: Pass::NONE,
         reached: 0.0,
         again: 0,
+        number: 0,
     };
-}
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Processes one portion for both directions. It is two relays of Algorithm 1, ten of a step, or twenty of a merit.
-    pub(super) fn step_both_ways(
+    /// Processes one portion. It is two relays of Algorithm 1, ten of a step, or twenty of a merit.
+    pub(super) fn step(
         &mut self,
-        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
     ) -> Poll<Result<f32, Infeasible>> {
-        if core::mem::replace(&mut self.is_new, false) {
-            (both.work, both.pass, both.again) = (Work::Begin, Pass::NONE, 0);
-        }
-        let next = match both.work {
-            Work::Begin => self.begin_start(both, chain),
+        let next = match self.work {
+            Work::Begin => self.begin_start(chain),
             Work::Seek(mut seek, purpose) => {
-                let Poll::Ready(met) = self.line(both, chain, seek.sigma) else {
+                let Poll::Ready(met) = self.line(chain, seek.sigma) else {
                     return Poll::Pending;
                 };
                 if seek.tried(met.map(|()| true)) {
@@ -205,29 +183,25 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                         (Some((sigma, _)), Purpose::Last) => {
                             return Poll::Ready(Ok(libm::expf(sigma)));
                         }
-                        (Some((sigma, _)), _) => self.found(both, sigma, purpose),
-                        (None, _) => self.next_start(both),
+                        (Some((sigma, _)), _) => self.found(sigma, purpose),
+                        (None, _) => self.next_start(),
                     }
                 }
             }
             Work::Settle(sigma) => {
-                let Poll::Ready(met) = self.line(both, chain, sigma) else {
+                let Poll::Ready(met) = self.line(chain, sigma) else {
                     return Poll::Pending;
                 };
                 match met {
-                    Some(()) => self.begin_interior(both, chain, None),
-                    None => self.next_start(both),
+                    Some(()) => self.begin_interior(chain, None),
+                    None => self.next_start(),
                 }
             }
             Work::Interior => {
-                let Poll::Ready(sigma) = both.interior.step(chain.mission, chain.seat_of) else {
+                let Poll::Ready(sigma) = self.interior.step(chain) else {
                     return Poll::Pending;
                 };
-                both.reached = sigma;
-                for index in 1..=chain.mission.relays() {
-                    let at = both.interior.cross_section(chain.mission, index);
-                    self.keep(index, 0.0, Cell::of(at, (chain.seat_of)(index).room));
-                }
+                self.reached = sigma;
                 Work::Seek(
                     Seek::down(sigma + ABOVE, ABOVE, 3.0, JUDGED),
                     Purpose::Result,
@@ -240,27 +214,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         {
             return Poll::Ready(Err(Infeasible));
         }
-        both.work = next;
+        self.work = next;
         Poll::Pending
     }
 
-    fn next_start(&mut self, both: &mut Both<RELAYS, SEGMENTS>) -> Work {
+    fn next_start(&mut self) -> Work {
         self.number += 1;
-        both.again = 0;
+        self.again = 0;
         Work::Begin
     }
 
     /// Begins the next start, or the last search after all of them.
-    fn begin_start(
-        &mut self,
-        both: &mut Both<RELAYS, SEGMENTS>,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Work {
+    fn begin_start(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Work {
         // Number 0 is the common altitude.
         let start = usize::from(self.number).saturating_sub(1);
         let Some(&start) = STARTS.get(start) else {
-            self.cells = self.best_cells;
-            let sigma = self.best.map_or(0.0, |(best, _)| best);
+            self.interior.cells = self.best_cells;
+            let sigma = self.best.unwrap_or_default();
             return Work::Seek(Seek::up(sigma, true, 1e-5, 1e-6), Purpose::Last);
         };
         let config = chain.mission.config();
@@ -278,13 +248,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             } else {
                 room.nearest(config.common.on_line().cross_section)
             };
-            self.keep(index, 0.0, Cell::of(at, room));
+            self.interior.cells.set(index, Cell::of(at, room));
         }
         match start.even {
             Some([first, last]) if is_turned(chain) => {
-                self.begin_interior(both, chain, Some([1.0 - last, 1.0 - first]))
+                self.begin_interior(chain, Some([1.0 - last, 1.0 - first]))
             }
-            Some(ends) => self.begin_interior(both, chain, Some(ends)),
+            Some(ends) => self.begin_interior(chain, Some(ends)),
             None => {
                 // The common altitude is compared, so its target is as exact as those of results.
                 let width = if self.number > 0 { 0.02 } else { JUDGED };
@@ -295,93 +265,92 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Keeps the current positions if they are the best, and returns the next step of the work. If Algorithm 1 has
     /// found new positions, that is the interior-point method from there.
-    fn found(&mut self, both: &mut Both<RELAYS, SEGMENTS>, sigma: f32, purpose: Purpose) -> Work {
-        if self.best.is_none_or(|(best, _)| sigma > best) {
-            self.best = Some((sigma, self.number));
-            self.best_cells = self.cells;
+    fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
+        if self.best.is_none_or(|best| sigma > best) {
+            self.best = Some(sigma);
+            self.best_cells = self.interior.cells;
         }
         let is_new = match purpose {
             Purpose::Start => self.number > 0,
-            Purpose::Result => sigma > both.reached + NEW && both.again < AGAIN,
+            Purpose::Result => sigma > self.reached + NEW && self.again < AGAIN,
             Purpose::Last => false,
         };
         if is_new {
-            both.again += 1;
+            self.again += 1;
             Work::Settle(sigma)
         } else {
-            self.next_start(both)
+            self.next_start()
         }
     }
 
     /// Starts the interior-point method at the cells, with x of a pass or between `even` ends.
     fn begin_interior(
         &mut self,
-        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         even: Option<[f32; 2]>,
     ) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.mission.relays();
-        let is_again = both.again > 1;
+        let is_again = self.again > 1;
         let [far, close] = OFF;
         let off = if is_again { close } else { far };
         for index in 1..=relays {
-            let seat = (chain.seat_of)(index);
-            let place: Placement = self.at(index, seat).at(0.0);
+            let room = (chain.seat_of)(index).room;
+            let place = self.interior.cells.get(index).place(room).at(0.0);
             let share = f32::from(index) / f32::from(relays + 1);
             let x_m = if let Some([first, last]) = even {
                 (first + share * (last - first)) * distance_m
             } else {
-                let [x_m, _] = both.interior.noted(index);
+                let [x_m, _] = self.interior.noted(index);
                 x_m + off * (share * distance_m - x_m)
             };
-            both.interior
-                .put(chain.mission, seat, index, Placement { x_m, ..place }, off);
+            self.interior
+                .put(chain, index, Placement { x_m, ..place }, off);
         }
-        both.interior
-            .start(chain.mission, chain.interferer, is_again);
+        self.interior.start(chain, is_again);
         Work::Interior
     }
 
     /// Continues Algorithm 1 for `sigma`. Ready with `Some` if all relays have positions; their x is noted.
     fn line(
         &mut self,
-        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         sigma: f32,
     ) -> Poll<Option<()>> {
-        let mut pass = both.pass;
+        let mut pass = self.pass;
         let target = libm::expf(sigma);
         if pass.index == 0 && !pass.is_back {
-            pass.end_m = self.end_m(chain.mission, chain.seat_of, 0);
+            pass.end_m = self.interior.cells.end_m(chain.mission, chain.seat_of, 0);
         }
         for _ in 0..LINE {
             let met = if pass.is_back {
-                self.line_back(both, chain, target, &mut pass)
+                self.line_back(chain, target, &mut pass)
             } else {
-                self.line_there(both, chain, target, &mut pass)
+                self.line_there(chain, target, &mut pass)
             };
             let over = pass.is_back && pass.index == 0;
             if over || met.is_none() {
-                both.pass = Pass::NONE;
+                self.pass = Pass::NONE;
                 return Poll::Ready(met);
             }
         }
-        both.pass = pass;
+        self.pass = pass;
         Poll::Pending
     }
 
     /// Computes the reach of the next relay.
     fn line_there(
         &mut self,
-        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         target: f32,
         pass: &mut Pass,
     ) -> Option<()> {
         let index = pass.index + 1;
-        let step = self.least_step(chain.mission, chain.seat_of, index);
-        pass.end_m = Self::end_after(chain.mission, pass.end_m, step);
+        let step = self
+            .interior
+            .cells
+            .least_step(chain.mission, chain.seat_of, index);
+        pass.end_m = end_after(chain.mission, pass.end_m, step);
         let link = self.line_link(chain, index, pass.end_m);
         let mut x_m = link.reach(target, pass.x_m)?;
         if index >= chain.mission.relays() {
@@ -392,7 +361,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             x_m = place;
             pass.is_back = true;
         }
-        both.interior.note(index, [x_m, pass.end_m]);
+        self.interior.note(index, [x_m, pass.end_m]);
         (pass.index, pass.x_m) = (index, x_m);
         Some(())
     }
@@ -400,21 +369,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Computes the position of the relay before the current one, which is at `pass.x_m`.
     fn line_back(
         &mut self,
-        both: &mut Both<RELAYS, SEGMENTS>,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         target: f32,
         pass: &mut Pass,
     ) -> Option<()> {
-        let [_, end_m] = both.interior.noted(pass.index);
+        let [_, end_m] = self.interior.noted(pass.index);
         let before = pass.index.saturating_sub(1);
-        let [reach, before_m] = both.interior.noted(before);
+        let [reach, before_m] = self.interior.noted(before);
         let link = self.line_link(chain, pass.index, end_m);
         pass.x_m = match link.required_position(target, reach, pass.x_m)? {
             RequiredPosition::AtReach => reach,
             RequiredPosition::At(x_m) => x_m,
         };
         pass.index = before;
-        both.interior.note(before, [pass.x_m, before_m]);
+        self.interior.note(before, [pass.x_m, before_m]);
         Some(())
     }
 
@@ -428,7 +396,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let station = |index: u16| {
             let seat = (chain.seat_of)(index);
             Station {
-                cross_section: self.at(index, seat),
+                cross_section: self.interior.cells.get(index).place(seat.room),
                 power_w: seat.power_w,
             }
         };

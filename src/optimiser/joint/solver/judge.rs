@@ -4,7 +4,7 @@
 //! tries another position, where the derivatives show no gain.
 
 use super::chain::{Seat, SolverContext, far_off, last_of};
-use super::{Purpose, Solver, Work};
+use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};
@@ -23,7 +23,7 @@ pub(super) const CEILING: f32 = 5e-5;
 /// Distance by which an ascent's first target limit is above the chain's upper bound, in ln(SIR).
 const PROBED: f32 = 3e-4;
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     pub(super) fn seek(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -258,7 +258,7 @@ pub(super) const GAIN: f32 = 2e-5;
 /// Maximum number of accepted trial moves in the final polish of a chain; it then ends.
 const MOVES: u8 = 200;
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Returns the current trial move of the polish: relay, kind of move, and number of halvings. Kinds 0 to 3 are
     /// down, up, left and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
@@ -284,7 +284,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             return Poll::Ready(Ok(libm::expf(sigma)));
         }
         let room = (chain.seat_of)(index).room;
-        self.kept = self.cell(index);
+        self.kept = self.cells.get(index);
         let part = FIRST_MOVE
             * libm::ldexpf(1.0, -i32::from(halved))
             * if way % 2 > 0 { 1.0 } else { -1.0 };
@@ -305,7 +305,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 self.moving += 1;
                 return Poll::Pending;
             }
-            moved = Cell::of(self.cell(other).place((chain.seat_of)(other).room), room);
+            moved = Cell::of(
+                self.cells.get(other).place((chain.seat_of)(other).room),
+                room,
+            );
         }
         if moved == self.kept {
             self.moving += 1;
@@ -317,7 +320,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Begins the ascent from the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
@@ -400,7 +403,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         purpose: Purpose,
     ) -> CrossSection {
         if purpose != Purpose::Start {
-            return self.cell(index).place(room);
+            return self.cells.get(index).place(room);
         }
         let wanted = match self.start {
             Start::Far => {
