@@ -57,33 +57,22 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
 /// Measures the instructions of the joint method's solver alone, without messages between relays.
 #[inline(never)]
 pub(crate) fn joint() {
-    let (total, longest_call, calls) = solve_instructions(&HIGH, 8);
-    hprintln!("solved_8 {}", total);
-    hprintln!("portion_8 {}", longest_call);
-    hprintln!("portions_8 {}", calls);
-    let (total, longest_call, calls) = solve_instructions(&HIGH, 50);
-    hprintln!("solved_50 {}", total);
-    hprintln!("portion_50 {}", longest_call);
-    hprintln!("portions_50 {}", calls);
-    let (total, longest_call, calls) = solve_instructions(&WIDE, 50);
-    hprintln!("solved_50_wide {}", total);
-    hprintln!("portion_50_wide {}", longest_call);
-    hprintln!("portions_50_wide {}", calls);
-    let (all, most, portions) = solve_instructions(&HIGH, 20);
-    hprintln!("solved_20 {}", all);
-    hprintln!("portion_20 {}", most);
-    hprintln!("portions_20 {}", portions);
-    let (all, most, portions) = solve_instructions(&BOTH, 8);
-    hprintln!("solved_8_both {}", all);
-    hprintln!("portion_8_both {}", most);
-    hprintln!("portions_8_both {}", portions);
-    let (all, most, portions) = solve_instructions(&BOTH, 20);
-    hprintln!("solved_20_both {}", all);
-    hprintln!("portion_20_both {}", most);
-    hprintln!("portions_20_both {}", portions);
-    let (all, most, portions) = solve_instructions(&BOTH, 50);
-    hprintln!("solved_50_both {}", all);
-    hprintln!("portion_50_both {}", most);
-    hprintln!("portions_50_both {}", portions);
+    for (of, relays, suffix) in [
+        (&HIGH, 8, ""),
+        (&HIGH, 20, ""),
+        (&HIGH, 50, ""),
+        (&WIDE, 50, "_wide"),
+        (&HIGH, 100, ""),
+        (&BOTH, 5, "_both"),
+        (&BOTH, 8, "_both"),
+        (&BOTH, 20, "_both"),
+        (&BOTH, 50, "_both"),
+        (&BOTH, 100, "_both"),
+    ] {
+        let (total, longest_call, calls) = solve_instructions(of, relays);
+        hprintln!("solved_{}{} {}", relays, suffix, total);
+        hprintln!("portion_{}{} {}", relays, suffix, longest_call);
+        hprintln!("portions_{}{} {}", relays, suffix, calls);
+    }
     hprintln!("size_of_solver {}", size_of::<Solver<100, 10>>());
 }

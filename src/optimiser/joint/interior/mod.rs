@@ -60,15 +60,16 @@ const APART: f32 = 5.0;
 const ATTEMPTS: u8 = 6;
 const DAMPING: f32 = 1e-5;
 
-/// Steps of T, and the relative error of the sum at which they end.
+/// Steps of T in a portion and altogether, and the relative error of the sum at which they end.
+const STEPS: u8 = 4;
 const TARGETS: u8 = 12;
 const EXACT: f32 = 5e-4;
 
-/// Relays of a segment, and of half of it.
+/// Relays of a segment, of its first part, and of the second one.
 const AT_ONCE: u16 = 10;
-const SEGMENT: usize = 10;
-const HALF: u16 = 5;
-const FACTORS: usize = 5;
+const FIRST: usize = 6;
+const SECOND: usize = 4;
+const FIRST_RELAYS: u16 = 6;
 
 /// Levels of a hop, and their multipliers with three digits.
 #[derive(Clone, Copy, Debug)]
@@ -91,14 +92,15 @@ struct Node {
     hop: Hop,
 }
 
-/// Steps of a segment's relays, with three digits.
-type Steps = [[u16; 3]; SEGMENT];
+/// Step of a relay, with three digits.
+type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
 enum Segment {
     /// Rows of the segment's first relay.
     Front(Front),
-    Steps(Steps),
+    /// Steps of its relays.
+    Steps([Step; FIRST], [Step; SECOND]),
 }
 
 /// Position of a node, and the corners of its box.
@@ -137,14 +139,16 @@ impl Spot {
 enum Work {
     /// Levels of this hop and the next ones, after a fraction of the step.
     Levels(u16),
-    /// T of these levels.
-    Target,
+    /// T of these levels, after some steps.
+    Target(u8),
     /// Merit, from this hop on.
     Merit(u16),
+    /// Positions and multipliers, from this hop on.
+    Accept(u16),
     /// Elimination of a segment.
     Eliminate(u16),
-    /// Factors of half a segment, and then its steps.
-    Substitute(u16),
+    /// Factors of one part of a segment, and then its steps. `true` for the second part.
+    Substitute(u16, bool),
 }
 
 /// Relays, whose positions are the variables, and the current step.
@@ -156,8 +160,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Steps of the segment that is substituted, and that of the relay after the current one.
-    steps: Steps,
+    /// Steps of the second part of the segment that is substituted, and that of the relay after the current one.
+    second: [Step; SECOND],
     ahead: Triple,
     work: Work,
     mu: f32,
@@ -189,7 +193,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }; RELAYS],
         last: Hop::NONE,
         segments: [Segment::Front(Front::NONE); SEGMENTS],
-        steps: [[0; 3]; SEGMENT],
+        second: [[0; 3]; SECOND],
         ahead: [0.0; 3],
         work: Work::Levels(0),
         mu: 0.0,
@@ -295,12 +299,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Returns the step of relay `index`.
     fn step_of(&self, index: u16) -> Triple {
         let at = usize::from(index).wrapping_sub(1);
-        match self.segments.get(at / SEGMENT) {
-            Some(Segment::Steps(steps)) => steps
-                .get(at % SEGMENT)
-                .map_or([0.0; 3], |step| step.map(widened)),
-            _ => [0.0; 3],
-        }
+        let (segment, k) = (at / (FIRST + SECOND), at % (FIRST + SECOND));
+        let step = match self.segments.get(segment) {
+            Some(Segment::Steps(first, second)) => {
+                first.get(k).or_else(|| second.get(k.wrapping_sub(FIRST)))
+            }
+            _ => None,
+        };
+        step.map_or([0.0; 3], |step| step.map(widened))
     }
 
     /// Returns the position of node `index` after the fraction of its step.
@@ -344,8 +350,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                 self.levels(chain, k);
                 Some(())
             }
-            Work::Target => {
-                self.approach(relays);
+            Work::Target(steps) => {
+                self.approach(relays, steps);
                 Some(())
             }
             Work::Merit(k) => {
@@ -361,6 +367,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                 }
                 Some(())
             }
+            Work::Accept(k) => {
+                let end = k.saturating_add(2 * AT_ONCE).min(relays + 2);
+                for k in k..end {
+                    self.accept(chain, k);
+                }
+                self.work = Work::Accept(end);
+                if end > relays + 1 {
+                    return self.continue_with(chain);
+                }
+                Some(())
+            }
             Work::Eliminate(segment) => self.forward(chain, segment).or_else(|| {
                 self.attempts += 1;
                 if self.convex {
@@ -370,7 +387,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                 self.work = Work::Eliminate(0);
                 (self.attempts < ATTEMPTS).then_some(())
             }),
-            Work::Substitute(half) => self.substitute(chain, half),
+            Work::Substitute(segment, is_second) => self.substitute(chain, segment, is_second),
         };
         match done {
             Some(()) => Poll::Pending,
@@ -399,7 +416,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             (from, quiet) = (to, ahead);
         }
         self.work = if end > relays + 1 {
-            Work::Target
+            self.target = self.least - self.mu;
+            Work::Target(0)
         } else {
             Work::Levels(end)
         };
@@ -408,9 +426,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Computes T from its equation, by Newton's method for the inverse of the sum.
     ///
     /// That inverse is concave, and T starts beyond the solution, so T falls to it.
-    fn approach(&mut self, relays: u16) {
-        self.target = self.least - self.mu;
-        for _ in 0..TARGETS {
+    fn approach(&mut self, relays: u16, steps: u8) {
+        let end = steps + STEPS;
+        self.work = Work::Target(end);
+        for step in steps..end {
             let (mut sum, mut slope) = (0.0, 0.0);
             for k in 1..=relays + 1 {
                 let target = self.target;
@@ -422,12 +441,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             }
             let (sum, slope) = (self.mu * sum, self.mu * slope);
             self.target -= (sum * sum - sum) / slope;
-            if sum <= 1.0 + EXACT {
-                break;
+            if sum <= 1.0 + EXACT || step >= TARGETS {
+                self.target = self.target.min(self.least - 0.5 * self.mu);
+                self.work = Work::Merit(1);
+                return;
             }
         }
-        self.target = self.target.min(self.least - 0.5 * self.mu);
-        self.work = Work::Merit(1);
     }
 
     /// Returns the slacks and multipliers of hop `k`.
@@ -441,39 +460,61 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts or refuses a step, and begins the next one.
+    /// Accepts or refuses a step.
     fn judge(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
-        let relays = chain.mission.relays();
-        let merit = self.target + self.mu * self.sum;
-        let whole = self.mu * levels(chain);
-        let is_step = self.share > 0.0;
-        if is_step && !(merit >= self.merit) {
-            self.tries += 1;
-            self.share *= SHORTER;
-            if self.tries < TRIES {
-                self.try_step();
-                return Poll::Pending;
-            }
-            // No step is better: once more without negative curvature, then with a smaller mu.
-            let was_convex = self.convex;
-            self.convex = true;
-            if was_convex {
-                return self.lower(whole, true);
-            }
-            self.look(true);
+        if !(self.share > 0.0) || self.summed() >= self.merit {
+            self.work = Work::Accept(1);
             return Poll::Pending;
         }
-        let gain = merit - self.merit;
-        if is_step {
-            for index in 1..=relays {
-                let spot = self.moved(chain, index);
-                self.settle(chain, index, spot.at);
-            }
-            self.convex = false;
+        self.tries += 1;
+        self.share *= SHORTER;
+        if self.tries < TRIES {
+            self.try_step();
+            return Poll::Pending;
         }
-        self.keep_multipliers(relays);
-        if is_step && (self.share > 0.5 && gain < SETTLED * whole || gain < STUCK * whole) {
-            return self.lower(whole, false);
+        // No step is better: once more without negative curvature, then with a smaller mu.
+        let was_convex = self.convex;
+        self.convex = true;
+        if was_convex {
+            return self.lower(chain, true);
+        }
+        self.look(true);
+        Poll::Pending
+    }
+
+    /// Returns the merit that was summed.
+    fn summed(&self) -> f32 {
+        self.target + self.mu * self.sum
+    }
+
+    /// Stores the new position of relay `k`, and keeps the multipliers of the hop to it close to mu / s.
+    fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
+        let relays = chain.mission.relays();
+        if self.share > 0.0 && k <= relays {
+            let spot = self.moved(chain, k);
+            self.settle(chain, k, spot.at);
+        }
+        let central = self.weights(relays, k).central();
+        let resets = self.resets;
+        let hop = self.hop(relays, k);
+        for (lambda, central) in hop.lambda.iter_mut().zip(central) {
+            *lambda = upper_half(if resets {
+                central
+            } else {
+                widened(*lambda).max(central / APART).min(central * APART)
+            });
+        }
+    }
+
+    /// Begins the next step from the accepted positions, or lowers mu.
+    fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+        let merit = self.summed();
+        let gain = (merit - self.merit) / (self.mu * levels(chain));
+        let is_step = self.share > 0.0;
+        self.convex &= !is_step;
+        self.resets = false;
+        if is_step && (self.share > 0.5 && gain < SETTLED || gain < STUCK) {
+            return self.lower(chain, false);
         }
         self.merit = merit;
         if self.iterations >= ITERATIONS {
@@ -486,7 +527,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Lowers mu, or ends. `resets` is for multipliers that no step was found with.
-    fn lower(&mut self, whole: f32, resets: bool) -> Poll<f32> {
+    fn lower(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        resets: bool,
+    ) -> Poll<f32> {
+        let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
             return Poll::Ready(self.target);
         }
@@ -496,36 +542,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Keeps the multipliers close to mu / s.
-    fn keep_multipliers(&mut self, relays: u16) {
-        for k in 1..=relays + 1 {
-            let central = self.weights(relays, k).central();
-            let resets = self.resets;
-            let hop = self.hop(relays, k);
-            for (lambda, central) in hop.lambda.iter_mut().zip(central) {
-                *lambda = upper_half(if resets {
-                    central
-                } else {
-                    widened(*lambda).max(central / APART).min(central * APART)
-                });
-            }
-        }
-        self.resets = false;
-    }
-
-    /// Returns the derivatives of hop `k`, its weights, and the node at its end.
+    /// Returns the derivatives and weights of hop `k` between `ends`.
     #[inline(never)]
-    fn derivatives(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        k: u16,
-    ) -> (Derivatives, Weights, Spot) {
-        let relays = chain.mission.relays();
+    fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
-        let (from, spot) = (self.spot(chain, k - 1), self.spot(chain, k));
-        let ends = [from.at, spot.at];
         let hop = (self.gains).derivatives(k, relays, ends, weights.lambda, self.convex);
-        (hop, weights, spot)
+        (hop, weights)
     }
 
     /// Eliminates the first `count` relays of `segment`. Returns the rows of the relay after them, and keeps the last
@@ -536,7 +558,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         segment: u16,
         count: u16,
-        factors: &mut [Factor; FACTORS],
+        factors: &mut [Factor; FIRST],
     ) -> Option<Front> {
         let first = segment * AT_ONCE;
         // The first segment begins with Tx.
@@ -544,12 +566,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             Some(Segment::Front(front)) if segment > 0 => (first + 1, *front),
             _ => (0, Front::NONE),
         };
+        let relays = chain.mission.relays();
+        let mut at = self.spot(chain, from).at;
         for index in from..=first + count {
-            let (hop, weights, spot) = self.derivatives(chain, index + 1);
+            let spot = self.spot(chain, index + 1);
+            let (hop, weights) = self.derivatives(relays, index + 1, [at, spot.at]);
+            at = spot.at;
             let (damping, sums) = (self.damping, &mut self.sums);
             let factor = front.pass(index > 0, &hop, &weights, &spot, damping, sums)?;
-            // Tx has no factors; those of relay 1 take their place.
-            if let Some(kept) = factors.get_mut(usize::from(index + HALF - 1) % FACTORS) {
+            // Tx has no factors, which are kept nowhere.
+            let k = usize::from(index.wrapping_sub(first + 1)) % FIRST;
+            if let Some(kept) = factors.get_mut(k) {
                 *kept = factor;
             }
         }
@@ -567,7 +594,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             self.sums = Sums::NONE;
         }
         let count = AT_ONCE.min(relays - segment * AT_ONCE);
-        let front = self.eliminate(chain, segment, count, &mut [Factor::NONE; FACTORS])?;
+        let front = self.eliminate(chain, segment, count, &mut [Factor::NONE; FIRST])?;
         let next = segment + 1;
         self.work = if let Some(segment) = self.segments.get_mut(usize::from(next))
             && next * AT_ONCE < relays
@@ -577,41 +604,56 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         } else {
             self.by_target = self.sums.by_target()?;
             (self.share, self.tries, self.ahead) = (1.0, 0, [0.0; 3]);
-            Work::Substitute((relays - 1) / HALF)
+            Work::Substitute(segment, count > FIRST_RELAYS)
         };
         Some(())
     }
 
-    /// Computes the steps of half a segment from its last relay to its first. `None` if one is not finite.
+    /// Computes the steps of one part of `segment` from its last relay to its first. `None` if one is not finite.
     fn substitute(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        half: u16,
+        segment: u16,
+        is_second: bool,
     ) -> Option<()> {
-        let segment = half * HALF / AT_ONCE;
-        let (first, begin) = (segment * AT_ONCE, half * HALF);
-        let end = (begin + HALF).min(chain.mission.relays());
-        let mut factors = [Factor::NONE; FACTORS];
+        let first = segment * AT_ONCE;
+        let middle = first + FIRST_RELAYS;
+        let (begin, end) = if is_second {
+            (middle, first + AT_ONCE)
+        } else {
+            (first, middle)
+        };
+        let end = end.min(chain.mission.relays());
+        let relays = chain.mission.relays();
+        let mut factors = [Factor::NONE; FIRST];
         self.eliminate(chain, segment, end - first, &mut factors)?;
+        let mut steps = [[0; 3]; FIRST];
+        let mut to = self.spot(chain, end + 1).at;
         for index in (begin + 1..=end).rev() {
-            let k = usize::from(index - 1);
+            let k = usize::from(index - first - 1) % FIRST;
             let ahead = self.ahead;
-            let step = factors.get(k % FACTORS)?.step(self.by_target, ahead);
+            let step = factors.get(k)?.step(self.by_target, ahead);
             if !dot(step, step).is_finite() {
                 return None;
             }
-            *self.steps.get_mut(k % SEGMENT)? = step.map(upper_half);
-            self.limit(&self.spot(chain, index), step);
-            self.follow(chain, index + 1, [step, ahead]);
-            self.ahead = step;
+            *steps.get_mut(k)? = step.map(upper_half);
+            let spot = self.spot(chain, index);
+            self.limit(&spot, step);
+            self.follow(relays, index + 1, [spot.at, to], [step, ahead]);
+            (self.ahead, to) = (step, spot.at);
         }
-        if begin == first {
-            *self.segments.get_mut(usize::from(segment))? = Segment::Steps(self.steps);
+        if is_second {
+            let [a, b, c, d, ..] = steps;
+            self.second = [a, b, c, d];
+            self.work = Work::Substitute(segment, false);
+            return Some(());
         }
-        if let Some(before) = half.checked_sub(1) {
-            self.work = Work::Substitute(before);
+        let kept = self.segments.get_mut(usize::from(segment))?;
+        *kept = Segment::Steps(steps, self.second);
+        if let Some(before) = segment.checked_sub(1) {
+            self.work = Work::Substitute(before, true);
         } else {
-            self.follow(chain, 1, [[0.0; 3], self.ahead]);
+            self.follow(relays, 1, [[0.0; 3], to], [[0.0; 3], self.ahead]);
             self.try_step();
         }
         Some(())
@@ -628,20 +670,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Updates the multipliers of hop `k`, whose ends move by `steps`.
-    fn follow(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        k: u16,
-        [from, to]: [Triple; 2],
-    ) {
-        let (hop, weights, _) = self.derivatives(chain, k);
+    /// Updates the multipliers of hop `k`, whose `ends` move by the steps `from` and `to`.
+    fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
+        let (hop, weights) = self.derivatives(relays, k, ends);
         let ([a, b], [c, d]) = (hop.by_from, hop.by_to);
         let change = [
             dot(a, from) + dot(c, to) - self.by_target,
             dot(b, from) + dot(d, to) - self.by_target,
         ];
-        self.hop(chain.mission.relays(), k).lambda = weights.after(change).map(upper_half);
+        self.hop(relays, k).lambda = weights.after(change).map(upper_half);
     }
 }
 

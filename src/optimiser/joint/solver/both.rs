@@ -23,8 +23,9 @@ use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
 use core::task::Poll;
 
-/// Relays of one portion of Algorithm 1.
+/// Relays of one portion of Algorithm 1, and of one that sets positions.
 const LINE: u16 = 2;
+const PUT: u16 = 20;
 
 /// Share of even spacing in initial positions, which separates relays that share one. Also their margin to the
 /// limits. At a start, and for a repetition.
@@ -108,11 +109,14 @@ enum Purpose {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    Begin,
+    /// Cross-sections of a start, after this relay.
+    Begin(u16),
     /// Search for the target at the current cross-sections.
     Seek(Seek, Purpose),
     /// Positions for this target.
     Settle(f32),
+    /// First positions of the interior-point method, after this relay.
+    Put(u16),
     Interior,
 }
 
@@ -158,7 +162,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         interior: Interior::NEW,
         best: None,
         best_cells: Cells::NEW,
-        work: Work::Begin,
+        work: Work::Begin(0),
         pass: Pass::NONE,
         reached: 0.0,
         again: 0,
@@ -171,7 +175,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
     ) -> Poll<Result<f32, Infeasible>> {
         let next = match self.work {
-            Work::Begin => self.begin_start(chain),
+            Work::Begin(done) => self.begin_start(chain, done),
+            Work::Put(done) => self.begin_interior(chain, done),
             Work::Seek(mut seek, purpose) => {
                 let Poll::Ready(met) = self.line(chain, seek.sigma) else {
                     return Poll::Pending;
@@ -193,7 +198,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
                     return Poll::Pending;
                 };
                 match met {
-                    Some(()) => self.begin_interior(chain, None),
+                    Some(()) => Work::Put(0),
                     None => self.next_start(),
                 }
             }
@@ -208,7 +213,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
                 )
             }
         };
-        if let Work::Begin = next
+        if let Work::Begin(0) = next
             && usize::from(self.number) > STARTS.len()
             && self.best.is_none()
         {
@@ -221,21 +226,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     fn next_start(&mut self) -> Work {
         self.number += 1;
         self.again = 0;
-        Work::Begin
+        Work::Begin(0)
     }
 
-    /// Begins the next start, or the last search after all of them.
-    fn begin_start(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Work {
-        // Number 0 is the common altitude.
-        let start = usize::from(self.number).saturating_sub(1);
-        let Some(&start) = STARTS.get(start) else {
+    /// Begins the next start, or the last search after all of them. The first `done` relays have their cross-sections.
+    fn begin_start(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) -> Work {
+        let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
             let sigma = self.best.unwrap_or_default();
             return Work::Seek(Seek::up(sigma, true, 1e-5, 1e-6), Purpose::Last);
         };
         let config = chain.mission.config();
         let relays = chain.mission.relays();
-        for index in 1..=relays {
+        let end = (done + PUT).min(relays);
+        for index in done + 1..=end {
             let share = if relays > 1 {
                 f32::from(index - 1) / f32::from(relays - 1)
             } else {
@@ -250,17 +254,21 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
             };
             self.interior.cells.set(index, Cell::of(at, room));
         }
-        match start.even {
-            Some([first, last]) if is_turned(chain) => {
-                self.begin_interior(chain, Some([1.0 - last, 1.0 - first]))
-            }
-            Some(ends) => self.begin_interior(chain, Some(ends)),
-            None => {
-                // The common altitude is compared, so its target is as exact as those of results.
-                let width = if self.number > 0 { 0.02 } else { JUDGED };
-                Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, width), Purpose::Start)
-            }
+        if end < relays {
+            Work::Begin(end)
+        } else if start.even.is_some() {
+            Work::Put(0)
+        } else {
+            // The common altitude is compared, so its target is as exact as those of results.
+            let width = if self.number > 0 { 0.02 } else { JUDGED };
+            Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, width), Purpose::Start)
         }
+    }
+
+    /// Returns the current start; the first one for the common altitude. `None` after the last one.
+    fn start(&self) -> Option<Start> {
+        let at = usize::from(self.number).saturating_sub(1);
+        STARTS.get(at).copied()
     }
 
     /// Keeps the current positions if they are the best, and returns the next step of the work. If Algorithm 1 has
@@ -283,29 +291,37 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the interior-point method at the cells, with x of a pass or between `even` ends.
+    /// Starts the interior-point method at the cells, with x of a pass or evenly spaced. The first `done` relays are
+    /// there.
     fn begin_interior(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        even: Option<[f32; 2]>,
+        done: u16,
     ) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.mission.relays();
+        let even = self.start().and_then(|start| start.even);
+        let even = even.filter(|_| self.again == 0);
         let is_again = self.again > 1;
         let [far, close] = OFF;
         let off = if is_again { close } else { far };
-        for index in 1..=relays {
+        let end = (done + PUT).min(relays);
+        for index in done + 1..=end {
             let room = (chain.seat_of)(index).room;
             let place = self.interior.cells.get(index).place(room).at(0.0);
             let share = f32::from(index) / f32::from(relays + 1);
+            let turned = |x: f32| if is_turned(chain) { 1.0 - x } else { x };
             let x_m = if let Some([first, last]) = even {
-                (first + share * (last - first)) * distance_m
+                turned(first + turned(share) * (last - first)) * distance_m
             } else {
                 let [x_m, _] = self.interior.noted(index);
                 x_m + off * (share * distance_m - x_m)
             };
             self.interior
                 .put(chain, index, Placement { x_m, ..place }, off);
+        }
+        if end < relays {
+            return Work::Put(end);
         }
         self.interior.start(chain, is_again);
         Work::Interior
