@@ -24,39 +24,33 @@ use crate::sir::{Sender, transmitter_gain};
 /// Square of a length below which a hop counts as longer, in units of D^2. Relays may share a position.
 const SHORTEST: f32 = 1e-8;
 
-pub(super) type Square = [Triple; 3];
-
 /// Symmetric matrix: xx, xy, xh, yy, yh, hh.
 pub(super) type Symmetric = [f32; 6];
 
 #[inline(never)]
-pub(super) fn dot([a, b, c]: Triple, [x, y, z]: Triple) -> f32 {
+pub(super) fn dot([a, b, c]: &Triple, [x, y, z]: &Triple) -> f32 {
     a * x + b * y + c * z
 }
 
 /// Adds `weight` v v' to `to`.
 #[inline(never)]
-pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: Triple, weight: f32) {
+pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: &Triple, weight: f32) {
     let (a, b) = (weight * x, weight * y);
-    let parts = [a * x, a * y, a * h, b * y, b * h, weight * h * h];
-    for (cell, part) in to.iter_mut().zip(parts) {
-        *cell += part;
-    }
-}
-
-/// Adds `weight` a b' to `to`.
-pub(super) fn add_product(to: &mut Square, a: Triple, b: Triple, weight: f32) {
-    for (row, x) in to.iter_mut().zip(a) {
-        add_scaled(row, b, weight * x);
-    }
+    let [xx, xy, xh, yy, yh, hh] = to;
+    *xx += a * x;
+    *xy += a * y;
+    *xh += a * h;
+    *yy += b * y;
+    *yh += b * h;
+    *hh += weight * h * h;
 }
 
 /// Adds `weight` v to `to`.
 #[inline(never)]
-pub(super) fn add_scaled(to: &mut Triple, v: Triple, weight: f32) {
-    for (cell, x) in to.iter_mut().zip(v) {
-        *cell += weight * x;
-    }
+pub(super) fn add_scaled([x, y, h]: &mut Triple, [a, b, c]: &Triple, weight: f32) {
+    *x += weight * a;
+    *y += weight * b;
+    *h += weight * c;
 }
 
 fn add_to_diagonal([xx, _, _, yy, _, hh]: &mut Symmetric, value: f32) {
@@ -143,7 +137,7 @@ impl Gains {
     /// Returns ln q at `at`.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.source);
-        let s = dot(w, w) + SHORTEST * SHORTEST;
+        let s = dot(&w, &w) + SHORTEST * SHORTEST;
         libm::logf(s / (1.0 + self.noise * s))
     }
 
@@ -156,7 +150,7 @@ impl Gains {
         [quiet_from, quiet_to]: [f32; 2],
     ) -> [f32; 2] {
         let v = minus(to, from);
-        let length = libm::logf(dot(v, v) + SHORTEST);
+        let length = libm::logf(dot(&v, &v) + SHORTEST);
         let [there, back] = self.of(k, chain);
         let there = there
             + if k > chain.mission.relays() {
@@ -178,14 +172,14 @@ impl Gains {
         convex: bool,
     ) -> Derivatives {
         let v = minus(to, from);
-        let l = dot(v, v) + SHORTEST;
+        let l = dot(&v, &v) + SHORTEST;
         let slope = v.map(|x| -2.0 * x / l);
         let [there, back] = weights;
         let flat = 2.0 * (there + back) / l;
         let mut bend = [0.0; 6];
         add_square(
             &mut bend,
-            v,
+            &v,
             if convex { -flat / l } else { -2.0 * flat / l },
         );
         add_to_diagonal(&mut bend, flat);
@@ -217,18 +211,18 @@ impl Gains {
         bend: &mut Symmetric,
     ) {
         let w = minus(at, self.source);
-        let s = dot(w, w) + SHORTEST * SHORTEST;
+        let s = dot(&w, &w) + SHORTEST * SHORTEST;
         let inverse = 1.0 / (1.0 + self.noise * s);
         let (first, second) = (
             inverse / s,
             (self.noise * inverse) * (self.noise * inverse) - 1.0 / (s * s),
         );
-        add_scaled(slope, w, 2.0 * first);
+        add_scaled(slope, &w, 2.0 * first);
         if convex {
             let radial = -weight * (2.0 * first + 4.0 * second * s);
-            add_square(bend, w, radial.max(0.0) / s);
+            add_square(bend, &w, radial.max(0.0) / s);
         } else {
-            add_square(bend, w, -4.0 * weight * second);
+            add_square(bend, &w, -4.0 * weight * second);
             add_to_diagonal(bend, -2.0 * weight * first);
         }
     }

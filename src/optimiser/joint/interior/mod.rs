@@ -120,14 +120,19 @@ impl Spot {
         }
     }
 
-    /// Returns the distances to both corners.
-    fn spans(&self) -> [Triple; 2] {
-        [minus(self.at, self.low), minus(self.high, self.at)]
+    /// Returns the distances to the lower corner.
+    fn below(&self) -> Triple {
+        minus(self.at, self.low)
+    }
+
+    /// Returns the distances to the upper corner.
+    fn above(&self) -> Triple {
+        minus(self.high, self.at)
     }
 
     /// Moves the position into the box, with a `margin` as a fraction of its width.
     fn enclose(&mut self, margin: f32) {
-        let limits = self.low.into_iter().zip(self.high);
+        let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
             let margin = margin * (high - low);
             *cell = cell.max(low + margin).min(high - margin);
@@ -314,7 +319,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
         if self.share > 0.0 {
-            add_scaled(&mut spot.at, self.step_of(index), self.share);
+            add_scaled(&mut spot.at, &self.step_of(index), self.share);
             spot.enclose(0.0);
         }
         spot
@@ -409,10 +414,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             let [a, b] = both;
             self.least = self.least.min(a).min(b);
             self.hop(relays, k).level = both;
-            let [below, above] = spot.spans();
-            let inside = below.into_iter().zip(above);
-            let inside = inside.filter(|(a, b)| *a > 0.0 && *b > 0.0);
-            self.sum += libm::logf(inside.map(|(a, b)| a * b).product());
+            let mut inside = 1.0;
+            for (a, b) in spot.below().iter().zip(&spot.above()) {
+                if *a > 0.0 && *b > 0.0 {
+                    inside *= a * b;
+                }
+            }
+            self.sum += libm::logf(inside);
             (from, quiet) = (to, ahead);
         }
         self.work = if end > relays + 1 {
@@ -633,7 +641,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             let k = usize::from(index - first - 1) % FIRST;
             let ahead = self.ahead;
             let step = factors.get(k)?.step(self.by_target, ahead);
-            if !dot(step, step).is_finite() {
+            if !dot(&step, &step).is_finite() {
                 return None;
             }
             *steps.get_mut(k)? = step.map(upper_half);
@@ -661,11 +669,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Shortens all steps so that the `step` from `spot` stays in the box.
     fn limit(&mut self, spot: &Spot, step: Triple) {
-        let [below, above] = spot.spans();
-        for (step, (below, above)) in step.into_iter().zip(below.into_iter().zip(above)) {
-            let room = if step < 0.0 { below } else { above };
-            if below > 0.0 && above > 0.0 && step.abs() * self.share > NEAR_BOX * room {
-                self.share = NEAR_BOX * room / step.abs();
+        let spans = (spot.below(), spot.above());
+        for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
+            let room = if *step < 0.0 { below } else { above };
+            let most = NEAR_BOX * room / step.abs();
+            if *below > 0.0 && *above > 0.0 && most < self.share {
+                self.share = most;
             }
         }
     }
@@ -673,10 +682,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Updates the multipliers of hop `k`, whose `ends` move by the steps `from` and `to`.
     fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
         let (hop, weights) = self.derivatives(relays, k, ends);
-        let ([a, b], [c, d]) = (hop.by_from, hop.by_to);
+        let ([a, b], [c, d]) = (&hop.by_from, &hop.by_to);
         let change = [
-            dot(a, from) + dot(c, to) - self.by_target,
-            dot(b, from) + dot(d, to) - self.by_target,
+            dot(a, &from) + dot(c, &to) - self.by_target,
+            dot(b, &from) + dot(d, &to) - self.by_target,
         ];
         self.hop(relays, k).lambda = weights.after(change).map(upper_half);
     }

@@ -23,7 +23,7 @@
 
 use super::super::hop::Triple;
 use super::Spot;
-use super::hop::{Derivatives, Square, Symmetric, add_product, add_scaled, add_square, dot};
+use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
 /// Smallest pivot, relative to the diagonal before the elimination.
@@ -42,16 +42,16 @@ pub(super) struct Front {
     taken: Triple,
 }
 
+/// Column of B of the next relay, and coordinate of u of g and of q.
+type Row = [f32; 5];
+
 /// Factors of one relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// L: inverse of xx, yx, zx, inverse of yy, zy, inverse of zz.
+    /// L: inverse of xx, yx, hx, inverse of yy, hy, inverse of hh.
     lower: [f32; 6],
-    /// B of the next relay.
-    next: Square,
-    /// u of g and of q.
-    slope: Triple,
-    column: Triple,
+    /// x, y and h.
+    rows: [Row; 3],
 }
 
 /// Sums that give dT.
@@ -118,42 +118,37 @@ impl Front {
         };
         let [a, b] = ratios;
         sums.sigma += a + b;
-        sums.slope += dot(factor.slope, factor.column);
-        sums.column += dot(factor.column, factor.column);
         *self = Self {
             bend: hop.bend_to,
             ..Self::NONE
         };
-        self.add(hop.by_to, weights, ratios);
+        self.add(&hop.by_to, weights, ratios);
         self.enclose(weights.mu, spot);
-        factor.carry(self);
+        self.reduce(&factor, sums);
         Some(factor)
     }
 
+    fn add(&mut self, [a, b]: &[Triple; 2], weights: &Weights, [r, s]: [f32; 2]) {
+        let [p, q] = weights.central();
+        self.add_level(a, r, p);
+        self.add_level(b, s, q);
+    }
+
     #[inline(never)]
-    fn add(&mut self, slopes: [Triple; 2], weights: &Weights, ratios: [f32; 2]) {
-        let pulls = weights.central();
-        for ((slope, pull), ratio) in slopes.into_iter().zip(pulls).zip(ratios) {
-            add_square(&mut self.bend, slope, ratio);
-            add_scaled(&mut self.slope, slope, pull);
-            add_scaled(&mut self.column, slope, ratio);
-        }
+    fn add_level(&mut self, slope: &Triple, ratio: f32, pull: f32) {
+        add_square(&mut self.bend, slope, ratio);
+        add_scaled(&mut self.slope, slope, pull);
+        add_scaled(&mut self.column, slope, ratio);
     }
 
     /// Adds the barrier of the box.
     fn enclose(&mut self, mu: f32, spot: &Spot) {
-        let [below, above] = spot.spans();
+        let ([a, b, c], [d, e, f]) = (spot.below(), spot.above());
         let [xx, _, _, yy, _, hh] = &mut self.bend;
-        let cells = [xx, yy, hh].into_iter().zip(&mut self.slope);
-        for ((bend, slope), (a, b)) in cells.zip(below.into_iter().zip(above)) {
-            if a > 0.0 && b > 0.0 {
-                let (a, b) = (1.0 / a, 1.0 / b);
-                *slope += mu * (a - b);
-                *bend += mu * (a * a + b * b);
-            } else {
-                *bend += STIFF;
-            }
-        }
+        let [x, y, h] = &mut self.slope;
+        barrier(mu, a, d, x, xx);
+        barrier(mu, b, e, y, yy);
+        barrier(mu, c, f, h, hh);
     }
 
     /// Adds the hop to the next relay, and eliminates this relay. `None` if a pivot is not positive.
@@ -164,22 +159,43 @@ impl Front {
         ratios: [f32; 2],
         damping: f32,
     ) -> Option<Factor> {
-        for (cell, more) in self.bend.iter_mut().zip(hop.bend_from) {
+        for (cell, more) in self.bend.iter_mut().zip(&hop.bend_from) {
             *cell += more;
         }
-        self.add(hop.by_from, weights, ratios);
+        self.add(&hop.by_from, weights, ratios);
         let lower = self.cholesky(damping)?;
-        let [xx, xy, xh, yy, yh, hh] = hop.bend.map(|cell| -cell);
-        let mut mixed = [[xx, xy, xh], [xy, yy, yh], [xh, yh, hh]];
-        for ((to, from), ratio) in hop.by_to.into_iter().zip(hop.by_from).zip(ratios) {
-            add_product(&mut mixed, to, from, ratio);
+        let [xx, xy, xh, yy, yh, hh] = hop.bend;
+        let ([x, y, h], [p, q, r]) = (self.slope, self.column);
+        let mut rows = [
+            [-xx, -xy, -xh, x, p],
+            [-xy, -yy, -yh, y, q],
+            [-xh, -yh, -hh, h, r],
+        ];
+        let ([a, b], [c, d], [r, s]) = (&hop.by_from, &hop.by_to, ratios);
+        add_product(&mut rows, a, c, r);
+        add_product(&mut rows, b, d, s);
+        let [a, b, c, d, e, f] = lower;
+        let [x, y, h] = &mut rows;
+        combine(x, &[0.0; 5], 0.0, a);
+        combine(y, x, b, d);
+        combine(h, x, c, 1.0);
+        combine(h, y, e, f);
+        Some(Factor { lower, rows })
+    }
+
+    /// Subtracts the part of the relay before, whose factors are known, and adds it to the sums.
+    fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
+        let before = self.bend;
+        for &[x, y, h, slope, column] in &factor.rows {
+            let row = [x, y, h];
+            add_square(&mut self.bend, &row, -1.0);
+            add_scaled(&mut self.slope, &row, -slope);
+            add_scaled(&mut self.column, &row, -column);
+            sums.slope += slope * column;
+            sums.column += column * column;
         }
-        Some(Factor {
-            lower,
-            next: mixed.map(|row| forward(lower, row)),
-            slope: forward(lower, self.slope),
-            column: forward(lower, self.column),
-        })
+        let ([x, _, _, y, _, h], [a, _, _, b, _, c]) = (before, self.bend);
+        self.taken = [x - a, y - b, h - c];
     }
 
     fn cholesky(&self, damping: f32) -> Option<[f32; 6]> {
@@ -200,12 +216,36 @@ impl Front {
     }
 }
 
-/// Returns L^-1 v.
+/// Adds the derivatives of mu (ln a + ln b), where a and b are the distances of a coordinate to its limits.
 #[inline(never)]
-fn forward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
-    let x = x * a;
-    let y = (y - b * x) * d;
-    [x, y, (z - c * x - e * y) * f]
+fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
+    if a > 0.0 && b > 0.0 {
+        let (a, b) = (1.0 / a, 1.0 / b);
+        *slope += mu * (a - b);
+        *bend += mu * (a * a + b * b);
+    } else {
+        *bend += STIFF;
+    }
+}
+
+/// Adds `weight` a b' to the first columns of `rows`.
+#[inline(never)]
+fn add_product(rows: &mut [Row; 3], a: &Triple, b: &Triple, weight: f32) {
+    for ([x, y, h, ..], a) in rows.iter_mut().zip(a) {
+        let weight = weight * a;
+        let [p, q, r] = b;
+        *x += weight * p;
+        *y += weight * q;
+        *h += weight * r;
+    }
+}
+
+/// Subtracts `part` times `from` from `to`, and multiplies the result by `scale`.
+#[inline(never)]
+fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
+    for (cell, from) in to.iter_mut().zip(from) {
+        *cell = (*cell - part * from) * scale;
+    }
 }
 
 /// Returns L'^-1 v.
@@ -218,34 +258,13 @@ fn backward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
 impl Factor {
     pub(super) const NONE: Self = Self {
         lower: [0.0; 6],
-        next: [[0.0; 3]; 3],
-        slope: [0.0; 3],
-        column: [0.0; 3],
+        rows: [[0.0; 5]; 3],
     };
-
-    /// Subtracts this relay's part from the `front` of the next relay.
-    fn carry(&self, front: &mut Front) {
-        let [a, b, c] = self.next;
-
-        front.taken = [dot(a, a), dot(b, b), dot(c, c)];
-        let [x, y, h] = front.taken;
-        let parts = [x, dot(a, b), dot(a, c), y, dot(b, c), h];
-        for (cell, part) in front.bend.iter_mut().zip(parts) {
-            *cell -= part;
-        }
-        for ((slope, column), row) in front.slope.iter_mut().zip(&mut front.column).zip(self.next) {
-            *slope -= dot(row, self.slope);
-            *column -= dot(row, self.column);
-        }
-    }
 
     /// Returns the relay's step, for `by_target` dT and the step of the next relay.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
-        let mut known = self.slope;
-        add_scaled(&mut known, self.column, by_target);
-        for (row, moved) in self.next.into_iter().zip(next) {
-            add_scaled(&mut known, row, -moved);
-        }
+        let known = (self.rows)
+            .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));
         backward(self.lower, known)
     }
 }
