@@ -56,10 +56,6 @@ const TRIES: u8 = 6;
 /// Factor between a multiplier and mu / s.
 const APART: f32 = 5.0;
 
-/// Attempts at a factorisation, and the first damping.
-const ATTEMPTS: u8 = 6;
-const DAMPING: f32 = 1e-5;
-
 /// Steps of T in a portion and altogether, and the relative error of the sum at which they end.
 const STEPS: u8 = 4;
 const TARGETS: u8 = 12;
@@ -182,9 +178,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     /// Multipliers mu / s in place of the stored ones.
     resets: bool,
     convex: bool,
-    damping: f32,
     tries: u8,
-    attempts: u8,
     iterations: u8,
 }
 
@@ -211,9 +205,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         by_target: 0.0,
         resets: false,
         convex: false,
-        damping: 0.0,
         tries: 0,
-        attempts: 0,
         iterations: 0,
     };
 
@@ -384,13 +376,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
                 Some(())
             }
             Work::Eliminate(segment) => self.forward(chain, segment).or_else(|| {
-                self.attempts += 1;
-                if self.convex {
-                    self.damping = (10.0 * self.damping).max(DAMPING);
-                }
-                self.convex = true;
                 self.work = Work::Eliminate(0);
-                (self.attempts < ATTEMPTS).then_some(())
+                (!core::mem::replace(&mut self.convex, true)).then_some(())
             }),
             Work::Substitute(segment, is_second) => self.substitute(chain, segment, is_second),
         };
@@ -439,13 +426,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Target(end);
         for step in steps..end {
             let (mut sum, mut slope) = (0.0, 0.0);
-            for k in 1..=relays + 1 {
+            for k in 1..relays + 2 {
                 let target = self.target;
-                for level in self.hop(relays, k).level {
-                    let inverse = 1.0 / (level - target);
-                    sum += inverse;
-                    slope += inverse * inverse;
-                }
+                let [a, b] = self.hop(relays, k).level;
+                let (a, b) = (1.0 / (a - target), 1.0 / (b - target));
+                sum += a + b;
+                slope += a * a + b * b;
             }
             let (sum, slope) = (self.mu * sum, self.mu * slope);
             self.target -= (sum * sum - sum) / slope;
@@ -529,7 +515,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             return Poll::Ready(self.target);
         }
         self.iterations += 1;
-        (self.attempts, self.damping) = (0, 0.0);
         self.work = Work::Eliminate(0);
         Poll::Pending
     }
@@ -576,12 +561,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
         let relays = chain.mission.relays();
         let mut at = self.spot(chain, from).at;
-        for index in from..=first + count {
+        let after = first + count + 1;
+        for index in from..after {
             let spot = self.spot(chain, index + 1);
             let (hop, weights) = self.derivatives(relays, index + 1, [at, spot.at]);
             at = spot.at;
-            let (damping, sums) = (self.damping, &mut self.sums);
-            let factor = front.pass(index > 0, &hop, &weights, &spot, damping, sums)?;
+            let (convex, sums) = (self.convex, &mut self.sums);
+            let factor = front.pass(index > 0, &hop, &weights, &spot, convex, sums)?;
             // Tx has no factors, which are kept nowhere.
             let k = usize::from(index.wrapping_sub(first + 1)) % FIRST;
             if let Some(kept) = factors.get_mut(k) {
@@ -636,8 +622,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let mut factors = [Factor::NONE; FIRST];
         self.eliminate(chain, segment, end - first, &mut factors)?;
         let mut steps = [[0; 3]; FIRST];
-        let mut to = self.spot(chain, end + 1).at;
-        for index in (begin + 1..=end).rev() {
+        let after = end + 1;
+        let mut to = self.spot(chain, after).at;
+        for index in (begin + 1..after).rev() {
             let k = usize::from(index - first - 1) % FIRST;
             let ahead = self.ahead;
             let step = factors.get(k)?.step(self.by_target, ahead);

@@ -99,20 +99,20 @@ impl Front {
 
     /// Eliminates a relay with these rows, and makes them those of the next node, which is at `spot`.
     ///
-    /// `hop` leads to that node. `damping` is a relative increase of the diagonal. Without a relay before the hop, its
-    /// factors are 0. `None` if a pivot is not positive.
+    /// `hop` leads to that node. Without a relay before the hop, its factors are 0. `None` if a pivot is not positive;
+    /// if the system is `convex`, such a pivot is a rounding error, and is raised.
     pub(super) fn pass(
         &mut self,
         is_relay: bool,
         hop: &Derivatives,
         weights: &Weights,
         spot: &Spot,
-        damping: f32,
+        convex: bool,
         sums: &mut Sums,
     ) -> Option<Factor> {
         let ratios = weights.ratios();
         let factor = if is_relay {
-            self.eliminate(hop, weights, ratios, damping)?
+            self.eliminate(hop, weights, ratios, convex)?
         } else {
             Factor::NONE
         };
@@ -157,13 +157,13 @@ impl Front {
         hop: &Derivatives,
         weights: &Weights,
         ratios: [f32; 2],
-        damping: f32,
+        convex: bool,
     ) -> Option<Factor> {
         for (cell, more) in self.bend.iter_mut().zip(&hop.bend_from) {
             *cell += more;
         }
         self.add(&hop.by_from, weights, ratios);
-        let lower = self.cholesky(damping)?;
+        let lower = self.cholesky(convex)?;
         let [xx, xy, xh, yy, yh, hh] = hop.bend;
         let ([x, y, h], [p, q, r]) = (self.slope, self.column);
         let mut rows = [
@@ -198,13 +198,12 @@ impl Front {
         self.taken = [x - a, y - b, h - c];
     }
 
-    fn cholesky(&self, damping: f32) -> Option<[f32; 6]> {
+    fn cholesky(&self, convex: bool) -> Option<[f32; 6]> {
         let [xx, xy, xh, yy, yh, hh] = self.bend;
         let [x, y, h] = self.taken;
         let root = |rest: f32, taken: f32| {
-            let whole = rest + taken;
-            let rest = rest + damping * whole;
-            (rest > LEAST_PIVOT * whole.abs()).then(|| 1.0 / sqrt(rest))
+            let least = LEAST_PIVOT * (rest + taken).abs();
+            (convex || rest > least).then(|| 1.0 / sqrt(rest.max(least)))
         };
         let a = root(xx, x)?;
         let (b, c) = (xy * a, xh * a);

@@ -239,7 +239,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         let config = chain.mission.config();
         let relays = chain.mission.relays();
         let end = (done + PUT).min(relays);
-        for index in done + 1..=end {
+        let after = end + 1;
+        for index in done + 1..after {
             let share = if relays > 1 {
                 f32::from(index - 1) / f32::from(relays - 1)
             } else {
@@ -306,7 +307,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         let [far, close] = OFF;
         let off = if is_again { close } else { far };
         let end = (done + PUT).min(relays);
-        for index in done + 1..=end {
+        let after = end + 1;
+        for index in done + 1..after {
             let room = (chain.seat_of)(index).room;
             let place = self.interior.cells.get(index).place(room).at(0.0);
             let share = f32::from(index) / f32::from(relays + 1);
