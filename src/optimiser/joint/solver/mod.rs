@@ -11,10 +11,10 @@
 //! | --- | --- |
 //! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
 //! | `judge` | the steps after a target is found: the next start, or the polish |
-//! | `both` | the joint method with a way back |
+//! | `both` | the solver for both directions |
 //! | `chain` | data shared by the passes; a segment of the chain; the profile of one relay |
 //!
-//! This file has the state of a solver, its current work and its purpose, and one portion of its work.
+//! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the work.
 
 mod both;
 mod chain;
@@ -226,10 +226,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Elements of state that exist with the feature `reverse` only.
-const BOTH: usize = if cfg!(feature = "reverse") { 1 } else { 0 };
+/// Number of states for both directions: 0 without the features `altitude` and `reverse`.
+const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
+    1
+} else {
+    0
+};
 
-/// State of a solver, which share their memory.
+/// States of the two solvers, which share their memory.
 #[expect(
     clippy::large_enum_variant,
     reason = "there is one of it, and nothing allocates"
