@@ -8,15 +8,15 @@ use core::f64::consts::PI;
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Path-loss model of the links between drones and the ground. It selects the factor that the paper calls eta.
+/// Kind of path loss between drones and the ground, from which their path-loss factor eta is computed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
-    /// Links between drones and the ground have line of sight: eta = `mu_los`, as between drones.
+    /// Line of sight between drones and the ground: eta = `mu_los`, as between two drones.
     Los,
-    /// Links between drones and the ground are obstructed: eta = `mu_nlos`, as between ground stations.
+    /// Obstructed links between drones and the ground: eta = `mu_nlos`, as between two ground stations.
     Nlos,
-    /// Weighted mean with the weight w of line of sight, 0 to 1: eta = w `mu_los` + (1 - w) `mu_nlos`.
+    /// Partial line of sight with the weight w, 0 to 1: eta = w `mu_los` + (1 - w) `mu_nlos`.
     Weighted(f64),
 }
 
@@ -28,7 +28,7 @@ pub struct Channel {
     mu_los: f64,
     /// Path-loss factor from the interferer to the ground receiver, without line of sight, 1/m^2.
     mu_nlos: f64,
-    /// Path-loss factor between a drone and the ground, either way, 1/m^2.
+    /// Path-loss factor between a drone and the ground, 1/m^2; the same in both directions.
     eta: f64,
 }
 
@@ -144,8 +144,10 @@ impl Channel {
         })
     }
 
-    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`]. With equal losses the weighted sum may be rounded out of
-    /// that range, which [`Channel::from_factors`] would reject.
+    /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`].
+    ///
+    /// [`Channel::from_factors`] requires this. If the two factors are equal, rounding can put their weighted mean
+    /// slightly outside.
     pub(crate) fn ordered(self) -> Self {
         Self {
             eta: self.eta.max(self.mu_los).min(self.mu_nlos),

@@ -20,7 +20,7 @@
 use crate::time::Duration;
 use crate::wire::MAX_SWEEP;
 
-/// Maximum number of frames that two neighbours of an idle chain exchange in `probe_after`.
+/// Maximum number of frames that two neighbours of an idle chain exchange in the time `probe_after`.
 const FRAMES: u64 = 8;
 
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
@@ -31,12 +31,13 @@ const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Maximum number of relays in range for which the wait for a free channel is neglected.
+/// Maximum number of relays in range without a wait for a free channel.
 ///
-/// It is this relay and four on either side.
+/// For every further nine relays, a transmission is assumed to take one frame time longer. Nine are this relay and
+/// four on either side.
 const NEAR: u16 = 9;
 
-/// Maximum time for one transmission including its wait for the channel, in frame times.
+/// Maximum time assumed for one transmission including its wait for the channel, in frame times.
 const MOST_TURNS: u32 = 4;
 
 /// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
@@ -45,7 +46,7 @@ const MOST_TURNS: u32 = 4;
 pub struct ChannelLoad {
     /// Number of relays in range of each other, 1 to 1000.
     pub in_range: u16,
-    /// Channel time of a frame beyond its bytes (preamble, turnaround), in bytes.
+    /// Overhead of a frame (preamble, turnaround of the radio), as the number of bytes of equal duration.
     pub overhead: u16,
 }
 
@@ -59,16 +60,17 @@ impl ChannelLoad {
         }
     }
 
-    /// Returns the capacity that the idle chain needs in one `probe_after`, in millionths of a bit.
+    /// Returns the capacity that the idle chain needs in one `probe_after`, in units of 1e-6 bit.
     ///
-    /// It is the number of bits sent in that time, divided by the fraction of the channel that they may take.
+    /// It is the number of bits sent in that time, divided by the fraction of the channel that they may take. Divided
+    /// by a time in microseconds it gives bit/s.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
         (bits * 1_000_000 * SHARE[1]).div_ceil(SHARE[0])
     }
 
-    /// Returns the minimum data rate, bit/s; 0 for a single relay.
+    /// Returns the minimum data rate of a channel that carries this load, bit/s; 0 for a single relay.
     ///
     /// ```
     /// use uav_relay::{ChannelLoad, Duration};
@@ -142,7 +144,8 @@ impl ChannelLoad {
         pairs.saturating_add(1)
     }
 
-    /// Returns the minimum `probe_after` on a channel of `baud` bit/s. `dead_after` should be three times that.
+    /// Returns the minimum `probe_after` of the relays' settings on a channel of `baud` bit/s. `dead_after` should be
+    /// three times that.
     pub const fn least_probe_after(self, baud: u32) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         Duration::from_micros(self.needed().div_ceil(baud))
@@ -160,7 +163,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the time for one transmission including its wait for the channel, in frame times.
+    /// Returns the time assumed for one transmission including its wait for the channel, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -170,11 +173,11 @@ impl ChannelLoad {
     }
 }
 
-/// Error of [`ChannelLoad::carried`]: the channel is overloaded. Contains three ways to reduce the load.
+/// Error of [`ChannelLoad::carried`]: the channel is overloaded. The fields give three ways to avoid this.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
-    /// Number of relays in range of each other that overload the channel.
+    /// Number of relays in range of each other, for which the channel is too slow.
     pub in_range: u16,
     /// Minimum data rate that would carry these relays, bit/s.
     pub least_baud: u32,
@@ -182,7 +185,7 @@ pub struct ChannelFull {
     ///
     /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times that.
     pub least_probe_after: Duration,
-    /// Maximum number of relays in range that this channel carries with the present `probe_after`.
+    /// Maximum number of relays in range that this channel carries without a longer `probe_after`.
     pub most_in_range: u16,
 }
 

@@ -6,7 +6,7 @@
 use crate::geodetic::LineError;
 use crate::side::Side;
 
-/// Event that a firmware may react to. The firmware reads the changed state from the relay.
+/// Event of the relay that a firmware may react to. The firmware reads the changed state from the relay.
 ///
 /// A *node* is a relay's index before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -16,8 +16,9 @@ pub enum Event {
     SetpointChanged,
     /// The chain has agreed on positions. Where the interference is known, it has agreed on a target SIR (`Relay::target`), too.
     Converged,
-    /// Every allowed target SIR is infeasible. Raised at the leader: relay 1, or relay N in an interference field.
-    /// All relays keep their positions. `Relay::restart`, a new view or a new mission makes the leader try again.
+    /// Every allowed target SIR is infeasible, and all relays keep their positions. Raised at the leader, which is
+    /// relay 1, or relay N if the mission gives the interference as a distribution along x. `Relay::restart`, a new
+    /// view or a new mission makes the leader try again.
     Infeasible,
     /// The neighbour at `side` has been silent for `Settings::dead_after` (15 s by default). With two links the relay
     /// keeps sending heartbeat requests to it; on a shared channel it searches for another node at that side. An
@@ -37,14 +38,15 @@ pub enum Event {
         /// Index of the neighbour that is received now.
         node: u16,
     },
-    /// A node has reported eight times in a row that it does not receive this relay. It cannot be a neighbour. Raised once until
-    /// the node receives this relay. An operator checks this transmitter and that receiver: antenna, power, channel.
+    /// A node has reported eight times in a row that it does not receive this relay. The node therefore cannot be a
+    /// neighbour. Not raised again before the node has received this relay. An operator checks this transmitter and
+    /// that receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node that does not receive this relay.
         node: u16,
     },
-    /// A node has another mission, or one that this relay cannot obtain; the node's messages are ignored. An operator
-    /// loads both with the same mission before take-off. Raised once a minute for each node.
+    /// A node's mission differs from this relay's, or this relay cannot obtain it. The node's messages are ignored.
+    /// An operator loads the same mission into both nodes before take-off. Raised once a minute for each node.
     MissionMismatch {
         /// Index of the node with the other mission.
         node: u16,
@@ -69,7 +71,7 @@ pub enum Event {
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
     /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of
-    /// the two nodes and gives it the right index. Raised once until the other node has been silent for twice
+    /// the two nodes and gives it the right index. Not raised again before the other node has been silent for twice
     /// `dead_after`. With signed frames, an attacker without the key can raise it, but cause nothing else.
     DuplicateIndex {
         /// Index that two nodes use.
@@ -78,17 +80,19 @@ pub enum Event {
     /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all relays of
-    /// the view use the last agreement. Raised once until a view is agreed on.
+    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all
+    /// relays of the view use the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
-    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its positions.
-    /// Raised once until a view is agreed on. Bring the missing relays back into range, or land this part.
+    /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
+    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land this
+    /// part.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
-    /// A newer mission was rejected. It has no valid line on earth, or leaves the relay's own geofence. The relay keeps its
-    /// mission, and the ground station is informed. Raised once for each such mission. Upload one whose sites are as far apart as
-    /// its distance, and within the geofence.
+    /// A newer mission was rejected, and this relay keeps its present one. The new mission's distance does not fit
+    /// its Tx and Rx positions on earth, or the mission exceeds this relay's own geofence. The ground station is
+    /// informed. Raised once for each such mission. Upload one whose Tx and Rx positions are as far apart as its
+    /// distance, and within the geofence.
     UploadRefused {
         /// Reason for which the mission was rejected.
         why: LineError,
@@ -111,7 +115,8 @@ pub enum Event {
     Adopted,
 }
 
-/// Events without a node that are polled first. Events with a node follow, then those of `POLLED_LAST`.
+/// Events that concern no node and that the firmware receives first, before those that concern a node. The other
+/// events without a node, `POLLED_LAST`, come at the end.
 const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,
@@ -147,9 +152,10 @@ pub(crate) enum NodeEvent {
     Mission,
     Key,
     Epoch,
-    /// Two nodes use the same index. If it is this relay's index, the side of the event has no meaning.
+    /// Duplicate index: two nodes use the same one. If it is this relay's index, the side of the event has no
+    /// meaning.
     Index,
-    /// Measurements of the node do not fit those of the others.
+    /// Sensor fault: measurements of the node do not fit those of the other nodes.
     Sensor,
 }
 
@@ -183,7 +189,8 @@ impl NodeEvent {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     events: u16,
-    /// Raised events that concern a node, upstream and downstream: bit i stands for `NodeEvent::ALL[i]`.
+    /// Raised events that concern a node at the upstream [0] and the downstream [1] side. Bit i stands for
+    /// `NodeEvent::ALL[i]`.
     kinds: [u8; 2],
     nodes: [[u16; 8]; 2],
 }
@@ -203,7 +210,8 @@ impl Pending {
         self.events |= Self::bit(event);
     }
 
-    /// Raises an event about node `node` at `side`; it replaces one of the same kind about another node.
+    /// Raises an event about node `node` at `side`. It replaces an event of the same kind and side about another
+    /// node.
     pub(crate) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         let at = usize::from(side == Side::Downstream);
         let (Some(bits), Some(nodes)) = (self.kinds.get_mut(at), self.nodes.get_mut(at)) else {

@@ -5,7 +5,7 @@
 
 /// Geodetic position: WGS84 latitude and longitude, and height above mean sea level.
 ///
-/// One unit of latitude is 1.1 cm on the ground, one of longitude at most that.
+/// A step of 1 in `lat_e7` is 1.1 cm on the ground, a step of 1 in `lon_e7` at most that.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geodetic {
@@ -53,7 +53,7 @@ pub(crate) fn to_integer(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
-/// Ground positions of the transmitter and the receiver, the two ends of the mission's line.
+/// Surveyed positions of transmitter Tx and receiver Rx on the ground, the ends of the mission's line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sites {
@@ -102,16 +102,18 @@ impl Sites {
     }
 }
 
-/// Reason why an uploaded mission does not fit its line on earth or the relay's own geofence.
+/// Reason why a relay rejects an uploaded mission: its Tx and Rx positions, or the relay's geofence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance differs from the distance between its sites (transmitter and receiver). Or it has no
-    /// sites, and its distance differs from the configured one at a relay with `Settings::sited`.
+    /// The mission's distance differs from the distance between its Tx and Rx positions. Or the mission has no such
+    /// positions, and its distance differs from that of the positions which the relay was configured with
+    /// (`Settings::sited`).
     Distance,
-    /// The mission's sites, transmitter and receiver, are less than 10 m or more than 100 km apart.
+    /// The mission's Tx and Rx positions are less than 10 m or more than 100 km apart.
     Sites,
-    /// The mission's altitudes exceed the relay's own geofence. See [`GuardConfig::geofence`](crate::guard::config::GuardConfig).
+    /// The mission's range of altitudes exceeds the relay's own geofence. See
+    /// [`GuardConfig::geofence`](crate::guard::config::GuardConfig).
     Altitude,
     /// The mission's range of lateral offsets exceeds the relay's own geofence.
     Lateral,

@@ -232,7 +232,7 @@ mod autopilot {
         }
     }
 
-    /// Returns the relay numbers in `relays` before the zeros that pad it.
+    /// Returns the part of `relays` before the first 0, because unused entries are 0.
     fn named(relays: &[u16]) -> &[u16] {
         relays.split(|node| *node == 0).next().unwrap_or_default()
     }

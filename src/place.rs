@@ -14,7 +14,7 @@
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Placement {
-    /// Distance from the transmitter along the ground, m, in [0, D].
+    /// Distance from the transmitter along the ground, m: 0 to D, the distance from Tx to Rx.
     pub x_m: f32,
     /// Lateral offset from the line Tx to Rx, m: to its right above 0, to its left below.
     pub y_m: f32,
@@ -23,7 +23,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Returns the position right above the line from transmitter to receiver (y = 0), as in the paper.
+    /// Returns the position right above the line from transmitter to receiver: the lateral offset is 0.
     pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
         CrossSection::on_line(altitude_m).at(x_m)
     }
@@ -72,7 +72,7 @@ impl CrossSection {
     }
 }
 
-/// Lateral offset and altitude of a relay, and its power; its x is free.
+/// Relay whose position along x is searched: its given lateral offset, altitude and transmit power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {

@@ -30,8 +30,7 @@ pub struct Bearing {
 }
 
 impl Bearing {
-    /// Returns the bearing of a position relative to this one. It is `ahead_m` farther along x, `aside_m` along y and `climb_m`
-    /// higher.
+    /// Returns the bearing of a position `ahead_m` farther along x, `aside_m` along y, and `climb_m` up.
     ///
     /// `None` for a zero distance, and for values that are not finite or whose distance overflows.
     ///
@@ -119,7 +118,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::place::Placement;
 
-    /// Returns the errors of azimuth, elevation and direction, rad, and the relative error of the distance.
+    /// Returns the errors of [`Bearing::new`] compared with f64. They are those of azimuth, elevation and direction,
+    /// rad, and the relative error of the distance.
     fn errors(ahead_m: f32, aside_m: f32, climb_m: f32) -> [f64; 4] {
         let bearing = Bearing::new(ahead_m, aside_m, climb_m).unwrap();
         let [x, y, h] = [ahead_m, aside_m, climb_m].map(f64::from);

@@ -33,13 +33,13 @@ impl PowerRatio {
         f64::from(self.hi) + f64::from(self.lo)
     }
 
-    /// Returns `target` over this ratio, rounded to f32. This ratio is the gain of a hop.
+    /// Returns `target` / A, rounded to f32, for a target SIR and this ratio as the gain A of a hop.
     pub const fn ratio(&self, target: f32) -> f32 {
         target / self.hi
     }
 
-    /// Returns `target` over this ratio, less 1, with a relative error below 2e-7. This holds even if the two are
-    /// nearly equal. This ratio is the gain of a hop.
+    /// Returns `target` / A - 1 for a target SIR and this ratio as the gain A of a hop. The relative error is below
+    /// 2e-7, even if the target is nearly A.
     pub const fn excess(&self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
     }

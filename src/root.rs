@@ -12,7 +12,7 @@ pub(crate) fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)
 }
 
-/// Returns the square root of `x`, as [`sqrt`] does, inlined for inner loops.
+/// Returns the square root of `x` as [`sqrt`] does, but is always inlined, for inner loops.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"

@@ -11,10 +11,10 @@ use crate::time::Duration;
 use crate::wire::auth::Auth;
 use crate::without_quorum::WithoutQuorum;
 
-/// Part of the presets' `hop_time` for computing and for the buffers of a link.
+/// Time for the computation and the buffers of a link, which the preset settings include in `hop_time`.
 const LATENCY: Duration = Duration::from_millis(10);
 
-/// Identity of a relay in its network.
+/// Identity of a relay: its network's number, and its index in the chain.
 ///
 /// ```
 /// use uav_relay::Identity;
@@ -47,17 +47,19 @@ pub enum Wiring {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Method {
-    /// Best x at fixed lateral offsets and altitudes: Algorithm 1, in an interference field Algorithm 4.
+    /// Optimise x at given lateral offsets and altitudes. This is the paper's Algorithm 1, or Algorithm 4 if the
+    /// mission gives the interference as a distribution along x (an interference field).
     #[default]
     Align,
-    /// Joint optimum of x, y and altitude within the mission's ranges. Not in an interference field; up to 100
-    /// relays.
+    /// Optimise x, y and altitude jointly, within the mission's ranges. For up to 100 relays, and not for a mission
+    /// that gives the interference as a distribution along x.
     Joint,
-    /// Algorithm 1, followed by Algorithm 2, which moves one relay after the other. Not in an interference field.
+    /// Optimise x by the paper's Algorithm 1, then move one relay after the other by Algorithm 2. Not for a mission
+    /// that gives the interference as a distribution along x.
     Adjust(Adjust),
 }
 
-/// Parameters of Algorithm 2.
+/// Parameters of the paper's Algorithm 2, which moves one relay after the other to a better position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
@@ -81,13 +83,14 @@ impl Default for Adjust {
     }
 }
 
-/// Settings of a relay that measures the interference, for a mission with an interference field.
+/// Settings of a relay that measures the interference itself. They are for a mission that gives the interference as a
+/// distribution along x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measure {
     /// Maximum interference power that can be received, W: 1e-30 to 1e6. Samples above it are rejected.
     pub i_max_w: f32,
-    /// Number of samples to take at one position before their estimate is used, 100 to 1 000 000.
+    /// Number of samples to take at one position before an estimate is made from them, 100 to 1 000 000.
     pub samples: u32,
 }
 
@@ -107,46 +110,49 @@ pub struct Measure {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// Altitude and power of this relay; `None` for the mission's common profile.
+    /// Altitude and power of this relay; `None` for the values that the mission gives for all relays.
     pub profile: Option<Profile>,
-    /// True to keep this relay's altitude while other altitudes are optimised.
+    /// True to keep this relay's altitude fixed while the method optimises other relays' altitudes.
     pub hold_altitude: bool,
-    /// Method that the leader (relay 1; in an interference field relay N) runs; the other relays follow.
+    /// Method that the leader runs; the other relays follow. The leader is relay 1, or relay N if the mission gives
+    /// the interference as a distribution along x.
     pub method: Method,
-    /// Measurement of the interference by this relay, used in place of the mission's interference field. `None` if
-    /// the mission has no such field.
+    /// Measurement of the interference by this relay; `None` for no measurement. The measured interference replaces
+    /// the distribution along x that the mission gives. Use `None` if the mission gives no such distribution.
     pub measure: Option<Measure>,
-    /// Estimation of an unknown interferer from measurements; `None` in an interference field. Set it on all relays
-    /// of a chain, or on none.
+    /// Estimation of an unknown interferer from measurements; `None` for no estimation. It has to be `None` if the
+    /// mission gives the interference as a distribution along x. Set it on all relays of a chain, or on none.
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first solves the chain from the mission alone (bracketed schedule). If that solution is
-    /// right, one round trip of messages is enough.
+    /// True if the leader first computes the chain's target SIR by itself, from the mission. If that target is right,
+    /// one round trip of messages along the chain is enough. For the bracketed schedule only.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
-    /// Key and epoch for signing frames. With it the relay accepts signed frames only; without it, it accepts frames from any
-    /// sender. Give the key to all relays of a network, or to none.
+    /// Key and epoch for signing frames. With a key the relay accepts signed frames only; without one, it accepts
+    /// frames from any sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
-    /// Maximum time for one hop of a message, from one relay's `poll_transmit` to the next one's. It is for a sweep,
-    /// a message of 100 bytes, and includes the computation; above 0. It is scaled for longer messages.
+    /// Maximum time from one relay's `poll_transmit` to the next relay's, above 0. It applies to a message of 100
+    /// bytes (a sweep), includes the computation, and is scaled for longer messages.
     pub hop_time: Duration,
-    /// Silence of a neighbour after which heartbeats are requested, 16 times until `dead_after`; above 0.
+    /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. It sends 16 requests until
+    /// `dead_after`.
     pub probe_after: Duration,
     /// Silence after which a neighbour is lost, and minimum duration of a lease; above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the previous
-    /// view, or half of them including its proposer. Without it, the parts of a split chain would interfere with each other.
+    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the
+    /// previous view, or half of them including its proposer. Without this rule, the parts of a split chain would
+    /// interfere with each other.
     pub quorum: bool,
-    /// Behaviour of the relay without a quorum.
+    /// Behaviour of the relay while too few relays are reachable for a quorum.
     pub without_quorum: WithoutQuorum,
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
     /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// True if the firmware converts positions to latitude and longitude by configured sites. An uploaded mission
-    /// without sites is then rejected if its distance differs from that of the configured ones. Set it on all relays
-    /// of a chain, or on none.
+    /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
+    /// mission without such positions is then rejected if its distance differs from that of the surveyed positions.
+    /// Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
@@ -180,9 +186,11 @@ impl Settings {
         sited: false,
     };
 
-    /// Returns settings for a UART of `baud` bit/s to each neighbour. Below 57 600 bit/s `hop_time` is longer than the default.
+    /// Returns settings for a UART of `baud` bit/s to each neighbour. Below 57 600 bit/s `hop_time` is longer than
+    /// the default.
     ///
-    /// `hop_time` has 10 ms for computing and for the buffers on the way. Set it for a link that needs more, such as a USB adapter.
+    /// `hop_time` includes 10 ms for the computation and the buffers of the link. Set a longer time for a slower
+    /// link, such as a USB adapter.
     ///
     /// ```
     /// use uav_relay::{Method, Settings};
@@ -237,8 +245,8 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with a longer `hop_time` if the channel needs one. `load` and `baud` (bit/s) are those of
-    /// the channel.
+    /// Returns the settings with the minimum `hop_time` for a channel of `baud` bit/s with this `load`. A longer
+    /// `hop_time` is kept.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {
@@ -261,24 +269,25 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` cannot be used. It chooses altitudes in an interference field, is the joint method for more than 100
-    /// relays, or needs a feature that the crate was built without.
+    /// `method` cannot be used. It is not [`Method::Align`] although the mission gives the interference as a
+    /// distribution along x, it is the joint method for more than 100 relays, or it needs a feature that the crate
+    /// was built without.
     Method,
-    /// The mission's `reverse` is above 0, `method` is Joint, and `listen` is set.
+    /// The mission has traffic from Rx to Tx (`reverse` above 0), which the method Joint does not support.
     Reverse,
-    /// `method.explore_m` is not within 0 to 1e5, or its grid has fewer than 2 columns or rows.
+    /// `method.explore_m` is not within 0 to 1e5, or its search grid has fewer than 2 columns or rows.
     Adjust,
     /// `measure.i_max_w` is not within 1e-30 to 1e6, or `measure.samples` not within 100 to 1 000 000. Or the crate was built
     /// without the feature `field`.
     Measure,
     /// `listen.every` or `listen.half_life` is zero, or `listen.relative_error` not within 1e-3 to 1. Or the mission
-    /// has an interference field, or the crate was built without the feature `sensing`.
+    /// gives the interference as a distribution along x, or the crate was built without the feature `sensing`.
     Listen,
     /// `hop_time` is zero.
     HopTime,
     /// `auth.epoch` is zero.
     Epoch,
-    /// `probe_after` is zero, or `dead_after` not above it.
+    /// `probe_after` is zero, or `dead_after` is not longer than `probe_after`.
     Silence,
     /// `without_quorum.y_m` is not within -1e4 to 1e4, or `without_quorum.up_m` not within 0 to 1e4.
     WithoutQuorum,

@@ -2,18 +2,18 @@
 
 use crate::mission::Heading;
 
-/// Direction along the chain as seen from a relay: a neighbour of the relay, or the link to it.
+/// Side of a relay along the chain, toward Tx or toward Rx: the neighbour there, or the link to it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Direction toward the transmitter.
+    /// Side toward the transmitter Tx.
     Upstream,
-    /// Direction toward the receiver.
+    /// Side toward the receiver Rx.
     Downstream,
 }
 
 impl Side {
-    /// Returns the side to which a relay forwards the messages of a pass along the chain.
+    /// Returns the side to which a relay forwards messages that travel along the chain in this direction.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -21,7 +21,8 @@ impl Side {
         }
     }
 
-    /// Returns the side from which a relay receives passes along the chain, and to which it replies.
+    /// Returns the side from which messages arrive that travel along the chain in this direction. Replies go back
+    /// there.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

@@ -37,8 +37,8 @@ use crate::root::sqrt;
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
-/// interferer it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). In an interference field it is Upsilon(x) /
-/// `Upsilon_max`, with noise.
+/// interferer at (X, Y) it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). For interference that
+/// the mission gives as a distribution along x, it is Upsilon(x) / `Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -59,7 +59,7 @@ pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
     if nu > 0.0 { s / (1.0 + nu * s) } else { s }
 }
 
-/// Sending node of a hop: its lateral offset and altitude, and its power relative to the interference.
+/// Sending node of a hop: lateral offset, altitude, and transmit power relative to the interference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sender {
@@ -94,13 +94,14 @@ impl Sender {
         }
     }
 
-    /// Returns the SIR at a relay at `to` that receives from this node at `from_m` along x. Infinite if both are at
-    /// one place.
+    /// Returns the SIR at a relay at `to` that receives from this sender at x = `from_m`. Infinite if both are at one
+    /// place.
     ///
-    /// With s = X - x0: A ((s - d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is
-    /// the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta /
-    /// `mu_los`). In an interference field it is the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x) /
-    /// (`mu_los` d^2).
+    /// With the interferer at (X, Y), the sender at (x0, y0, h0), its gain A, s = X - x0 and d = x - x0 it is A ((s -
+    /// d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is the paper's `SIR_1` for h0
+    /// = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). For interference that
+    /// the mission gives as a distribution along x, it is the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x)
+    /// / (`mu_los` d^2).
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
         let across = to.cross_section().apart_squared(self.cross_section);
@@ -116,7 +117,7 @@ pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     mission.receiver_gain(power_w) / (square(distance) + across)
 }
 
-/// Returns the SIR at Tx when a relay at `from` sends to it with `power_w` watts. 0 unless the interferer is known.
+/// Returns the SIR at Tx when a relay at `from` sends to it with `power_w` watts. 0 while the interferer is unknown.
 pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let across = square(from.y_m) + square(from.altitude_m);
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
@@ -151,7 +152,7 @@ pub(crate) const fn square(x: f32) -> f32 {
 /// Number of bisection steps for an x at which the slope of the first hop's SIR changes its sign.
 const HALVINGS: u8 = 32;
 
-/// Maximum number of doublings of x in the search for a point at which a condition fails.
+/// Maximum number of doublings of x in the search for an x beyond an extremum of the first hop's SIR.
 const DOUBLINGS: u8 = 64;
 
 /// Shape of SIR_1, the SIR of the first hop, along x >= 0 at one altitude.
@@ -199,8 +200,8 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// Function phi(x), whose sign is that of the slope of the first hop's SIR along x. `x` is the interferer's X, and
-/// `q` is X^2 + Y^2.
+/// Function phi(x) that has the sign of the slope of the first hop's SIR along x. The field `x` is the interferer's
+/// X, and `q` is X^2 + Y^2.
 struct Slope {
     x: f32,
     q: f32,
@@ -220,14 +221,14 @@ impl Slope {
     }
 
     /// Returns half the derivative of phi at x = `at`, m, for an interferer at X > 0. phi has the sign of the slope
-    /// of the first hop's SIR. The derivative falls beyond X.
+    /// of the first hop's SIR. Beyond X the derivative falls.
     fn bend(&self, at: f32) -> f32 {
         let s = square(at - self.x) + self.aside;
         0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)
     }
 
-    /// Returns the maximum of the first hop's SIR along x, for X < 0; `peak` is its x without noise, m. X is that of
-    /// the interferer.
+    /// Returns the maximum of the first hop's SIR along x, for an interferer at X < 0. `peak` is the x of the maximum
+    /// without noise, m.
     fn hill(&self, peak: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Hill(peak);
@@ -235,8 +236,8 @@ impl Slope {
         Extremum::Hill(last(0.0, peak, |at| self.sign(at) > 0.0))
     }
 
-    /// Returns the extrema of the first hop's SIR along x, for X > 0. `bottom` is the x of the minimum without noise,
-    /// m. X is that of the interferer.
+    /// Returns the extrema of the first hop's SIR along x, for an interferer at X > 0. `bottom` is the x of the
+    /// minimum without noise, m.
     fn turns(&self, bottom: f32) -> Extremum {
         if !(self.noise > 0.0) {
             return Extremum::Valley(bottom);
@@ -255,7 +256,8 @@ impl Slope {
     }
 }
 
-/// Returns the last x in [`low`, `high`] at which `holds` is true. It is true at `low` and changes once.
+/// Returns the last x in [`low`, `high`] at which `holds` is true, by bisection. `holds` is true at `low` and changes
+/// once.
 fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
     let (mut low, mut high) = (low, high);
     for _ in 0..HALVINGS {
@@ -283,8 +285,8 @@ fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
 /// Returns the largest SIR of the first hop to a relay at `altitude_m`. The maximum is over all x in [0, D].
 ///
 /// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of
-/// [`first_hop_turn`] for X < 0, with noise as well. In an interference field it is an upper bound: the largest
-/// Upsilon right above the transmitter. It is larger at lower altitudes.
+/// [`first_hop_turn`] for X < 0, with noise as well. For interference that the mission gives as a distribution along
+/// x, it is an upper bound: the largest Upsilon right above the transmitter. It is larger at lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

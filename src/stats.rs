@@ -1,19 +1,19 @@
 //! Counters of a relay. Remote faults are counted here; they never cause an error or a panic.
 
-/// Counters since start-up; each saturates at its maximum.
+/// Counters of a relay's messages and faults since start-up; each saturates at its maximum.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Stats {
     /// Frames passed to the link, including retransmissions.
     pub sent: u32,
-    /// Retransmissions of messages of a pass along the chain and of proposals, after a missing reply.
+    /// Retransmissions of proposals, and of messages that travel along the chain, after a missing reply.
     pub repeats: u32,
-    /// Passes along the chain, of any kind, and proposals that this relay has started as the leader.
+    /// Proposals and messages along the chain (passes of any kind) that this relay started as the leader.
     pub passes_begun: u32,
     /// Messages received from a neighbour with all values in range. Some are also counted by another counter, for
     /// example as stale.
     pub received: u32,
-    /// Duplicate pass messages and proposals received; the reply to them is sent again.
+    /// Duplicates of proposals and of messages along the chain. The reply to them is sent again.
     pub repeated: u32,
     /// Intact frames between other nodes of the network, received on a shared channel.
     pub overheard: u32,
@@ -27,8 +27,8 @@ pub struct Stats {
     pub version: u32,
     /// Handshake frames with the right authentication tag. They only establish sessions, and carry no message.
     pub handshakes: u32,
-    /// Intact frames without an authentication tag at a relay with a key. At a relay without a key, mission offers,
-    /// which only a key makes acceptable.
+    /// Intact frames without an authentication tag, received by a relay with a key. A relay without a key counts
+    /// mission offers here, because it accepts offers only with a key.
     pub unsigned: u32,
     /// Intact frames with a wrong authentication tag: sent without the key, altered, or of another epoch.
     pub forged: u32,
@@ -40,20 +40,22 @@ pub struct Stats {
     pub foreign: u32,
     /// Intact frames from a node that is no neighbour, or, on a point-to-point link, for another node.
     pub misaddressed: u32,
-    /// Messages from the wrong side: a pass or proposal against its direction, or a reply along it.
+    /// Messages from the wrong neighbour. They are messages along the chain from the next relay, and replies from the
+    /// previous relay.
     pub misdirected: u32,
     /// Messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Messages of a pass or view change for another view. Also those for a mission that is not flown in this view.
+    /// Messages of another view, or of another mission than the one of this view. They belong to a pass along the
+    /// chain or to a view change.
     pub view: u32,
     /// New views that this relay has accepted.
     pub views: u32,
-    /// Messages of a pass or view change that is over or cannot be joined. Also mission offers that answer no recent
-    /// hello.
+    /// Outdated messages, for example of a pass along the chain or a view change that has ended. Also mission offers
+    /// that this relay has not requested by a recent hello.
     pub stale: u32,
-    /// Rejected interference samples: not a number, out of range, or without a measurement in progress.
+    /// Rejected interference samples: not a number, out of range, or while this relay measures nothing.
     pub samples_rejected: u32,
 }
 

@@ -48,7 +48,7 @@ impl Instant {
         self.micros
     }
 
-    /// Returns the time from `earlier` to `self`; zero if `earlier` is later.
+    /// Returns the time from `earlier` to this instant; zero if `earlier` is later.
     #[inline(never)] // as `add`
     pub const fn since(self, earlier: Self) -> Duration {
         Duration {
@@ -58,12 +58,12 @@ impl Instant {
 }
 
 impl Duration {
-    /// Returns a span of `micros` microseconds.
+    /// Returns a duration of `micros` microseconds.
     pub const fn from_micros(micros: u64) -> Self {
         Self { micros }
     }
 
-    /// Returns a span of `millis` milliseconds.
+    /// Returns a duration of `millis` milliseconds.
     pub const fn from_millis(millis: u64) -> Self {
         Self {
             micros: millis.saturating_mul(1_000),
@@ -95,15 +95,16 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Maximum backward step of the caller's time that is taken for calls in the wrong order. A larger step is taken for
-/// a changed clock.
+/// Maximum backward step of the caller's time that counts as calls in the wrong order. After a larger step the
+/// caller's clock counts as changed.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum advance of internal time in one call, some 140 years. A wrong reading does not take internal time to its
-/// end, where no timer expires.
+/// Maximum advance of internal time in one call, some 140 years. The limit keeps one wrong reading of the clock from
+/// taking internal time to its maximum, where no timer expires any more.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
-/// Converts the caller's time to internal time, which never runs backward. The caller's time may step in either direction.
+/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time may step in
+/// either direction.
 ///
 /// | caller's time | internal time |
 /// | --- | --- |
@@ -157,7 +158,8 @@ impl MonotonicClock {
     }
 }
 
-/// Returns the instant that is as far from `to` as `at` is from `from`.
+/// Converts `at` between two clocks: returns `to` + (`at` - `from`). The first clock shows `from` when the second
+/// shows `to`.
 fn shifted(at: Instant, from: Instant, to: Instant) -> Instant {
     let back = from.since(at).as_micros();
     Instant::from_micros((to + at.since(from)).as_micros().saturating_sub(back))
@@ -189,8 +191,8 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` plus a random part of up to an eighth. Relays on a shared channel then do not transmit at the
-    /// same time again and again.
+    /// Returns `span` plus a random time of up to an eighth of it. Relays on a shared channel then do not transmit at
+    /// the same time again and again.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.

@@ -2,13 +2,13 @@
 
 use crate::mission::MAX_RELAYS;
 
-/// Identifier of a view, an agreement on the members of the chain; ordered. It has a number, and the node that
-/// proposed the view, so that no two nodes propose the same view.
+/// Identifier of a view, an agreement on the members of the chain. It consists of a number and of the node that
+/// proposed the view, so that no two nodes propose the same view. Views are ordered by number, then by proposer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
 
-/// Number of bits for the proposer's node number: a chain has at most 1000 relays.
+/// Number of bits of a view's identifier for the proposing node's number. They suffice for a chain of 1000 relays.
 const NODE: u32 = 10;
 
 impl ViewId {
@@ -35,7 +35,7 @@ impl ViewId {
         (self.0 & ((1 << NODE) - 1)) as u16
     }
 
-    /// Returns true if a node can have proposed this view: not the initial one, and a valid proposer.
+    /// Returns true if a node can have proposed this view: a valid proposer, and not the initial view.
     pub(crate) const fn is_proposed(self) -> bool {
         self.number() > 0 && 1 <= self.proposer() && self.proposer() <= MAX_RELAYS
     }
@@ -50,7 +50,7 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, or one `most` numbers ahead of this view if `view` is farther ahead.
+    /// Returns `view` with its number limited to at most `most` above the number of this view.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -60,8 +60,8 @@ impl ViewId {
         }
     }
 
-    /// Value that is added to the mission's digest in messages of this view, to tell views apart. Views of one
-    /// number, and of thousands of consecutive ones, have different values.
+    /// Returns the value that marks messages of this view; it is added to the mission's digest. Views of one number,
+    /// and of thousands of consecutive numbers, have different values.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -2,7 +2,7 @@
 
 use crate::place::Placement;
 
-/// Behaviour of a relay while the relays that it can reach are no quorum of the chain.
+/// Behaviour of a relay while the relays that it can reach are too few for a quorum of the chain.
 ///
 /// [`Leave`](Self::Leave) clears the line for the relays that have a quorum. Set the same value on all relays: relays
 /// that leave the line then keep their order and distances.
@@ -12,8 +12,8 @@ pub enum WithoutQuorum {
     /// Hold the last agreed position while there is no quorum.
     #[default]
     Hold,
-    /// Leave the line from the last agreed position, along y and upward. With a guard, only within its geofence
-    /// ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
+    /// Leave the line from Tx to Rx: fly from the last agreed position sideways (along y) and upward. With a guard,
+    /// only within its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
         /// Lateral offset that is added to the agreed position, m: -1e4 to 1e4.
         y_m: f32,
@@ -30,7 +30,7 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the position to take without a quorum; `place` is the last agreed one.
+    /// Returns the position for a relay without a quorum; `place` is the last agreed position.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

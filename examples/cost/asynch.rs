@@ -18,7 +18,7 @@ use super::missions::mission;
 /// Bit rate of the ports, bit/s.
 const BAUD: u32 = 115_200;
 
-/// Serial port in memory: a frame to receive, the range of its unread bytes, number of bytes sent.
+/// Serial port in memory. `coming` is a frame and the range of its unread bytes, `gone` the number of sent bytes.
 struct Memory {
     coming: Cell<([u8; MAX_FRAME], usize, usize)>,
     gone: Cell<usize>,
@@ -107,8 +107,8 @@ impl Clock for FixedClock {
     }
 }
 
-/// Returns relay 2 of 3, and the first sweep message to it, its length, and the time. A sweep message passes the
-/// search for positions down the chain from relay to relay.
+/// Returns relay 2 of 3, the first sweep message that it receives, the message's length, and the time. The sweep
+/// message carries the search for the positions along the chain, from relay to relay.
 fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -125,8 +125,8 @@ fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Measures the instructions for a sweep message through relay 2, by the blocking and the async runner. A sweep
-/// message is the search message that goes down the chain from relay to relay.
+/// Measures the instructions with which relay 2 handles a sweep message. The blocking and the async driver of its ports are
+/// compared. The sweep message carries the search for the positions along the chain.
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = relay_and_sweep() else {
         return;

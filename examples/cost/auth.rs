@@ -10,8 +10,8 @@ use super::missions::mission;
 
 pub(crate) const KEY: Key = Key::new([0xA5; 32]);
 
-/// Returns the instructions for the authentication tag of a frame with `body` bytes. Sender and receiver each compute
-/// it once.
+/// Returns the number of instructions for the authentication tag of a frame with `body` payload bytes. Sender and
+/// receiver each compute the tag once.
 fn tag(body: usize) -> u32 {
     const LONGEST: [u8; 231] = [0x5A; 231];
     let signed = black_box(LONGEST.get(..10 + body).unwrap_or_default());
@@ -34,7 +34,8 @@ fn exchange_all(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     }
 }
 
-/// Measures the instructions for authentication tags, a signed search message, and a rejected replay.
+/// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay. The sweep
+/// message carries the search for positions along the chain.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);

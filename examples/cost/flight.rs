@@ -8,7 +8,7 @@ use uav_relay::{Geodetic, Placement, Sites};
 
 use super::counter::instructions;
 
-/// Measures the instructions for creating the axis between two sites, and for position conversions.
+/// Measures the instructions for creating the line from Tx to Rx on earth, and converting positions.
 pub(crate) fn flight() {
     let site = Geodetic::from_degrees;
     let (Some(tx), Some(rx)) = (site(47.40, 8.54, 420.0), site(47.41, 8.55, 431.0)) else {

@@ -52,8 +52,8 @@ impl Flight {
         }
     }
 
-    /// Runs the chain until all relays hold their positions, for at most `turns` rounds of timers. Returns true if
-    /// they do.
+    /// Runs the chain until all relays hold their agreed positions, for at most `turns` rounds of timers. Returns
+    /// true if they do.
     fn run_until_holding(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {
@@ -83,7 +83,8 @@ impl Flight {
     }
 }
 
-/// Result of a simulated chain: 1 if it settled, cost of its most expensive call, longest frame.
+/// Result of a simulated chain. `settled` is 1 if all relays hold their agreed positions, `most` the instructions of
+/// the most expensive call, and `longest` the length of the longest frame, bytes.
 struct Flown {
     settled: u32,
     most: u32,

@@ -46,7 +46,7 @@ pub(crate) const INTERFERER: Interferer = Interferer {
     y_m: 150.0,
 };
 
-/// Mission of three relays that may choose altitudes of 20 to 300 m.
+/// Mission of three relays with altitudes of 20 to 300 m to choose from.
 pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     band: Band {
         least_m: 20.0,
@@ -56,13 +56,13 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
-/// Mission of three relays that may choose altitudes, for both directions.
+/// Mission of three relays with ranges of altitudes for both directions.
 pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
     reverse: 1.0,
     ..*HIGH.config()
 });
 
-/// Mission of three relays that may choose altitudes, and lateral positions 280 m to either side.
+/// Mission of three relays that may choose altitudes, and of lateral offsets, 280 m to either side.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,
@@ -90,7 +90,7 @@ pub(crate) const POINTS: [FieldPoint; 4] = [
     },
 ];
 
-/// Mission of three relays in a non-uniform interference field.
+/// Mission of three relays whose interference is a known distribution along x, not the same everywhere.
 pub(crate) const UNEVEN: Mission = Mission::new(MissionConfig {
     interference: Interference::Field(Field::new(&POINTS)),
     ..*mission(3).config()

@@ -66,21 +66,22 @@ fn reach_in_noise() {
     hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
-/// Largest costs, in instructions, of the calls that handle a sweep and its verdict. A sweep is the search that
-/// passes along the chain from relay to relay; the verdict is its result on the way back.
+/// Instructions of the most expensive calls that handle a sweep and its verdict. A sweep is a message that carries
+/// the search for positions along the chain; the verdict is the message with its result on the way back.
 struct SweepCost {
     begin: u32,
     through: u32,
     at_tail: u32,
     back: u32,
     next: u32,
-    /// Longest frame, bytes.
+    /// Length of the longest frame, bytes.
     longest: usize,
-    /// True if the chain has agreed.
+    /// True if the chain has agreed on positions.
     settled: bool,
 }
 
-/// Prints the costs of a sweep (search along the chain), for traffic in one direction and in both.
+/// Prints the costs of a sweep (search for positions along the chain). They are measured for a mission with traffic
+/// in one direction, and for one with traffic in both.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
@@ -105,7 +106,7 @@ pub(crate) fn sweep() {
     hprintln!("settled_both_ways {}", u32::from(cost.settled));
 }
 
-/// Measures a full sweep (search along the chain of three relays), and the verdict on its way back.
+/// Measures a sweep (search for positions along three relays) and its result on the way back.
 #[inline(never)]
 fn measured(mission: Mission) -> SweepCost {
     let settings = Settings {
@@ -206,8 +207,8 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the instructions of the calls in which the first of 100 relays predicts the chain. Prints the largest
-/// cost and the number of calls.
+/// Measures the instructions of the calls in which relay 1 of 100 computes the target SIR in advance. Prints the
+/// largest cost and the number of calls.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);

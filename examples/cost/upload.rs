@@ -7,8 +7,8 @@ use super::auth::KEY;
 use super::counter::{instructions, next_frame, relay};
 use super::missions::mission;
 
-/// Measures the instructions that relay 1 takes to accept a mission offered by a ground station. The offer is its own
-/// mission as version 1.
+/// Measures the instructions that relay 1 takes to accept a mission offered by a ground station. The offered mission
+/// is the relay's own, as version 1.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn upload() {
     const THREE: Mission = mission(3);

@@ -8,7 +8,7 @@ use uav_relay::wire::message::{Message, MessageError, SweepVerdict};
 /// First bytes that the golden firmware sends, once it can receive.
 pub const READY: &[u8] = b"ready\0";
 
-/// Answers received frames, so that a test can compare the results of target and PC.
+/// Generator of the answers to received frames, by which a test compares the results of target and PC.
 ///
 /// A valid frame is answered with itself, decoded and encoded again. A sweep message is also answered with a verdict
 /// message that contains values of the sweep. An invalid frame is answered with a digit for the error, and a
@@ -25,7 +25,7 @@ impl Answerer {
         }
     }
 
-    /// Handles a received `byte`, and sends the answer if it completes a frame.
+    /// Processes a received `byte`. If it completes a frame, the answer is passed to `send`.
     pub fn hear(&mut self, byte: u8, mut send: impl FnMut(&[u8])) {
         let decoded = match self.deframer.push(byte) {
             None => return,

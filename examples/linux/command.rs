@@ -8,7 +8,8 @@ use uav_relay_scenario::deployment::Deployment;
 
 use crate::config::{self, FileOnlySettings, FileOptions};
 
-/// Parses the command line and the file named by `--config`. `section` adds the program's own section of that file.
+/// Parses the command line and the file named by `--config`. `section` reads the file's section that only this
+/// program has.
 ///
 /// # Errors
 /// The exit status after `--help` or a mistake, which has been printed.
@@ -27,7 +28,8 @@ pub fn read<T: Parser>(
     Ok((options, beyond))
 }
 
-/// Returns clap's error as one line, with the suggested spelling. The other tips and the usage are dropped.
+/// Returns the first paragraph of clap's error as one line, with the suggested spelling. Other tips and the usage are
+/// dropped.
 fn first(text: &str) -> String {
     let mut lines = text.lines().map(str::trim);
     let wrong: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
@@ -81,7 +83,7 @@ pub fn number([least, most]: [f32; 2]) -> impl Parse<f32> {
     }
 }
 
-/// Parses a number that is one of several in an option's value; errors begin with its `name`.
+/// Parses one of several numbers in an option's value. Error messages begin with the number's `name`.
 ///
 /// # Errors
 /// A message with the name and the allowed range.

@@ -21,9 +21,9 @@ const TOLERANCE: f64 = 1e-4;
 /// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
-    /// Channel given by the file; `None` for the paper's channel.
+    /// Channel given by the file; `None` for the default channel, that of the paper.
     pub channel: Option<Channel>,
-    /// Interference field given by the file, if any.
+    /// Distribution of the interference along x given by the file, if any.
     pub field: Option<Interference>,
     /// Profiles (altitude and power) of single relays, with the indices of these relays.
     pub profiles: Vec<(u16, Profile)>,
@@ -49,7 +49,7 @@ impl FileOnlySettings {
     }
 }
 
-/// Command-line option that overrides a different value in the file.
+/// Command-line option that overrides another value in the file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Override {
     /// Option of the command line and its value, as one text.
@@ -104,7 +104,8 @@ impl FileOptions {
         self.options.extend(path.map(|path| (name, Some(path))));
     }
 
-    /// Adds an option with a relative path, see [`path`](Self::path), or with a `udp:` address unchanged.
+    /// Adds an option whose value is a path or a `udp:` address. A path is relative to the file's folder; an address
+    /// is unchanged.
     pub fn path_or_udp(&mut self, name: &'static str, place: Option<&String>) {
         match place {
             Some(path) if !path.starts_with("udp:") => self.path(name, Some(&PathBuf::from(path))),
@@ -112,14 +113,15 @@ impl FileOptions {
         }
     }
 
-    /// Adds the option `name`, which has no value, if `is` is true.
+    /// Adds the option `name`, which takes no value, if `is` is true.
     pub fn flag(&mut self, name: &'static str, is: Option<bool>) {
         if is == Some(true) {
             self.options.push((name, None));
         }
     }
 
-    /// Returns an error if the file has autopilot settings, but no autopilot is given there or in `line`.
+    /// Returns an error if the file has settings for an autopilot, but no autopilot is named. Both the file and the
+    /// command line may name one.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {
@@ -136,7 +138,7 @@ impl FileOptions {
         })
     }
 
-    /// Removes the file's options that the command line also gives, or excludes.
+    /// Removes those options of the file that the command line also gives, or excludes by another option.
     ///
     /// Returns the remaining options, and as overrides the removed ones whose value differs from the command line's.
     fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
@@ -173,8 +175,8 @@ impl FileOptions {
     }
 }
 
-/// Returns the command line's value for the option `name`; `None` without this option. The value is empty if nothing
-/// follows the option.
+/// Returns the value of the option `name` on the command line; `None` without this option. The value is empty if the
+/// option is the last word.
 fn value_of(line: &[OsString], name: &str) -> Option<String> {
     let with_value = format!("{name}=");
     line.iter().enumerate().find_map(|(at, word)| {
@@ -187,7 +189,8 @@ fn value_of(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Returns true if both values are the same text or the same list of numbers, or if `other` is empty.
+/// Returns true if both values are the same text or the same list of numbers. An empty `other` also counts as the
+/// same, because it is that of an option without a value.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
@@ -197,14 +200,14 @@ fn is_same(one: &str, other: &str) -> bool {
     one == other || other.is_empty() || numbers(one).is_some_and(|one| Some(one) == numbers(other))
 }
 
-/// Options that need an autopilot, and the file's keys for them.
+/// Command-line options that have an effect only with an autopilot, and their keys in the file.
 const NEEDS_AUTOPILOT: [(&str, &str); 3] = [
     ("--autopilot-baud", "autopilot_baud"),
     ("--autopilot-key-file", "autopilot_key_file"),
     ("--speed", "speed_m_s"),
 ];
 
-/// Command-line options, and the file's options that each of them excludes.
+/// Command-line options, each with the options of the file that it makes void.
 const EXCLUDES: [(&str, &[&str]); 6] = [
     ("--shared", &["--upstream", "--downstream"]),
     ("--upstream", &["--shared"]),
@@ -225,7 +228,7 @@ const EXCLUDES: [(&str, &[&str]); 6] = [
 /// Merges the `--config` file into the command line. Returns the arguments, the file's first, and the settings that
 /// only a file can give.
 ///
-/// `section` adds the program's own section of the file.
+/// `section` reads the file's section that only this program has.
 ///
 /// # Errors
 /// One line that says what is wrong with the file.
@@ -293,7 +296,7 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
     })
 }
 
-/// Adds the scenario's mission to `given` as options; returns the settings that have no option.
+/// Adds the mission of the file's scenario to the options `given`. Returns the settings for which there is no option.
 fn mission_options(
     scenario: &Scenario,
     given: &mut FileOptions,

@@ -40,11 +40,12 @@ const EVERY: Duration = Duration::from_millis(2_000);
 /// Minimum number of frames rejected for a reason between two checks before the reason is reported.
 const MANY: u32 = 3;
 
-/// Minimum number of damaged frames between two checks that suggests a wrong baud rate. No frame may have been
-/// intact.
+/// Minimum number of damaged frames between two checks from which on the baud rate may be wrong. It is reported only
+/// if no frame was intact.
 const DAMAGED: u32 = 10;
 
-/// Detector of reasons for rejected frames. It has the counters at the last check, and the reasons already reported.
+/// Detector of the reasons why frames are rejected. It has the counters at the last check, and the reasons already
+/// reported.
 #[derive(Debug, Default)]
 pub struct RejectionReasons {
     last: Stats,
@@ -53,8 +54,8 @@ pub struct RejectionReasons {
 }
 
 impl RejectionReasons {
-    /// Returns a text for the next new reason of rejected frames; `None` if there is none. `signs` is true if this
-    /// relay signs.
+    /// Returns a text about a reason why frames are rejected; `None` if there is no new one. Each reason is returned
+    /// once. `signs` is true if this relay signs.
     pub fn next_reason(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.check_at {
             return None;

@@ -14,11 +14,12 @@ use crate::log::Log;
 /// Maximum length of an input line, bytes; a longer one is rejected.
 pub const LONGEST: usize = 200;
 
-/// Description of a valid power, for error messages.
+/// Description of the permitted powers, for error messages.
 pub const POWER: &str =
     "a power within 1e-30 to 1e6 W, or that in dBm with the unit behind it, as -95 dBm";
 
-/// Parses a power, W, from the words of a line: a number of W, or of dBm with that unit. `None` outside 1e-30 to 1e6 W.
+/// Parses a power from the words of a line: a number in W, or a number in dBm followed by that unit. Returns it in W;
+/// `None` outside 1e-30 to 1e6 W.
 #[must_use]
 pub fn power_w(words: &[&str]) -> Option<f32> {
     let number = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
@@ -46,7 +47,8 @@ pub fn words(line: &[u8]) -> Option<Vec<&str>> {
 pub struct InvalidLines(u64);
 
 impl InvalidLines {
-    /// Counts an invalid line; the first one is logged as `event`, with the `expected` content.
+    /// Counts an invalid line. The first one is logged as the event `event`, with a description of the `expected`
+    /// content.
     pub fn refuse(&mut self, now: Instant, log: &Log, event: &str, line: &[u8], expected: &str) {
         self.0 += 1;
         if self.0 == 1 {
@@ -73,7 +75,8 @@ pub struct Fifo {
     partial_line: PartialLine,
 }
 
-/// Incomplete line, as received so far. It has at most one byte more than [`LONGEST`], which marks it as too long.
+/// Incomplete line, as received so far. A line longer than [`LONGEST`] is cut to one byte more, which marks it as too
+/// long.
 #[derive(Debug, Default)]
 pub struct PartialLine(Vec<u8>);
 

@@ -50,7 +50,7 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Request to confirm that the writer thread has written or dropped all earlier lines.
+    /// Request to the writer thread to confirm that all earlier lines are written or dropped.
     Flush(SyncSender<()>),
 }
 
@@ -112,7 +112,7 @@ impl Log {
         })
     }
 
-    /// Logs an event at `now`: a short name, fields for programs, and a text for people.
+    /// Logs an event at `now`: its short name, data fields for programs, and a text for people.
     pub fn event(&self, now: Instant, event: &str, fields: Value, text: impl fmt::Display) {
         let line = self.format.line(now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
@@ -120,7 +120,7 @@ impl Log {
         }
     }
 
-    /// Logs an event without fields.
+    /// Logs an event without data fields.
     pub fn line(&self, now: Instant, event: &str, text: impl fmt::Display) {
         self.event(now, event, Value::Null, text);
     }
@@ -164,7 +164,7 @@ fn appended(path: &Path) -> std::io::Result<File> {
 struct Writer {
     file: File,
     path: Option<PathBuf>,
-    /// True if the last log line was written only in part.
+    /// True if the last log line was written only in part, for example on a full disk.
     torn: bool,
     /// Number of dropped lines that have already been reported in the log.
     reported_drops: u64,

@@ -13,10 +13,10 @@ pub const DISTANCE_M: [f32; 2] = [1.0, 1e6];
 /// Permitted range of an altitude, m.
 pub const ALTITUDE_M: [f32; 2] = [0.1, 1e4];
 
-/// Permitted range of the left limit of lateral positions, y in m.
+/// Permitted range of the lower limit of lateral offsets y, left of the line Tx to Rx, m.
 pub const LEFT_M: [f32; 2] = [-1e5, 0.0];
 
-/// Permitted range of the right limit of lateral positions, y in m.
+/// Permitted range of the upper limit of lateral offsets y, right of the line Tx to Rx, m.
 pub const RIGHT_M: [f32; 2] = [0.0, 1e5];
 
 /// Permitted range of a transmit power, W.
@@ -74,7 +74,7 @@ pub struct MissionOptions {
     /// Left limit of the places that `joint` chooses, facing the receiver, as y in m, -1e5 to 0
     #[arg(long = "lateral-min-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(LEFT_M))]
     pub lateral_min: f32,
-    /// Right limit of these places, as y in m, 0 to 1e5
+    /// Right limit of the places that `joint` chooses, facing the receiver, as y in m, 0 to 1e5
     #[arg(long = "lateral-max-m", value_name = "M", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(RIGHT_M))]
     pub lateral_max: f32,
     /// Power of the transmitter, W, 1e-6 to 1e6
@@ -90,10 +90,10 @@ pub struct MissionOptions {
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W))]
     pub noise: f32,
-    /// SIR that a hop needs on the way back from the receiver, relative to that on the way there, 0 to 1. 0 is one direction
+    /// SIR that a hop needs toward the transmitter, relative to its SIR toward the receiver, 0 to 1. 0 is one direction only
     #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(REVERSE))]
     pub reverse: f32,
-    /// Power of the receiver on the way back, W, 1e-6 to 1e6; default: --tx-power
+    /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub rx_power: Option<f32>,
     /// Minimum distance between two relays, m, 0 to 1e5
@@ -102,12 +102,13 @@ pub struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// Returns the interferer of the command line, else the `field` of a file, else the paper's interferer.
+    /// Returns the interference of the mission. It is the interferer of the command line, or else `field`, the
+    /// interference that the file gives along x, or else the paper's interferer.
     pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
-    /// Returns the mission's parameters for `relays` relays. Without a `channel` it has the paper's.
+    /// Returns the mission's parameters for `relays` relays. If `channel` is `None`, the channel is the paper's.
     ///
     /// # Errors
     /// One line that says what is wrong.
@@ -147,7 +148,7 @@ impl MissionOptions {
     }
 }
 
-/// Checks a mission's parameters. Error messages name options with their `prefix`, "--" or "--new-".
+/// Checks a mission's parameters. Error messages name options, which begin with `prefix`: "--" or "--new-".
 ///
 /// # Errors
 /// One line that names the option and the fault.

@@ -10,14 +10,14 @@ use uav_relay::{Duration, Instant};
 pub struct Notify {
     socket: UnixDatagram,
     to: SocketAddr,
-    /// Interval of the messages to systemd's watchdog, half its timeout; `None` without a watchdog.
+    /// Interval of the reports to systemd's watchdog, half of its timeout; `None` without a watchdog.
     every: Option<Duration>,
     due: Instant,
 }
 
 impl Notify {
-    /// Opens the socket that `NOTIFY_SOCKET` names. `None` without one or if it can not be reached: the relay flies
-    /// all the same.
+    /// Opens the socket that `NOTIFY_SOCKET` names. Returns `None` without one, or if the socket can not be reached:
+    /// then the program runs all the same.
     pub fn open() -> Option<Self> {
         let to = address(&std::env::var_os("NOTIFY_SOCKET")?)?;
         let socket = UnixDatagram::unbound().ok()?;

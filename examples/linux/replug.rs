@@ -14,11 +14,11 @@ use crate::log::Log;
 use crate::tap::Tap;
 use crate::tty::Tty;
 
-/// Pause before the first attempt to reopen a tty; each further pause doubles, up to [`LONGEST`].
+/// Pause before the first attempt to reopen a tty. The pause doubles with every attempt, up to [`LONGEST`].
 const FIRST: Duration = Duration::from_millis(250);
 const LONGEST: Duration = Duration::from_millis(4_000);
 
-/// Tty that may be unplugged and plugged in again, known by its name. All its traffic passes through `read` and
+/// Tty that may be unplugged and plugged in again under the same name. All its traffic passes through `read` and
 /// `write`.
 #[derive(Debug)]
 pub struct Replug {
@@ -33,7 +33,7 @@ pub struct Replug {
     tap: Option<Tap>,
 }
 
-/// Traffic counters of a tty, in bytes and interruptions.
+/// Traffic counters of a tty: bytes, and the number of times that it was missing.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     read: u64,
@@ -61,12 +61,12 @@ impl Replug {
         })
     }
 
-    /// Captures all further traffic of this tty with `tap`.
+    /// Passes all further traffic of this tty to `tap`, which captures it in a file.
     pub fn tapped(&mut self, tap: Tap) {
         self.tap = Some(tap);
     }
 
-    /// Closes a failed tty and reopens it when a retry is due. Logs each change once.
+    /// Closes a tty that has failed, and tries to reopen it when that is due. Logs each loss and each return once.
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
@@ -114,7 +114,7 @@ impl Replug {
         self.tty.as_ref().map(|tty| (tty.as_fd(), tty.interest()))
     }
 
-    /// Records the events that poll(2) reported for this tty.
+    /// Records the events that poll(2) reported for this tty, such as a hang-up.
     pub fn noticed(&mut self, events: PollFlags) {
         if let Some(tty) = &mut self.tty {
             tty.noticed(events);

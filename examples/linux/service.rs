@@ -26,7 +26,7 @@ const LAST_LINES: Duration = Duration::from_millis(500);
 /// Longest sleep after poll(2) has failed.
 const NAP: Duration = Duration::from_millis(10);
 
-/// Services of a long-running program.
+/// Common services of a long-running program: log, clock, signals, status socket and systemd.
 #[derive(Debug)]
 pub struct Service {
     /// Log of the program.
@@ -42,7 +42,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// Registers the signals and starts the clock, the log and the socket. Every log line names `source`.
+    /// Registers the signals, and starts the clock, the log and the status socket. Every log line names `source`.
     ///
     /// # Errors
     /// One line that names the fault.
@@ -76,11 +76,11 @@ impl Service {
         self.notify.iter().for_each(Notify::ready);
     }
 
-    /// Handles signals and status requests, and reports to the watchdog. Returns the time by which to call it again,
-    /// if any.
+    /// Handles signals and status requests, and reports to systemd's watchdog. Returns the time by which to call it
+    /// again, if any.
     ///
-    /// `answer` gets `None` for a status request, or a command and its sender. `who` names the program in the line
-    /// after a SIGHUP.
+    /// `answer` returns the answer to a request. It gets `None` for a status request, or a command and its sender.
+    /// `who` names the program in the log line after a SIGHUP.
     pub fn tend(
         &mut self,
         time: Instant,
@@ -110,12 +110,12 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// Sleeps until `wake`, a signal, a status request, or until one of `ttys` or `others` is ready. `wake` is a
-    /// time; without it there is no time limit.
+    /// Sleeps until the time `wake`, a signal, a status request, or input on one of `ttys` or `others`. Without
+    /// `wake` there is no time limit.
     ///
     /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
     ///
-    /// A tty is ready when it has bytes, or room after it had none.
+    /// A tty is ready when it has received bytes, or accepts bytes again after it was full.
     pub fn sleep<'a>(
         &mut self,
         wake: Option<Instant>,

@@ -6,7 +6,7 @@ use clap::Args;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Geodetic, Sites};
 
-/// Options of the two ends of the line.
+/// Options for the positions of the transmitter and the receiver on earth.
 #[derive(Args, Debug)]
 pub struct SiteOptions {
     /// Position of the transmitter. Latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
@@ -18,7 +18,7 @@ pub struct SiteOptions {
 }
 
 impl SiteOptions {
-    /// Returns the sites of transmitter and receiver; `None` if they were not given.
+    /// Returns the positions of transmitter and receiver; `None` if they were not given.
     pub fn sites(&self) -> Option<Sites> {
         let (Some(tx), Some(rx)) = (self.site_tx, self.site_rx) else {
             return None;
@@ -26,7 +26,7 @@ impl SiteOptions {
         Some(Sites { tx, rx })
     }
 
-    /// Returns the sites of transmitter and receiver, if given. Checks that they are `distance_m` apart.
+    /// Returns the positions of transmitter and receiver, if given. Checks that they are `distance_m` apart.
     ///
     /// # Errors
     /// One line that names the option and the right distance.
@@ -45,7 +45,7 @@ impl SiteOptions {
     }
 }
 
-/// Displays the sites of transmitter and receiver in the format of the command-line options.
+/// Positions of transmitter and receiver, displayed in the format of the command-line options.
 #[derive(Clone, Copy, Debug)]
 pub struct Between(pub Sites);
 
@@ -56,7 +56,7 @@ impl fmt::Display for Between {
     }
 }
 
-/// Returns a site with latitude and longitude swapped, a frequent mistake.
+/// Returns a geodetic position with latitude and longitude swapped, which is a frequent mistake.
 #[must_use]
 pub fn swapped(site: Geodetic) -> Geodetic {
     Geodetic {
@@ -66,14 +66,14 @@ pub fn swapped(site: Geodetic) -> Geodetic {
     }
 }
 
-/// Formats a site as the command-line options do: latitude and longitude (degrees), height (m).
+/// Formats a position as the command-line options do: latitude and longitude (degrees), height (m).
 pub fn degrees(at: Geodetic) -> String {
     let part = |number: i32, unit: f64| f64::from(number) / unit;
     let (lat, lon) = (part(at.lat_e7, 1e7), part(at.lon_e7, 1e7));
     format!("{lat:.7},{lon:.7},{:.3}", part(at.amsl_mm, 1e3))
 }
 
-/// Parses a site: latitude and longitude (degrees), and height above the mean sea level (m).
+/// Parses a position: latitude and longitude (degrees), and height above the mean sea level (m).
 ///
 /// # Errors
 /// The expected form.

@@ -16,7 +16,8 @@ use crate::lines::LONGEST;
 /// Maximum number of connections that one call accepts.
 const ANSWERS: usize = 4;
 
-/// Maximum number of clients that may wait. Of any more, the oldest get the state at once.
+/// Maximum number of clients whose request is not complete. If there are more, the oldest of them are answered at
+/// once.
 const CLIENTS: usize = 16;
 
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -78,8 +79,8 @@ impl StatusSocket {
         std::iter::once(self.listener.as_fd()).chain(clients)
     }
 
-    /// Accepts connections and reads from them. Returns the complete requests, and the time of the next call; `None`
-    /// without clients.
+    /// Accepts connections and reads from them. Returns the complete requests, and the time by which to call it
+    /// again; `None` without clients.
     pub fn questions(&mut self, now: Instant) -> (Vec<Question>, Option<Instant>) {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
         let accepted = accepted.filter(|(stream, _)| stream.set_nonblocking(true).is_ok());
@@ -101,7 +102,8 @@ impl StatusSocket {
 }
 
 impl Client {
-    /// Reads from the client. Returns true after a line, the end of the stream, an overlong line or a timeout.
+    /// Reads from the client. Returns true if the request is complete: after a line, the end of the stream, an
+    /// overlong line or a timeout.
     fn is_complete(&mut self, now: Instant) -> bool {
         let mut bytes = [0; LONGEST];
         let has_ended = match self.stream.read(&mut bytes) {
@@ -138,8 +140,8 @@ impl Question {
         "an unknown user".to_owned()
     }
 
-    /// Sends the answer to the client and closes the connection. A client that leaves no room in the kernel's buffer
-    /// gets only a part.
+    /// Sends the answer to the client and closes the connection. If the kernel's buffer for this client is full, only
+    /// a part is sent.
     pub fn answer(mut self, answer: &Value) {
         let _ = self.stream.write_all(format!("{answer}\n").as_bytes());
     }

@@ -36,8 +36,8 @@ fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     new.sync_all()
 }
 
-/// Returns this start's epoch, one more than in `file`, and writes it to the file before it is used. No power failure
-/// makes a relay use an epoch twice.
+/// Returns the epoch of this start, which is one more than the number in `file`. The file is updated before the epoch
+/// is used, so that even a power failure never makes a relay use an epoch twice.
 ///
 /// A missing file counts as the clock's seconds since 1970, so that the epoch does not restart from 1.
 ///
@@ -71,7 +71,7 @@ const LAST: Span = Span::from_millis(500);
 
 type Done = (std::io::Result<()>, Span);
 
-/// Record in a file, followed by a CRC-32C. A separate thread writes it, so that a slow or full disk never blocks the
+/// File with one record and a CRC-32C. A separate thread writes it, so that a slow or full disk never blocks the
 /// program.
 ///
 /// After a failed write the program flies on; the failure is logged once and counted, and the write is tried again
@@ -87,7 +87,7 @@ pub struct StoredFile {
     /// Newest record to store.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
-    /// Record of the last write that has ended, successful or not.
+    /// Record whose write has ended last, successful or not.
     tried: Option<Vec<u8>>,
     writes: u64,
     slowest: Span,
@@ -142,7 +142,8 @@ impl StoredFile {
         })
     }
 
-    /// Begins to write `record`; returns true once the write has ended, also if it has failed.
+    /// Begins to write `record` unless it was written before. Returns true once its write has ended, even if it has
+    /// failed.
     ///
     /// After a failure the program flies on, because a drone in the air must not fall silent for a full disk.
     pub fn store(&mut self, record: &[u8]) -> bool {
@@ -156,8 +157,8 @@ impl StoredFile {
         is_tried
     }
 
-    /// Finishes a write, and begins the next one or retries a failed one when due. Returns the time of the next
-    /// retry, if a write has failed.
+    /// Handles the end of a write, and begins the next write if there is one. A failed write is retried when due.
+    /// Returns the time of that retry, if any.
     pub fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         let mut bytes = [0; 8];
         let _ = (&self.ended).read(&mut bytes);
@@ -171,7 +172,7 @@ impl StoredFile {
         (self.failing && self.writing.is_none()).then_some(self.again_at)
     }
 
-    /// Passes the newest record to the writer thread; does nothing while a write is in progress.
+    /// Passes the newest record to the writer thread, unless that thread is writing.
     fn write(&mut self) {
         if let (None, Some(record)) = (&self.writing, &self.record)
             && self
@@ -253,8 +254,8 @@ pub fn load(option: &str, file: &Path) -> Result<Option<Vec<u8>>, String> {
     }
 }
 
-/// Returns the record in `bytes`, the content of a file written by [`StoredFile`]. `None` for another length or a
-/// wrong CRC.
+/// Returns the record in `bytes`, the content of a [`StoredFile`]. `None` if the record does not have `length` bytes
+/// or its CRC is wrong.
 pub fn record(bytes: &[u8], length: usize) -> Option<&[u8]> {
     let (record, check) = bytes.split_at_checked(length)?;
     (sum(record) == *check).then_some(record)

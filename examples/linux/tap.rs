@@ -16,12 +16,12 @@ use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, Interface};
 use crate::log::Log;
 use crate::replug::Replug;
 
-/// Maximum number of reads and writes waiting to be captured; further ones are left out.
+/// Maximum number of reads and writes that wait for the capture's writer thread. Further ones are not captured.
 const QUEUE: usize = 1_024;
 
 const MAX_CAPTURES: u32 = 9_999;
 
-/// Bytes that one call received or sent at port number `port`.
+/// Bytes received or sent by one call, at the port with the number `port`.
 struct Piece {
     port: usize,
     at: Duration,
@@ -29,7 +29,7 @@ struct Piece {
     bytes: Vec<u8>,
 }
 
-/// State of a capture, shared by the taps of all ports.
+/// State of a capture of serial traffic, shared by all its ports.
 #[derive(Debug, Default)]
 struct CaptureState {
     /// Error that ended the capture early.
@@ -37,7 +37,7 @@ struct CaptureState {
     is_reported: AtomicBool,
 }
 
-/// Tap of one port, which passes the port's traffic to the writer thread of the capture.
+/// Capture of one port, which passes the port's traffic to the writer thread of the capture file.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
@@ -74,7 +74,7 @@ impl Tap {
         self.is_over
     }
 
-    /// Returns the error that ended the capture, once. All taps of the capture share it.
+    /// Returns the error that ended the capture, but only once for all ports.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let was_reported = self.state.is_reported.swap(true, Ordering::Relaxed);
@@ -92,10 +92,11 @@ impl Tap {
     }
 }
 
-/// Captures all further traffic of `ttys` in a file. Logs the name of that file if it differs from `asked`.
+/// Captures all further traffic of `ttys` in the file `asked`. Logs the name of the file if another one had to be
+/// used.
 ///
 /// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if
-/// `asked` exists, the file is `numbered`.
+/// `asked` exists, a number is added to the file's name.
 ///
 /// # Errors
 /// One line that names the file.
@@ -137,7 +138,7 @@ pub fn attach<'a>(
     Ok(())
 }
 
-/// Creates the capture file under the first free name; opens a device or a FIFO directly.
+/// Creates the capture file under the first free name. A device or a FIFO is opened under its own name.
 fn create(path: &Path) -> Result<(File, PathBuf), String> {
     let named = |error: io::Error| format!("--capture {}: {error}", path.display());
     let is_other = path.metadata().is_ok_and(|it| !it.is_file());

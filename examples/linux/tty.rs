@@ -16,7 +16,7 @@ use uav_relay::serial::{Fault, SerialPort};
 pub struct Tty {
     fd: OwnedFd,
     name: String,
-    /// True if the last write was accepted only in part.
+    /// True if the tty has accepted only a part of the last write, because it is full.
     full: bool,
     failure: Option<String>,
 }

@@ -32,7 +32,7 @@ const WAITING: usize = 4_096;
 
 const EVENT: &str = "autopilot";
 
-/// MAVLink link number that the signatures of this program carry.
+/// Link number in this program's MAVLink signatures.
 const LINK: u8 = 0;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -64,7 +64,7 @@ pub(crate) struct AutopilotPlan {
     pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
-    /// Side of the neighbour that the antenna points to.
+    /// Side of the neighbour that the drone's directional antenna points to; `None` without one.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
 }
@@ -84,8 +84,8 @@ pub(crate) struct Companion {
     state: Option<&'static str>,
     answers: AnswerMonitor,
     off_line: OffLineMonitor,
-    /// Numbers of lost relays that the operator has cleared over MAVLink, because they have landed. Not yet
-    /// collected.
+    /// Numbers of lost relays that have landed, as the operator has reported over MAVLink. They are kept until
+    /// `take_cleared` collects them.
     cleared: Vec<u16>,
 }
 
@@ -112,7 +112,7 @@ impl Companion {
         })
     }
 
-    /// Logs the autopilot's port, the drone's speed limit, and signing.
+    /// Logs the autopilot's port, the drone's speed limit, and whether frames are signed.
     pub(crate) fn started(&self, log: &Log) {
         let (place, pace) = (&self.plan.port, self.plan.pace);
         let from = match place {
@@ -158,7 +158,7 @@ impl Companion {
         })
     }
 
-    /// Returns the drone's position relative to the line; `None` if it is older than 3 s.
+    /// Returns the drone's position in the mission's coordinates; `None` if it is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         self.off_line.place(now)
     }
@@ -199,7 +199,7 @@ impl Companion {
         self.check_fence(now, log, sites, relay.mission().config().lateral);
     }
 
-    /// Returns and removes the numbers of lost relays that the operator has cleared over MAVLink.
+    /// Removes and returns the numbers of lost relays that have landed, as reported over MAVLink.
     pub(crate) fn take_cleared(&mut self) -> Vec<u16> {
         std::mem::take(&mut self.cleared)
     }
@@ -227,7 +227,7 @@ impl Companion {
         }
     }
 
-    /// Logs an autopilot that has not answered since the start, once for each kind of fault.
+    /// Logs that no autopilot has answered since the start, once for each kind of fault.
     fn log_unanswered(&mut self, now: Instant, log: &Log) {
         let received = self.received_kind();
         if let Some(missing) = self.answers.check(now, received) {
@@ -237,7 +237,7 @@ impl Companion {
         }
     }
 
-    /// Returns the most specific kind of data received so far; `None` once the autopilot is found.
+    /// Returns the kind of data received so far, for example noise; `None` once the autopilot is found.
     fn received_kind(&self) -> Option<Received> {
         // A rejected signature is logged separately.
         if self.link.state() != State::Silent || self.link.refused() > 0 {
@@ -254,7 +254,7 @@ impl Companion {
         })
     }
 
-    /// Returns the log line for a missing autopilot: the port, and what to check.
+    /// Returns the log text about a missing autopilot: its port, and what the operator has to check.
     fn unanswered(&self, answer: Received) -> String {
         match (answer, &self.port) {
             (Received::Nothing, Port::Udp(datagrams)) => {
@@ -468,8 +468,8 @@ const fn mistrusted(why: Mistrust) -> &'static str {
     }
 }
 
-/// Returns this machine's time as a MAVLink time stamp, for signatures. If this clock is behind the autopilot's, the
-/// link follows the stamps that it receives.
+/// Returns this machine's time as a MAVLink timestamp for signatures. If this clock is behind the autopilot's, the
+/// link continues from the timestamps that it receives.
 fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());

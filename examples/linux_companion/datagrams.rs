@@ -7,7 +7,7 @@ use std::os::fd::{AsFd as _, BorrowedFd};
 use serde_json::{Value, json};
 use uav_relay_scenario::endpoint::Endpoint;
 
-/// Maximum number of attempts of a socket call, which may fail because an earlier datagram was refused.
+/// Maximum number of attempts of a socket call. A call may fail because an earlier datagram was refused.
 const ATTEMPTS: usize = 4;
 
 #[derive(Debug)]
@@ -17,12 +17,12 @@ pub(crate) struct Datagrams {
     endpoint: Endpoint,
     read: u64,
     written: u64,
-    /// Number of "connection refused" answers: no program listens at the autopilot's port.
+    /// Number of "connection refused" replies. They mean that no program listens at the autopilot's port.
     refused: u64,
 }
 
 impl Datagrams {
-    /// Binds the local UDP port; accepts datagrams only from the autopilot's address and port.
+    /// Binds the local UDP port. Datagrams are accepted only from the autopilot's address and port.
     pub(crate) fn open(endpoint: &Endpoint) -> Result<Self, String> {
         let Endpoint {
             host, port, local, ..
@@ -87,7 +87,7 @@ impl Datagrams {
         self.read
     }
 
-    /// Returns a text for the log: the address that does not answer, and what to check.
+    /// Returns a text for the log about an address that does not answer, and what to check.
     pub(crate) fn silence(&self) -> String {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {
@@ -136,7 +136,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// Checks that the refusal of a datagram loses neither the next sent nor the next received datagram.
+    /// Checks that a refused datagram causes the loss of neither the next sent nor the next received one.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

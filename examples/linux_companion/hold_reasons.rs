@@ -6,18 +6,20 @@ use uav_relay::{Duration, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;
 
-/// Time that a reason for waiting must last before it is logged. Shorter waits occur while an agreement spreads.
+/// Time for which a reason to wait for a neighbour must last before it is logged. Shorter waits are normal while the
+/// relays agree on new positions.
 const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns why the drone waits for its neighbours: toward the transmitter, and toward the receiver. `None` if it does
-/// not wait.
+/// Returns the reasons why the drone waits for its neighbours. The first is for the neighbour toward the transmitter,
+/// the second for the one toward the receiver. `None` if the drone does not wait.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Logged reasons why the drone waits, and newer ones that have not lasted long enough to be logged.
+/// Log of the reasons why the drone waits for its neighbours. It has the logged reasons, and newer ones that have not
+/// lasted long enough to be logged.
 #[derive(Debug, Default)]
 pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],

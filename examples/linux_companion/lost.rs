@@ -12,7 +12,7 @@ use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// Relays that this relay has lost (no longer receives) since its start.
+/// Relays that this relay has lost since its start: it does not receive them any more.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,
@@ -98,12 +98,12 @@ impl Lost {
         Ok(cleared(named, side))
     }
 
-    /// Forgets lost relays that the operator has cleared over MAVLink.
+    /// Forgets lost relays that have landed, as the operator has reported over MAVLink.
     pub(crate) fn remove_cleared(&mut self, named: &[u16]) {
         self.nodes.retain(|node| !named.contains(node));
     }
 
-    /// Parses the number of a lost relay in a command, and checks that this relay may be cleared.
+    /// Parses the number of a relay that a command reports as landed, and checks that it may be lost.
     fn number(&self, relay: &Relay, word: &str) -> Result<u16, String> {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
@@ -144,7 +144,7 @@ pub(crate) fn log_command(
     json!({ "done": is_done, "text": text })
 }
 
-/// Returns the log text for lost relays, `named`, that the operator has cleared on one side.
+/// Returns the log text about the lost relays `named` on one side that the operator reports as landed.
 pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
     let stream = match side {
         Side::Upstream => "upstream",

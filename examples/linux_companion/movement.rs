@@ -11,28 +11,30 @@ use uav_relay_linux::log::Log;
 
 const STEP_M: f32 = 0.5;
 
-/// Maximum distance from the agreed position at arrival, m. Autopilots hover up to 0.9 m off their target.
+/// Maximum distance from the agreed position at which a drone has arrived, m. Autopilots hover up to 0.9 m off their
+/// target.
 const NEAR_M: f32 = 1.0;
 
-/// Time without movement before a move counts as ended, because a drone may overshoot its target.
+/// Time without a change of the setpoint after which a move has ended. Also the time for which a drone must stay near
+/// its position to have arrived, because it may overshoot.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Step {
     Setpoint(Placement),
-    /// Arrival of the drone: the agreed position, and the remaining distance to it, m.
+    /// Arrival of the drone: the agreed position, and the drone's remaining distance from it, m.
     Arrived(Placement, f32),
 }
 
-/// State of the log lines about a drone's flight: logged and newest setpoint, and pending lines.
+/// State of the log of a drone's moves: logged and newest setpoint, and the lines still to log.
 #[derive(Debug)]
 pub(crate) struct Movement {
-    /// True if only setpoint changes above [`STEP_M`] are logged, and the end of each move.
+    /// True if small changes of the setpoint are not logged. Those above [`STEP_M`] are, and the end of each move.
     is_sparse: bool,
     logged: Option<Placement>,
     newest: Option<Placement>,
     changed_at: Instant,
-    /// True from a setpoint change above [`STEP_M`] until the exact end of the move is logged.
+    /// True from a setpoint change above [`STEP_M`] until the setpoint has stopped changing.
     is_moving: bool,
     /// True from a setpoint change above [`STEP_M`] until the drone's arrival is logged.
     is_on_its_way: bool,
@@ -62,7 +64,7 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns the line to log at `now` for a drone at `drone`, if any, and the time of the next call.
+    /// Returns what to log at `now` for a drone at `drone`, if anything, and the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -83,7 +85,7 @@ impl Movement {
         (step, end.into_iter().chain(near).min())
     }
 
-    /// Returns the setpoint as a line to log, if it must be logged.
+    /// Returns the setpoint if it has to be logged, as a line of the log.
     fn next(
         &mut self,
         now: Instant,
@@ -120,7 +122,7 @@ impl Movement {
 
     /// Returns the drone's arrival at `goal`, if it must be logged; `None` otherwise.
     ///
-    /// `goal` is the setpoint if that is the agreed position, and `None` while it is not.
+    /// `goal` is the agreed position, and `None` while the setpoint differs from it.
     fn arrival(
         &mut self,
         now: Instant,
@@ -143,9 +145,9 @@ impl Movement {
 }
 
 impl Step {
-    /// Writes this setpoint or arrival to the log. A setpoint has `x_m` metres from the transmitter toward the
-    /// receiver, `y_m` to the right of that line seen from above, and `altitude_m` above the ground; each number also
-    /// as the bits of its f32.
+    /// Writes this setpoint or arrival to the log. The position is in the mission's coordinates: `x_m` metres from
+    /// the transmitter toward the receiver, `y_m` to the right of that line seen from above, and `altitude_m` above
+    /// the ground. Each number of a setpoint is also logged as the bits of its f32.
     pub(crate) fn log(self, now: Instant, log: &Log) {
         match self {
             Self::Setpoint(place) => {
@@ -219,8 +221,8 @@ mod tests {
         }
     }
 
-    /// Checks that a drone which flies past its goal and back is logged as arrived once. The overshoot within 2 s is
-    /// no arrival.
+    /// Checks that a drone which flies past its goal and back is logged as arrived once. Passing the goal for less
+    /// than 2 s is no arrival.
     #[test]
     fn a_drone_that_stays_has_arrived_once() {
         let mut movement = Movement::new(true);

@@ -17,11 +17,11 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// Distance outside the geofence up to which nothing is reported, m.
+/// Distance from the geofence up to which a drone outside of it is not reported, m.
 const FENCE_M: f64 = 100.0;
 
-/// Minimum ratio of the drone's distances from the given line and from the line between swapped sites. From this
-/// ratio on, the log suggests that latitude and longitude were swapped.
+/// Ratio of a drone's distances from the given line and the line with latitude and longitude swapped. From this ratio
+/// on, the log suggests that they were swapped by mistake.
 const NEARER: f64 = 10.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -30,17 +30,17 @@ enum Kind {
     Fence,
 }
 
-/// Report of a drone that is far from its line or outside its geofence.
+/// Report that a drone is far from the line Tx to Rx, or outside its geofence.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct OffLineReport {
     kind: Kind,
     away_m: f64,
     outside_m: f64,
-    /// True if swapping latitude and longitude of both sites brings the line near the drone.
+    /// True if the drone is near the line when latitude and longitude of Tx and Rx are swapped.
     is_swapped: bool,
 }
 
-/// Monitor of the drone's distance from its line and from its geofence.
+/// Monitor of the drone's distance from the line Tx to Rx and from its geofence.
 #[derive(Debug, Default)]
 pub(crate) struct OffLineMonitor {
     newest: Option<(Instant, Placement)>,
@@ -60,14 +60,15 @@ impl OffLineMonitor {
         fresh.map(|(_, place)| place)
     }
 
-    /// Returns the report for a drone that the autopilot link has found far off the line between `sites`.
+    /// Returns the report for a drone that the autopilot link has found far from the line Tx to Rx. `sites` are the
+    /// positions of Tx and Rx.
     pub(crate) fn line_report(&mut self, sites: Sites, off_line: OffLine) -> Option<OffLineReport> {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
     /// Returns the report of a drone outside its geofence, if one is due. The drone's position is `off_line`, or if
-    /// that is `None` the newest measured one. The geofence is the line between `sites` with the mission's `lateral`
-    /// range.
+    /// that is `None` the newest measured one. The geofence is the line between the Tx and Rx positions `sites`, with
+    /// the mission's `lateral` range on either side.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -106,7 +107,7 @@ impl OffLineMonitor {
         self.lines.as_ref()
     }
 
-    /// Returns the drone's distance from its line as JSON, and the limit that it exceeds, if any.
+    /// Returns the drone's distance from the line Tx to Rx as JSON, and the limit that it exceeds, if any.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from_line_m": self.away_m,
@@ -119,7 +120,8 @@ impl OffLineMonitor {
     }
 }
 
-/// Line between two sites, and the line with latitude and longitude swapped, if these are valid.
+/// Line between the positions of Tx and Rx. Also the line with their latitude and longitude swapped, if that is
+/// valid.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,
@@ -147,7 +149,7 @@ impl Lines {
         }
     }
 
-    /// Returns the horizontal distance from a position to the line between the sites, m.
+    /// Returns the horizontal distance of a position from the line Tx to Rx, m.
     fn away_m(&self, place: Placement) -> f64 {
         let along_m = beyond(place.x_m.into(), 0.0, self.axis.distance_m());
         along_m.hypot(place.y_m.into())

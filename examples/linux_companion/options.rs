@@ -20,7 +20,8 @@ use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{self, Method, MissionOptions};
 use uav_relay_linux::site::SiteOptions;
 
-/// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
+/// Latency of a frame between two relays. It is caused by two kernels, two USB adapters (up to 16 ms each) and the
+/// computation.
 const LATENCY: Duration = Duration::from_millis(40);
 
 /// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.
@@ -84,7 +85,7 @@ pub(crate) struct Options {
         conflicts_with = "positions"
     )]
     autopilot: Option<String>,
-    /// Bit rate of its tty, bit/s, 1200 to 4000000
+    /// Bit rate of the tty to the autopilot, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
     autopilot_baud: u32,
     /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits. Frames to it are signed, and unsigned ones from it are
@@ -100,7 +101,8 @@ pub(crate) struct Options {
     antenna: Option<Antenna>,
     #[command(flatten)]
     sites: SiteOptions,
-    /// Maximum position error of a hovering drone, m, 0 to 1000. Drones may come closer to each other by as much
+    /// Maximum position error of a hovering drone, m, 0 to 1000. Two drones may come closer to each other than the separation by twice
+    /// this error
     #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number([0.0, 1_000.0]))]
     position_error: f32,
     #[command(flatten)]
@@ -108,8 +110,8 @@ pub(crate) struct Options {
     /// Method of finding positions; with --field only `align`. The first relay's setting counts, with --field the last relay's
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
-    /// Interference field instead of --interferer. Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32) along the line to the
-    /// receiver (m, -1e7 to 1e7), X rising
+    /// Interference as a function of the position along the line, instead of --interferer. Each point has X (m, -1e7 to 1e7, in
+    /// ascending order) and Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32)
     #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
     field: Option<Field>,
     #[command(flatten)]
@@ -197,7 +199,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
     plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
-/// Adds the options of the file's sections `[network]` and `[companion]`.
+/// Adds the options that the file's sections `[network]` and `[companion]` give.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.companion;
@@ -358,7 +360,8 @@ fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, S
     mission::mission(config, "--")
 }
 
-/// Parses an interference field. Its points are leaked, because the mission refers to them until the program ends.
+/// Parses the interference's distribution along x. Its points are leaked, because the mission refers to them until
+/// the program ends.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text

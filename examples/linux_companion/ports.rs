@@ -10,7 +10,7 @@ use crate::options::Options;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 
-/// Tty toward a neighbour, or `None` at an end of the chain.
+/// Serial port toward a neighbour; `None` at an end of the chain, where there is no neighbour.
 #[derive(Debug)]
 pub(crate) struct End(Option<Replug>);
 
@@ -52,8 +52,8 @@ impl Ports {
         Ok(Self::Pair(Box::new(Pair::new(upstream, downstream))))
     }
 
-    /// Exchanges bytes with the relay. Passes the relay's changed votes to `store` before it sends. Returns the time
-    /// of the next call.
+    /// Exchanges bytes between ports and relay. Passes the relay's changed votes to `store` before it sends. Returns
+    /// the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,

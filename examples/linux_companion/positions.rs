@@ -19,7 +19,7 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
-    /// Opens the FIFO `path`. `listens` permits lines with a measured interference power.
+    /// Opens the FIFO `path` with the drone's positions. `listens` permits lines with a measured interference power.
     pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
@@ -83,7 +83,7 @@ impl Positions {
     }
 }
 
-/// Logs whether drones are kept apart.
+/// Logs whether the drones are kept apart while they move, which requires `positions`.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
@@ -97,7 +97,8 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Parses a line: a position with or without a measured power, or the word `receiver` and a power.
+/// Parses a line: a position with or without a measured power, or the word `receiver` and a power. Returns the
+/// position and the measurement, if any; `None` for an invalid line.
 fn parse_line(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
     let words = lines::words(text)?;
     let number = |word: &str| word.parse::<f32>().ok().filter(|number| number.is_finite());

@@ -16,7 +16,8 @@ use crate::relay::Refusal;
 const VIEWS: &str = "--view-file";
 const UPLOADS: &str = "--upload-file";
 
-/// Restores the votes of an earlier start into `relay`. Returns the file of votes, and true if it held any.
+/// Restores the relay's votes of an earlier start into `relay`. Returns the file of votes, and true if the file had
+/// votes.
 ///
 /// # Errors
 /// One line that names the file, the fault and the remedy: a relay that has lost its votes must not vote again in the
@@ -81,12 +82,12 @@ fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Upload>, String>
     Ok(Some(upload))
 }
 
-/// Starts the writer thread of the upload file; writes nothing yet.
+/// Starts the thread that writes uploaded missions to `file`. It writes nothing yet.
 pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
     StoredFile::new(UPLOADS, file, None)
 }
 
-/// Begins to store an uploaded mission. The relay flies the mission also if it can not be stored.
+/// Begins to store an uploaded mission. If it can not be stored, the relay flies it all the same.
 pub(crate) fn store_upload(file: &mut StoredFile, upload: &Upload) {
     let mut bytes = [0; Upload::LENGTH];
     // The buffer has room for every upload.

@@ -40,8 +40,8 @@ struct Flight {
 #[derive(Debug)]
 pub(crate) struct Refusal {
     pub(crate) line: String,
-    /// True if another start would fail as well, until somebody changes something. False for a port that may come
-    /// back.
+    /// True if the program would fail again at another start, until somebody changes something. False for a port that
+    /// may come back.
     pub(crate) is_final: bool,
 }
 
@@ -143,7 +143,7 @@ impl Flight {
         })
     }
 
-    /// Runs the loop once; returns false when the program must end.
+    /// Runs the main loop once; returns false when the program must end.
     fn turn(&mut self) -> bool {
         let time = self.service.now();
         let Self { service, relay, .. } = self;

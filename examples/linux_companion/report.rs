@@ -57,7 +57,8 @@ impl Report {
         }
     }
 
-    /// Logs the relay's identity, ports and mission digest, which is equal at relays with the same mission.
+    /// Logs the relay's identity, its ports, and the digest of its mission. Relays with the same mission have the
+    /// same digest.
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
@@ -153,7 +154,8 @@ impl Report {
         }
     }
 
-    /// Logs a setpoint or the arrival of a drone at `drone`, if due; returns the time of the next check.
+    /// Logs a new setpoint, or the arrival of a drone at the position `drone`, if due. Returns the time of the next
+    /// check.
     pub(crate) fn log_movement(
         &mut self,
         now: Instant,
@@ -270,7 +272,7 @@ impl Report {
         self.identity.index
     }
 
-    /// Returns the name of a node for the log. `node` is its initial number: 0 is the transmitter, N + 1 the
+    /// Returns the name of a node for the log. `node` is its number before flight: 0 is the transmitter, N + 1 the
     /// receiver.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
@@ -280,7 +282,7 @@ impl Report {
         }
     }
 
-    /// Returns the digest of the mission that the relay flies, which is the loaded or an uploaded one.
+    /// Returns the digest of the mission that the relay flies, uploaded or given at the start.
     fn mission_digest(&self, relay: &Relay) -> u16 {
         match relay.upload() {
             Some(upload) if relay.version() == upload.version() => upload.id().digest,
@@ -288,7 +290,7 @@ impl Report {
         }
     }
 
-    /// Logs that a new mission was adopted, and its sites, if they differ from the loaded ones.
+    /// Logs that the chain flies a new mission, and the Tx and Rx positions, if the mission has its own.
     fn adopted(&self, now: Instant, relay: &Relay) {
         let version = relay.version();
         let fields = json!({ "version": version });

@@ -11,7 +11,7 @@ pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
 }
 
-/// Returns the relay's state as JSON. `index` is the number that the relay was started with.
+/// Returns the relay's state as JSON. `index` is the relay's number before flight.
 pub(crate) fn of_relay(
     relay: &Relay,
     index: u16,

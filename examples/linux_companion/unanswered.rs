@@ -18,8 +18,8 @@ pub(crate) enum Received {
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Kind of the data received so far (the most specific), and the time of its first receipt. `None` once the
-    /// autopilot is found.
+    /// Kind of data received so far from the autopilot's port, and the time since which it is that kind. The most
+    /// specific kind counts. `None` once the autopilot is found.
     newest: Option<(Received, Instant)>,
     reported: Option<Received>,
 }
@@ -32,8 +32,8 @@ impl AnswerMonitor {
         }
     }
 
-    /// Handles the most specific kind of data received so far. `None` means that the autopilot was found. Returns a
-    /// fault to report, once for each kind.
+    /// Handles the most specific kind of data received so far; `None` means that the autopilot was found. Returns the
+    /// kind of fault if it has to be reported, once for each kind.
     pub(crate) fn check(&mut self, now: Instant, received: Option<Received>) -> Option<Received> {
         let (answer, since) = self.newest?;
         let Some(heard) = received else {
@@ -51,7 +51,7 @@ impl AnswerMonitor {
         self.reported
     }
 
-    /// Returns the fault that was reported, while no autopilot is found.
+    /// Returns the kind of fault that was reported; `None` if none was, or if the autopilot is found.
     pub(crate) fn missing(&self) -> Option<Received> {
         self.newest.and(self.reported)
     }

@@ -15,7 +15,7 @@ const TURN_US: u64 = 1_000;
 
 const TIME_LIMIT: Duration = Duration::from_secs(10);
 
-/// Mission loaded into the relays, with all that a forecast of their positions needs.
+/// Mission loaded into the relays before flight, with all data for a forecast of the relays' positions.
 #[derive(Clone, Debug)]
 pub(crate) struct Loaded {
     pub(crate) mission: Mission,
@@ -29,7 +29,7 @@ struct Letter {
     bytes: Vec<u8>,
 }
 
-/// Simulated chain of relays, whose links lose nothing.
+/// Simulated chain of relays, whose links lose no frame.
 struct Chain {
     relays: Vec<Relay>,
     agreed: Vec<bool>,
@@ -38,7 +38,7 @@ struct Chain {
 }
 
 impl Chain {
-    /// Creates simulated relays that fly the uploaded mission `flown`, or else the loaded mission.
+    /// Creates simulated relays that fly the mission `flown`, or without it the one loaded before flight.
     fn flying(loaded: &Loaded, flown: Option<&Upload>) -> Option<Self> {
         let relays = (1..=loaded.mission.relays()).map(|index| {
             let identity = Identity { network: 0, index };
@@ -69,8 +69,8 @@ impl Chain {
         })
     }
 
-    /// Delivers the frames that relays sent in the previous turn, and collects the frames of this turn. Notes the
-    /// relays that agree on positions in mission `version`.
+    /// Simulates a millisecond: delivers the frames that were sent in the last one, and collects new ones. Notes the
+    /// relays that have agreed on positions in mission `version`.
     fn turn(&mut self, version: u16) {
         self.now = Instant::from_micros(self.now.as_micros() + TURN_US);
         let now = self.now;
@@ -98,8 +98,8 @@ impl Chain {
         }
     }
 
-    /// Runs the chain until all relays agree on positions in mission `version`. Returns `None` if they do not before
-    /// the time `end`.
+    /// Runs the chain until all relays have agreed on positions in mission `version`. Returns these positions, or
+    /// `None` if the time `end` comes first.
     fn positions(&mut self, version: u16, end: Clock) -> Option<Vec<Placement>> {
         self.agreed.fill(false);
         while !self.agreed.iter().all(|agreed| *agreed) {
@@ -121,10 +121,11 @@ pub(crate) struct Move {
     pub(crate) metres: f64,
 }
 
-/// Returns the move of each relay from the mission `flown` to `new`. `flown` is `None` for the loaded mission.
+/// Returns the move of each relay from the mission `flown` to `new`. `flown` is `None` if the relays fly the mission
+/// that was loaded before flight.
 ///
-/// The two pairs of sites define the lines before and after. `None` if the positions can not be predicted: the relays
-/// measure the interference, or do not agree within ten seconds of computing.
+/// `before` and `after` are the Tx and Rx positions of the two missions. `None` if the positions can not be
+/// predicted: the relays measure the interference, or do not agree within ten seconds of computing.
 pub(crate) fn moves(
     loaded: &Loaded,
     flown: Option<&Upload>,
@@ -159,7 +160,7 @@ pub(crate) fn moves(
 
 /// Returns the distance, m, between a relay's positions before and after an upload.
 ///
-/// `lines` are the lines from Tx to Rx before and after; without both of them the line counts as unchanged.
+/// `lines` are the lines on earth from Tx to Rx before and after. If one is missing, the line counts as unchanged.
 fn apart_m(lines: &[Option<Axis>; 2], before: Placement, after: Placement) -> f64 {
     let on_earth = |axis: &Option<Axis>, place| axis.as_ref().and_then(|axis| axis.point(place));
     let [one, other] = lines;

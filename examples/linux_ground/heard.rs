@@ -7,10 +7,10 @@ use uav_relay_linux::log::Log;
 
 use crate::report;
 
-/// Time without an answer after which a relay is lost. A lost handshake is repeated with the next measurement.
+/// Time without an answer after which a relay counts as lost. It leaves time to repeat a handshake that was lost.
 const LOST_AFTER: Duration = Duration::from_millis(5_000);
 
-/// State of a relay that has answered before.
+/// State of a nearby relay that has answered this station at least once.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
     Heard,

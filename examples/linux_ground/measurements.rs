@@ -14,7 +14,7 @@ use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--measurements";
 
-/// Polling period of a file, because poll(2) does not report changes of a file.
+/// Interval at which a file is checked for changes, because poll(2) does not report them.
 const LOOK: Duration = Duration::from_millis(500);
 
 const READS: usize = 16;
@@ -22,7 +22,7 @@ const READS: usize = 16;
 /// Number of bytes read from the end of a file: enough for its last line and the one before.
 const TAIL: u64 = 1_024;
 
-/// Minimum interval of forwarded measurements, so that they do not fill the channel.
+/// Minimum time between two measurements sent to the relays, so that they do not fill the channel.
 const EVERY: Duration = Duration::from_millis(500);
 
 /// Time without a measurement after which the log reports that they are missing.
@@ -35,7 +35,7 @@ enum Source {
     File(Watched),
 }
 
-/// Watched file, and its state at the last read: inode, length, and modification time, s and ns.
+/// Watched file with measurements. Its state at the last read is inode, length, and modification time, s and ns.
 #[derive(Debug)]
 struct Watched {
     path: PathBuf,
@@ -48,7 +48,7 @@ pub(crate) struct Measurements {
     source: Source,
     name: String,
     end: Side,
-    /// Newest measured power that has not been forwarded yet, W.
+    /// Newest measured power that has not been sent to the relays yet, W.
     newest_w: Option<f32>,
     next_at: Instant,
     /// Time of the last valid line; `None` before the first.
@@ -90,7 +90,7 @@ impl Measurements {
         })
     }
 
-    /// Returns the newest measured power, W, if it may be forwarded now. Work: at most 64 KiB of lines.
+    /// Returns the newest measured power, W, if it may be sent to the relays now. Work: at most 64 KiB of lines.
     pub(crate) fn newest(&mut self, now: Instant, log: &Log) -> Option<f32> {
         self.read(now, log);
         let silent_at = self.last_at.map(|at| at + SILENCE);
@@ -190,7 +190,7 @@ impl Measurements {
 }
 
 impl Watched {
-    /// Returns the last complete line of the file; `None` if the file has not changed.
+    /// Returns the last complete line of the file; `None` if the file has not changed, or is missing.
     fn last(&mut self, now: Instant) -> Option<Vec<u8>> {
         if now < self.look_at {
             return None;

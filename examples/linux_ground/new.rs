@@ -40,7 +40,7 @@ pub(crate) struct NewOptions {
     /// New left limit of the relays' positions, facing the receiver, as y in m, -1e5 to 0
     #[arg(long = "new-lateral-min-m", value_name = "M", allow_negative_numbers = true, value_parser = number(LEFT_M))]
     new_lateral_min: Option<f32>,
-    /// New right limit, as y in m, 0 to 1e5
+    /// New right limit of the relays' positions, facing the receiver, as y in m, 0 to 1e5
     #[arg(long = "new-lateral-max-m", value_name = "M", allow_negative_numbers = true, value_parser = number(RIGHT_M))]
     new_lateral_max: Option<f32>,
     /// New power of the transmitter, W, 1e-6 to 1e6
@@ -61,12 +61,12 @@ pub(crate) struct NewOptions {
     new_min_separation: Option<f32>,
 }
 
-/// Minimum distance along the line at which the order of two relays is certain, m. Twice the companion's default
-/// position error.
+/// Minimum distance of two relays along the line Tx to Rx at which their order is certain, m. It is twice the
+/// companion's default position error.
 const ORDER_M: f32 = 2.0;
 
-/// Maximum distance of a new line from the present line, m, beyond the new line's own length. A line farther away
-/// is rejected.
+/// Maximum distance of a new line Tx to Rx from the present one, m, besides the new line's own length. A line farther
+/// away is rejected.
 const FAR_M: f64 = 100_000.0;
 
 /// Mission that supplies the values which the `--new-` options do not give.
@@ -74,12 +74,13 @@ const FAR_M: f64 = 100_000.0;
 pub(crate) struct Basis {
     pub(crate) config: MissionConfig,
     pub(crate) line: Option<Sites>,
-    /// Upload that brought this mission to the relays; `None` for the loaded mission.
+    /// Upload that brought this mission to the relays; `None` for the mission loaded before flight.
     pub(crate) upload: Option<Upload>,
 }
 
 impl Basis {
-    /// Returns the loaded mission as the basis. It is flown between the sites `sited`, if given.
+    /// Returns the mission loaded before flight as the basis of a new one. `sited` are its Tx and Rx positions, if
+    /// given.
     pub(crate) const fn loaded(loaded: &Mission, sited: Option<Sites>) -> Self {
         Self {
             config: *loaded.config(),
@@ -88,7 +89,8 @@ impl Basis {
         }
     }
 
-    /// Returns an uploaded mission as the basis. If the upload has no sites, the mission is flown between `sited`.
+    /// Returns an uploaded mission as the basis of a new one. If the upload has no Tx and Rx positions, they are
+    /// `sited`.
     pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
         Self {
             config: *upload.config(),
@@ -99,8 +101,8 @@ impl Basis {
 }
 
 impl NewOptions {
-    /// Returns the upload that changes the mission `basis` by these options. The relays were loaded with `loaded`
-    /// and, if given, with the sites `sited`.
+    /// Returns the upload that changes the mission `basis` by these options. Before flight the relays were loaded
+    /// with the mission `loaded` and, if given, with the Tx and Rx positions `sited`.
     pub(crate) fn upload(
         &self,
         version: u16,
@@ -134,7 +136,7 @@ impl NewOptions {
         }
     }
 
-    /// Returns the sites of the new mission and their distance, m; `None` if neither site changes.
+    /// Returns the new mission's Tx and Rx positions and their distance, m; `None` if neither changes.
     fn moved(
         &self,
         line: Option<Sites>,
@@ -201,7 +203,8 @@ impl NewOptions {
     }
 }
 
-/// Returns an error if the new line is far from the present one. The drones would have no position along it.
+/// Returns an error if the new line Tx to Rx is too far from the present one. The drones' positions could then not be
+/// converted to the new line.
 fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     let away_m = |tx, rx| {
         let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));
@@ -226,8 +229,8 @@ fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String
     ))
 }
 
-/// Returns the largest turn of the line, degrees, that keeps the relays' order along it. Position errors are up to 1
-/// m.
+/// Returns the maximum turn of the line Tx to Rx, degrees, that keeps the relays' order along it. Position errors are
+/// up to 1 m.
 ///
 /// For the minimum separation s and the width w of the lateral range, the angle t solves s cos t - w sin t = min(2 m,
 /// s / 2).

@@ -158,7 +158,7 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
     plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
-/// Adds the options of the file's sections `[network]` and `[ground]`.
+/// Adds the options that the file's sections `[network]` and `[ground]` give.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.ground;

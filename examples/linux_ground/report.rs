@@ -13,7 +13,7 @@ use crate::forecast::Move;
 use crate::measurements::name;
 use crate::options::Plan;
 
-/// Logs the station's end of the chain (transmitter or receiver), its port and the signing epoch.
+/// Logs the station's end of the chain (transmitter or receiver), its port, and the signing epoch.
 pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
     let (end, relays, network) = (
         name(plan.end),
@@ -73,7 +73,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
     }
 }
 
-/// Returns the error text for an upload whose version is not above `held`, the relays' version.
+/// Returns the error text for an upload that is not newer than version `held`, which the relays have.
 pub(crate) fn outdated(version: u16, held: u16) -> String {
     match held.checked_add(1) {
         Some(next) => {
@@ -115,10 +115,10 @@ pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
 
 /// Value of an uploaded mission that exceeds the relays' geofence.
 pub(crate) struct FenceViolation {
-    /// Text for the operator: the value and the permitted range.
+    /// Text for the operator: the value that exceeds the geofence, and the permitted range.
     what: String,
     name: &'static str,
-    /// Function that returns the coordinate limited by the range, m.
+    /// Function that returns the coordinate of a position that the geofence limits, m.
     coordinate: fn(&Placement) -> f32,
     range_m: [f32; 2],
 }
@@ -228,7 +228,7 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
     format!("--timeout {seconds}: {state}; {refused} frames refused")
 }
 
-/// Returns the most likely reason, by the frame counters, why no relay has answered as needed.
+/// Returns the most likely reason why no relay has answered as needed, judged by the frame counters.
 fn likely_reason(plan: &Plan, stats: &Stats) -> String {
     let faults = [
         (

@@ -27,13 +27,13 @@ struct Station<'a> {
     service: Service,
     ground: Ground,
     tty: Replug,
-    /// Bytes of a frame that the tty has not accepted yet.
+    /// Bytes of the present frame that the tty has not accepted yet.
     outgoing: Vec<u8>,
     measurements: Option<Measurements>,
     hearing: NearbyRelays,
     rejections: RejectionReasons,
     uploading: Option<Uploading>,
-    /// True once the operator's answer can be read from standard input, while a confirmation is awaited.
+    /// True if the operator has answered a request for confirmation: standard input is readable.
     is_answered: bool,
 }
 
@@ -252,7 +252,8 @@ impl<'a> Station<'a> {
     }
 }
 
-/// Reads the operator's answer from standard input, which has one. The text is empty at the end of the input.
+/// Reads the operator's answer from standard input, in which it must be available. The text is empty at the end of
+/// the input.
 fn answered() -> String {
     let mut line = String::new();
     match std::io::stdin().read_line(&mut line) {

@@ -20,7 +20,7 @@ use crate::new::Basis;
 use crate::options::Plan;
 use crate::report::{self, FenceViolation};
 
-/// Maximum time that a relay may take to send the values of its mission.
+/// Maximum time that a relay may take to send the values of the mission that it flies.
 const VALUES_TIMEOUT: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
 
 #[derive(Debug)]
@@ -35,13 +35,13 @@ impl From<String> for Fault {
     }
 }
 
-/// Result of an upload or of the program; `None` while it goes on.
+/// Result of an upload or of the program; `None` while the upload or the program continues.
 pub(crate) type Outcome = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Waiting for a relay to report the flown mission. The time is when a relay first reported it without its
-    /// values.
+    /// Waiting until a relay reports the mission that it flies, with its values. `Some` is the time at which a relay
+    /// first reported only the mission's version.
     Querying(Option<Instant>),
     Confirming,
     Uploading,
@@ -52,7 +52,7 @@ enum Stage {
 pub(crate) struct Uploading {
     version: u16,
     stage: Stage,
-    /// Mission to upload; `None` until its values are known.
+    /// Mission to upload; `None` until a relay has reported the mission that it is based on.
     upload: Option<Upload>,
     progress: Progress,
     /// Deadline of the present stage of the upload; `None` while a confirmation is awaited, and at the end.
@@ -109,7 +109,7 @@ impl Uploading {
         ))
     }
 
-    /// Advances the upload; returns its result once it has ended.
+    /// Continues the upload; returns its result once it has ended.
     pub(crate) fn turn(
         &mut self,
         now: Instant,
@@ -161,7 +161,8 @@ impl Uploading {
         failed(report::timed_out(plan, version, Progress::Idle, ground))
     }
 
-    /// Builds the upload from the flown mission, shows its changes, and starts it or asks for confirmation.
+    /// Builds the upload from the mission that the relays fly, and shows the changes. Then starts the upload, or asks
+    /// the operator for confirmation.
     fn decide(
         &mut self,
         now: Instant,

@@ -34,7 +34,7 @@ const POSITION_ERROR_M: f32 = 1.5;
 /// Length of the longest frame to send, bytes.
 const LONGEST: usize = size_of::<FrameBytes>();
 
-/// Pause before the next attempt to write to a full port; 115 bytes are sent meanwhile.
+/// Pause before the next attempt to write to a full port. In this time 115 bytes are sent.
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
@@ -51,8 +51,8 @@ pub(crate) struct Autopilot {
 }
 
 impl Autopilot {
-    /// Returns the guard's configuration `of` with this drone's position error and stopping time. The guard keeps
-    /// drones apart.
+    /// Returns the guard's configuration `of` with this drone's position error and stopping time. The guard prevents
+    /// collisions.
     #[expect(
         clippy::unnecessary_wraps,
         reason = "an image that does not fly has none"
@@ -65,8 +65,8 @@ impl Autopilot {
         })
     }
 
-    /// Creates the autopilot link along the line between `sites`, in static RAM. `None` if the mission can not be
-    /// flown there.
+    /// Creates the autopilot link for the line between the Tx and Rx positions `sites`, in static RAM. `None` if the
+    /// mission can not be flown along that line.
     #[inline(never)] // its stack frame is released
     pub(crate) fn begin(
         uart: Uart,
@@ -80,8 +80,8 @@ impl Autopilot {
         Self::along(&course, uart, now)
     }
 
-    /// Creates the autopilot link along a course. The computation of the course is in another function, to save
-    /// stack.
+    /// Creates the autopilot link for a course: line on earth and speed limit. The course is computed in another
+    /// function, to save stack.
     #[inline(never)]
     fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;
@@ -98,8 +98,8 @@ impl Autopilot {
         Some(autopilot)
     }
 
-    /// Processes bytes from the autopilot, and exchanges data with the relay. The relay's next frames carry the
-    /// newest position.
+    /// Processes bytes from the autopilot, and exchanges data with the relay. The relay's next frames then have the
+    /// drone's newest position.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         self.receive(now);
         self.link.exchange(relay, now);
@@ -163,8 +163,8 @@ fn open(uart: Uart) -> Option<Port> {
 /// Error: an autopilot signing key is configured, but this image can not sign.
 struct CannotSign;
 
-/// Enables signing to the autopilot if the configuration block has a key. Without a clock the link takes the time
-/// from received stamps.
+/// Enables signing to the autopilot if the configuration block has a key. The board has no clock, so the link takes
+/// the time from the timestamps that it receives.
 #[cfg(feature = "mavlink-signing")]
 #[expect(clippy::unnecessary_wraps, reason = "as where it cannot")]
 fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {

@@ -45,7 +45,8 @@ impl uav_relay::asynch::Clock for Time {
     }
 }
 
-/// Runs `task` for ever: polls it after an interrupt, a wake-up or at its time, then calls `also`.
+/// Runs `task` for ever. Polls it after an interrupt, after a wake-up and at the time for which it asked, then calls
+/// `also`.
 pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {
     let waker = waker();
     let mut cx = Context::from_waker(&waker);

@@ -14,8 +14,8 @@ use crate::firmware::log;
 use crate::firmware::persistent;
 
 pub(crate) trait Links {
-    /// Exchanges bytes between ports and relay, and stores the relay's votes between receiving and sending. Returns
-    /// the time of the next call.
+    /// Exchanges bytes between ports and relay. The relay's changed votes are stored after receiving and before
+    /// sending. Returns the time of the next call.
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
     fn log_counters(&self);
@@ -86,10 +86,11 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
     }
 }
 
-/// Returns no measurement. Replace it if the relay measures a field or listens for an interferer.
+/// Returns no measurement. Replace it if the relay measures the interference, by a function that returns the newest
+/// measurement of your receiver.
 ///
-/// Return your receiver's newest measurement then. To listen, the relay also needs the drone's position. After enough
-/// samples of a field, call `Relay::restart` at the leader, so that the chain agrees again.
+/// To estimate the interferer, the relay also needs the drone's position. If the mission gives the interference as a
+/// distribution along x, call `Relay::restart` at the leader after enough samples, so that the chain agrees again.
 const fn measured() -> Option<Sample> {
     None
 }

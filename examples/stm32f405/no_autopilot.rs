@@ -19,7 +19,7 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// Placeholder type for the autopilot link, which this image lacks. It has no values.
+/// Placeholder type for the autopilot link, which this image lacks. It has no values, so it never exists.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {

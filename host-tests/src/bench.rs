@@ -15,7 +15,8 @@ use uav_relay::{
 
 use crate::fixtures::NETWORK;
 
-/// Largest number of frames delivered at one instant. If it is exceeded, the relays never stop sending.
+/// Limit of the number of frames delivered at one instant. The bench panics above it, because the relays then seem to
+/// send without end.
 const MOST_STEPS: u32 = 400_000;
 
 /// Frame in transit between two nodes of the test bench.
@@ -120,7 +121,7 @@ impl Bench {
 
     /// Returns the ground station at `end`; the first call creates it.
     ///
-    /// `base` is the mission that it was loaded with, `auth` authenticates its frames.
+    /// `base` is the mission loaded into it before flight, `auth` authenticates its frames.
     pub fn ground(&mut self, base: &Mission, end: Side, auth: Auth) -> &mut Ground {
         let ground = || Ground::new(base, end, NETWORK, Wiring::Pair, auth);
         self.grounds[end as usize].get_or_insert_with(ground)
@@ -239,7 +240,7 @@ impl Bench {
         });
     }
 
-    /// Returns true if all relays hold their agreed positions, and are in the same view.
+    /// Returns true if every relay has its agreed position and all are in the same view (membership).
     pub fn holds(&self) -> bool {
         let view = self.relays[0].view();
         let holds = |relay: &Relay| relay.phase() == Phase::Holding && relay.view() == view;

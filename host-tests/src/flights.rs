@@ -32,7 +32,7 @@ pub fn end_at(setup: &mut Setup, at: Instant) {
     setup.deadline = at;
 }
 
-/// Runs `setup` and checks that all relays hold their positions for the same target at the end.
+/// Runs `setup` and checks that at the end all relays have agreed positions for the same target SIR.
 ///
 /// # Panics
 /// The chain does not settle, or a setpoint was outside its limits.

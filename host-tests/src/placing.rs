@@ -106,8 +106,9 @@ pub struct Solved {
 
 /// Checks that the crate's solution is at most `allowed` (relative) below the optimum, never above.
 ///
-/// The relays of the link have one altitude, so the farthest position that meets a target is the best one. `None` if
-/// every chain has an SIR of 0, which the solver must report.
+/// The relays of the link have one altitude; for these the crate's rule, that each relay goes as far as the target
+/// SIR allows, finds the optimum. Returns `None` if every chain has an SIR of 0, after a check that the crate reports
+/// so.
 pub fn optimum_is_found(
     link: &Link,
     (mission, own): &(Mission, Vec<(u16, Profile)>),
@@ -185,7 +186,7 @@ pub struct DrawnHop {
     pub index: u16,
     /// Distance of the hop's sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// Limit of the hop's SIR, linear, far from the sender and the interferer.
+    /// Limit of the hop's SIR without noise, linear, far from the sender and the interferer.
     pub gain: f64,
     relays: u16,
 }
@@ -230,7 +231,7 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
 pub struct Reaches {
     /// Number of hops whose farthest position is before Rx, so that the target limits it.
     pub inside: u32,
-    /// Number of hops that miss the target at a nearer position, because the interferer is there.
+    /// Number of hops whose farthest position is beyond the interferer, while nearer ones miss the target.
     pub leaps: u32,
     /// Number of hops whose target SIR no position meets.
     pub infeasible: u32,

@@ -21,14 +21,14 @@ struct Function {
     /// Unit of an absolute error.
     unit: &'static str,
     error: Error,
-    /// Range of the test points x. A positive range has points at a constant ratio, others at equal distances.
+    /// Range of the test points x. The points of a range above 0 are spaced logarithmically, those of others evenly.
     range: [f64; 2],
     /// Maps a test point x to the arguments of the function. A function of one argument ignores the second.
     arguments: fn(f64) -> [f64; 2],
     micromath: fn([f32; 2]) -> f32,
     libm: fn([f32; 2]) -> f32,
     exact: fn([f64; 2]) -> f64,
-    /// Largest permitted errors of micromath and of libm: the measured errors, rounded up.
+    /// Largest permitted errors, first of micromath and then of libm: the measured errors, rounded up.
     largest: [f64; 2],
 }
 

@@ -103,7 +103,7 @@ fn fine_search_gains_sir_over_a_coarse_grid() {
 
 /// Checks that the paper's grid search makes the same moves as a separate program.
 ///
-/// It starts from positions at which the SIRs of the hops differ much.
+/// The start positions are such that the SIRs of the hops differ much.
 #[test]
 fn grid_search_moves_as_the_reference_program() {
     let link = Link {
@@ -217,7 +217,7 @@ fn the_fine_search_is_as_good_as_a_dense_grid() {
     assert!(far <= 3, "{far}");
 }
 
-/// Returns the hops of relay `at` (from 0) in a chain of 1 W relays at `places`.
+/// Returns the two hops that begin or end at relay `at` (from 0) in a chain of 1 W relays at `places`.
 fn hops_of(mission: &Mission, places: &[Placement], at: usize) -> Hops {
     let beside = |place: &Placement| HopEnd {
         place: *place,

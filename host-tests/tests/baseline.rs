@@ -120,7 +120,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Checks that a surplus relay is placed above Rx, and all other hops are shortened in proportion.
+/// Checks that one relay more than needed is placed above Rx. All other hops are shortened in proportion.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);
@@ -132,7 +132,7 @@ fn surplus_relays_shorten_all_hops_in_proportion() {
     assert!(off(places[1] - places[0], step * 1000.0 / whole) < 1e-9);
 }
 
-/// Checks that a Tx with less power has its relay right above it.
+/// Checks that the first relay is placed right above Tx if Tx has less power than the relays.
 #[test]
 fn the_relay_of_the_weaker_ground_station_is_above_it() {
     let mut link = Link::paper(60);
@@ -146,7 +146,7 @@ fn the_relay_of_the_weaker_ground_station_is_above_it() {
     assert!(off(1000.0 - places[59], last * 1000.0 / whole) < 1e-9);
 }
 
-/// Checks that the mean SIR of two relays at random positions is its integral over all positions.
+/// Checks that the mean SIR of two relays at random positions equals the integral over all positions.
 #[test]
 fn the_mean_of_random_chains_is_the_integral() {
     // With an interferer near Tx and relays with a long range, the order of relays matters.

@@ -277,7 +277,7 @@ fn a_shared_channel_gives_the_positions_of_two_wires() {
 
 /// Checks that relays with their own altitudes and powers reach the optimum.
 ///
-/// The leader does not know these at first, so that the target SIR that it predicts is wrong.
+/// The leader does not know these altitudes and powers at first, so that the target SIR that it predicts is wrong.
 #[test]
 fn a_chain_of_different_relays_is_solved_exactly() {
     let mission = mission(8);

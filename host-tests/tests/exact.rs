@@ -322,8 +322,9 @@ fn near_optimal_in_uneven_fields_by_unlike_relays() {
     assert!(tally.near * 100 >= tally.scenes * 88 && tally.tight() >= 80.0);
 }
 
-/// Checks that chains agree by messages on targets that they meet, with an upper bound that holds. Runs are with and
-/// without prediction and message faults.
+/// Checks that chains agree by messages on target SIRs that they meet, and state a correct upper bound.
+///
+/// Runs are with and without prediction and message faults.
 #[test]
 fn chains_agree_by_messages_on_feasible_targets() {
     let mut rng = generator(904);

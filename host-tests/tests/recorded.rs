@@ -173,7 +173,7 @@ fn the_numbered_scenarios_are_of_many_kinds() {
 }
 
 /// Checks that no random move of one or all relays improves a recorded optimum. Scenes are in the plane, with lateral
-/// offsets, with held altitudes, and in noise.
+/// offsets, with fixed altitudes, and in noise.
 #[test]
 fn no_single_move_improves_an_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(35));

@@ -122,7 +122,8 @@ fn without_a_quorum_the_last_relay_goes_on() {
     assert_eq!(only(&report, 2, 1).view, 1);
 }
 
-/// Checks that authentication does not change the positions after a loss. It costs only the time of a handshake.
+/// Checks that authentication does not change the positions after a loss. Authentication costs only the time of a
+/// handshake.
 #[test]
 fn tags_change_only_the_time() {
     let (bare, _) = recovered(losing(8, 4));

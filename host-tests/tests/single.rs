@@ -108,7 +108,7 @@ fn the_first_feasible_target_is_not_the_optimum() {
     assert!((found.sir / 0.121_95 - 1.0).abs() < 0.02, "{found:?}");
 }
 
-/// Checks one relay in a constant field against a public reference program.
+/// Checks one relay in constant interference against a public reference program.
 ///
 /// With Upsilon = E[1/I] of 4 (I is the interference power) and steps of 0.0001, the reference reaches an SIR of
 /// 0.0065 at x = 77.298 m.

@@ -92,7 +92,7 @@ fn retreats_agree_with_the_reference() {
     assert!(worst < 1e-6);
 }
 
-/// Checks that chains in a constant field reach the closed-form optimum.
+/// Checks that chains in constant interference reach the closed-form optimum.
 ///
 /// They have 1 to 50 relays, with and without the leader's prediction of the target SIR.
 #[test]
@@ -147,9 +147,9 @@ fn the_fixed_step_is_that_of_the_paper() {
     assert!(steps > 1000);
 }
 
-/// Checks that relays with own altitudes or powers in a field meet their agreed target SIR.
+/// Checks that relays with own altitudes or powers meet their target SIR in a field of interference.
 ///
-/// The leader does not know these at first, so that the target that it predicts is wrong.
+/// The leader does not know these altitudes and powers at first, so that the target that it predicts is wrong.
 #[test]
 fn different_relays_meet_the_agreed_target_in_a_field() {
     let mut rng = generator(68);
@@ -206,7 +206,7 @@ fn silent_places_equal_those_by_messages() {
     }
 }
 
-/// Checks that relays in a field keep the least separation, and that it limits the target SIR.
+/// Checks that relays in a field of interference keep the least separation. The separation limits the target SIR.
 #[test]
 fn relays_keep_their_separation() {
     let mut link = StochasticLink {
@@ -235,7 +235,8 @@ fn even(relays: usize) -> StochasticLink {
     }
 }
 
-/// Checks that relays loaded with a constant field measure the true one, and agree again.
+/// Checks that relays whose mission has a wrong field of interference measure the true one. Then they agree again.
+/// The wrong field is constant.
 #[test]
 fn measurements_replace_the_agreed_field() {
     let mut rng = generator(67);

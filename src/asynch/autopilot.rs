@@ -18,7 +18,7 @@ use crate::flight::autopilot::{Autopilot, AutopilotEvent};
 use crate::serial::READ_LIMIT;
 use crate::time::Duration;
 
-/// Pause before a failed, ended or full port is used again.
+/// Pause after the autopilot's port has failed, ended or accepted nothing.
 ///
 /// The data exchange with the relay also pauses for this time, unless an event requests it earlier.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -30,10 +30,10 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Signal to the future that exchanges data with the relay. It is raised after received bytes and events of the
-    /// relay.
+    /// Signal that wakes the future which exchanges data with the relay. It is raised after received bytes and events
+    /// of the relay.
     exchange_signal: Signal,
-    /// Signal to the future that sends frames to the autopilot: a frame may be pending.
+    /// Signal that wakes the future which sends frames to the autopilot. It is raised when a frame may be pending.
     send_signal: Signal,
     /// Waker of the task in `next_event`, which waits for an event of the autopilot link.
     listener: Cell<Option<Waker>>,
@@ -167,7 +167,7 @@ impl AsyncAutopilot {
     }
 }
 
-/// Writes all `bytes` to the port; `None` if the port fails or is full.
+/// Writes all `bytes` to the port. Returns `None` if the port fails or accepts nothing.
 async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     while !bytes.is_empty() {
         match tx.write(bytes).await {
@@ -197,7 +197,7 @@ impl Signal {
         wake(&self.waker);
     }
 
-    /// Clears the signal. The caller then handles everything for which the signal was raised before.
+    /// Clears the signal. The caller must then handle everything for which the signal can have been raised.
     fn clear(&self) {
         self.is_raised.set(false);
     }

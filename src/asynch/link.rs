@@ -17,15 +17,15 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
 
-/// Pause before a failed or ended port is used again, in byte times (11 ms at 115 200 baud).
+/// Pause before a port that has failed or ended is used again, in byte times (11 ms at 115 200 baud).
 const PAUSE: u32 = 128;
 
-/// Time for which the driver-enable pin stays high after the last byte should have left, in byte times.
+/// Time in byte times for which the driver-enable pin stays high after the last byte should have left.
 ///
-/// One byte time for a byte that the port may still be sending, one for the tolerance of its clock.
+/// One byte time is for a byte that the port may still be sending, and one for the tolerance of its clock.
 const PIN_HOLD: u32 = 2;
 
-/// Delimiter that ends every frame. Sent alone, it ends a frame that was cut short.
+/// Delimiter byte that ends every frame. Sent before a frame, it ends a previous frame that was cut short.
 const DELIMITER: [u8; 1] = [0];
 
 /// Link of a port: its reader and writer, the frame queue, and its driver-enable pin if it has one.
@@ -40,15 +40,15 @@ pub struct AsyncLink<R, W, D = NoPin> {
     queue: RefCell<Frames>,
 }
 
-/// Sending half of a link.
+/// Sending half of a link: the port's writer, and its driver-enable pin if it has one.
 #[derive(Debug)]
 struct Sender<W, D> {
     tx: W,
     pin: Option<D>,
     byte_time: Duration,
-    /// Time before which the port is still sending written bytes, computed from the baud rate.
+    /// Time at which all written bytes have left the port, computed from the baud rate.
     quiet_at: Instant,
-    /// True if the last frame may have been cut short on the line.
+    /// True if the last frame may have been cut short, because its writing failed or was cancelled.
     cut: bool,
 }
 
@@ -79,7 +79,7 @@ impl<R: Read, W: Write, D: OutputPin> AsyncLink<R, W, D> {
         }
     }
 
-    /// Returns the future that receives, the future that sends, and the queue of frames to send.
+    /// Returns the future that receives, the future that sends, and the queue of the frames to send.
     pub(super) fn ends<'l>(
         &'l mut self,
         port: Port,
@@ -212,7 +212,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the level of the driver-enable pin, if there is one. Returns true on success and without a pin; pauses
+    /// Sets the driver-enable pin high or low, if there is one. Returns true on success and without a pin; pauses
     /// after a failure.
     async fn drive(
         &mut self,
@@ -278,7 +278,7 @@ pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     (output, waited)
 }
 
-/// Capacity of a frame queue: two frames of full length, besides the frame that the port is sending.
+/// Capacity of a frame queue, bytes: two frames of maximum length. The frame that the port is sending is not in it.
 const CAPACITY: usize = 2 * MAX_FRAME;
 
 /// Queued frames in sending order, each with its delimiter.

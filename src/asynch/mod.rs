@@ -254,7 +254,7 @@ async fn run_relay(
     }
 }
 
-/// Handles the relay's due timeouts, stores its changed record and queues its frames for the ports.
+/// Handles the relay's due timers, stores its changed votes, and queues its frames for the ports.
 ///
 /// Returns the time of the relay's next timeout; `None` if there is none.
 fn turn(

@@ -15,13 +15,13 @@ use crate::serial::SerialStats;
 /// relay across an `await`. An interrupt passes its data through a channel to such a task.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// True if the relay has had new input since the ports' task last ran: received bytes or a call.
+    /// True if the relay has received bytes or was called since the task that runs its ports last ran.
     changed: Cell<bool>,
     /// Waker of the task that runs the relay's ports.
     runner: Cell<Option<Waker>>,
     /// Waker of the firmware's task that waits for an event of the relay.
     listener: Cell<Option<Waker>>,
-    /// Counters of the upstream or shared port, and of the downstream port.
+    /// Counters of the ports: [0] of the upstream or the shared port, [1] of the downstream port.
     stats: [Cell<SerialStats>; 2],
 }
 
@@ -83,7 +83,7 @@ impl<'a> AsyncRelay<'a> {
         Some(work(*self.relay.try_borrow_mut().ok()?))
     }
 
-    /// Notes new input and wakes the task that runs the relay's ports.
+    /// Records that the relay has new input, and wakes the task that runs the relay's ports.
     pub(super) fn notify_runner(&self) {
         self.changed.set(true);
         wake(&self.runner);
@@ -94,12 +94,13 @@ impl<'a> AsyncRelay<'a> {
         wake(&self.listener);
     }
 
-    /// Marks all inputs of the relay so far as handled.
+    /// Records that the task which runs the relay's ports has handled all inputs so far.
     pub(super) fn mark_handled(&self) {
         self.changed.set(false);
     }
 
-    /// Completes once the relay has input that the ports' task has not handled, at once if there is some.
+    /// Completes once the relay has input that the task which runs its ports has not handled. At once if there is
+    /// some.
     pub(super) fn changed(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             store_waker(&self.runner, cx);
@@ -139,7 +140,7 @@ const ZERO: SerialStats = SerialStats {
     unrouted: 0,
 };
 
-/// Stores the waker of the current task, unless that is already stored.
+/// Stores the waker of the current task in `place`, unless the waker there wakes this task, too.
 pub(super) fn store_waker(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
     let kept = place.take().filter(|waker| waker.will_wake(cx.waker()));
     place.set(Some(kept.unwrap_or_else(|| cx.waker().clone())));

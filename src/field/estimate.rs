@@ -30,14 +30,15 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Number 1 in the fixed-point format of the samples: 2^31, so that no sum overflows. 2^32 samples sum to at most
-/// 2^63, and their squares, times the number of samples, to 2^126.
+/// Number 1 in the fixed-point format of the samples I / `I_max`: 2^31. With it no sum overflows: 2^32 samples sum to
+/// at most 2^63, and their squares, times the number of samples, to 2^126.
 const ONE: f32 = 2_147_483_648.0;
 
-/// Fractional bits of the fixed-point numbers in which samples are summed.
+/// Number of fractional bits of the fixed-point numbers in which the samples are summed.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of I / `I_max` for which an estimate is made: the fixed-point step is 5e-4 of it.
+/// Smallest mean of I / `I_max` for which an estimate is made. A step of the fixed-point format is 5e-4 of it; with a
+/// smaller mean the rounding would falsify the estimate.
 const LEAST_MEAN: f32 = 1e-6;
 
 /// Running sums of the interference powers measured at one position; samples are not stored.
@@ -57,7 +58,7 @@ pub struct Estimator {
     rejected: u32,
 }
 
-/// Estimate of Upsilon = E[1/I] from the samples of an [`Estimator`]. Every number is finite.
+/// Estimate of Upsilon = E[1/I], the mean inverse interference power, by an [`Estimator`]. Every number is finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimate {
@@ -178,7 +179,7 @@ impl Estimator {
     }
 }
 
-/// Beta distribution with the mean and the variance of the samples.
+/// Beta distribution that has the mean and the variance of the samples.
 struct Fit {
     /// Mean m of the samples I / `I_max`.
     m: f32,

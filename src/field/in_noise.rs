@@ -18,7 +18,8 @@
 
 use super::{Field, FieldPoint};
 
-/// Interference field with the receiver noise N, W. It turns Upsilon = E[1/I] into Upsilon / (1 + N Upsilon).
+/// Interference field (known interference along x) together with the receiver noise N, W. Upsilon = E[1/I] becomes
+/// Upsilon / (1 + N Upsilon).
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(

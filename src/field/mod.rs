@@ -9,8 +9,8 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon = E[1/I], 1/W. It stands for interference of 1e9 W to 1e-32 W, far beyond measured
-/// values.
+/// Allowed range of Upsilon = E[1/I], 1/W. It corresponds to interference of 1e9 W down to 1e-32 W, far more and far
+/// less than is ever measured.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
 /// Point of a [`Field`]: an x, and Upsilon = E[1/I], the mean of the inverse interference power there.
@@ -232,7 +232,7 @@ impl FieldPoint {
         }
     }
 
-    /// Returns a field point at `x_m`, m, for interference whose I / `i_max_w` has a Beta distribution.
+    /// Returns a point at `x_m`, m, of a field whose I / `i_max_w` has a Beta distribution there.
     ///
     /// `None` if [`beta_upsilon`](Self::beta_upsilon) is `None` for the same shapes and `i_max_w`. Constant work.
     #[expect(

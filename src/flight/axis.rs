@@ -31,7 +31,8 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Maximum difference, m, between the mission's distance and that of the sites of Tx and Rx. It covers rounding.
+/// Maximum difference, m, between a mission's distance and the distance of its Tx and Rx positions. It covers
+/// rounding.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why the positions of transmitter and receiver define no line.
@@ -80,7 +81,7 @@ impl core::fmt::Display for AxisError {
 
 impl core::error::Error for AxisError {}
 
-/// Line on earth from the transmitter to the receiver, with conversions from and to its coordinates.
+/// Line on earth from Tx to Rx. It converts between geodetic positions and the mission's coordinates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
@@ -94,7 +95,7 @@ pub struct Axis {
     up: Vector,
     /// Half the length of the chord from transmitter to receiver, m.
     half_chord_m: f64,
-    /// Radius of curvature of the line, m.
+    /// Radius of curvature of the earth's surface along the line, m.
     radius_m: f64,
     /// Distance from transmitter to receiver along the ground, m.
     distance_m: f64,
@@ -103,10 +104,11 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Maximum distance from the line of a position in its coordinates, m: beside, before and beyond it.
+    /// Maximum distance from the line Tx to Rx at which mission coordinates are used, m. It applies sideways, upward,
+    /// before Tx and beyond Rx.
     pub const AROUND_M: f32 = 5_000.0;
 
-    /// Creates the line between two sites on the ground.
+    /// Creates the line from a transmitter at `tx` to a receiver at `rx`, both on the ground.
     ///
     /// Poles and the antimeridian need no special case. Constant work.
     ///
@@ -124,7 +126,7 @@ impl Axis {
     /// ```
     ///
     /// # Errors
-    /// [`AxisError`] if a latitude or longitude is out of range, or the sites are too close or too far apart.
+    /// [`AxisError`] if a latitude or longitude is out of range, or the two positions are too close or too far apart.
     #[inline(never)] // called from several places
     pub fn try_new(tx: Geodetic, rx: Geodetic) -> Result<Self, AxisError> {
         if !tx.is_valid() {
@@ -162,7 +164,7 @@ impl Axis {
         })
     }
 
-    /// Creates the line from the transmitter to the receiver of `sites`, see [`try_new`](Self::try_new).
+    /// Creates the line between the Tx and Rx positions `sites`, see [`try_new`](Self::try_new).
     ///
     /// # Errors
     /// Same as for [`try_new`](Self::try_new).
@@ -181,7 +183,7 @@ impl Axis {
         self.distance_m
     }
 
-    /// Returns true if `distance_m` is the line's length but for rounding.
+    /// Returns true if `distance_m` is the line's length, except for rounding.
     pub fn is_of(&self, distance_m: f32) -> bool {
         let rounded = f64::from(distance_m) * f64::from(f32::EPSILON);
         (f64::from(distance_m) - self.distance_m).abs() <= TOLERANCE_M + rounded
@@ -267,7 +269,7 @@ impl Axis {
         })
     }
 
-    /// Returns the point at height 0 that is `x` m from the line's middle along it, and `y` m beside it.
+    /// Returns the point at height 0 that is `x` m along the line from its middle, and `y` m to the right.
     fn on_line(&self, x: f64, y: f64) -> Vector {
         let c = chord(x, self.radius_m);
         let sagitta =
@@ -284,12 +286,13 @@ impl Axis {
         narrow(libm::atan2(east, north))
     }
 
-    /// Returns the angle between this line and `other` at their transmitters, radians in [0, π]. Constant work.
+    /// Returns the angle between the directions of this line and `other` at their Tx, radians in [0, π]. Constant
+    /// work.
     pub fn turn_rad(&self, other: &Self) -> f32 {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }
 
-    /// Returns the line's azimuth at `x_m` plus `aside_rad`, radians from -π to π. Constant work.
+    /// Returns the azimuth of the line at `x_m` plus the angle `aside_rad`, radians in -π to π. Constant work.
     pub(super) fn heading_rad(&self, x_m: f32, aside_rad: f32) -> f32 {
         turned(self.azimuth_rad(x_m) + aside_rad)
     }
@@ -346,7 +349,7 @@ const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns half the length of an arc, m, from half the length of its `chord` and its `radius`, m.
+/// Returns half the length of an arc, m. `chord` is half the length of its chord, and `radius` its radius, m.
 fn arc(chord: f64, radius: f64) -> f64 {
     let q = chord / radius;
     chord * (1.0 + q * q / 6.0)
@@ -357,11 +360,12 @@ fn chord(arc: f64, radius: f64) -> f64 {
     arc * (1.0 - q * q / 6.0)
 }
 
-/// Minimum length of a line from Tx to Rx, m. One unit of latitude turns it by a thousandth of a radian.
+/// Minimum length of a line from Tx to Rx, m. On a shorter line the 1e-7 degree steps of the two positions (1 cm)
+/// would turn its direction by more than 1 mrad.
 #[doc(hidden)] // for the tests of this workspace
 pub const SHORTEST_M: f64 = 10.0;
 
-/// Maximum length of a line from Tx to Rx, m; up to it the accuracy is known.
+/// Maximum length of a line from Tx to Rx, m. For longer lines the accuracy of the conversions is not tested.
 #[doc(hidden)] // for the tests of this workspace
 pub const LONGEST_M: f64 = 100_000.0;
 
@@ -406,8 +410,8 @@ impl Vector {
         .unit()
     }
 
-    /// Returns latitude and longitude of this point, which is near the ellipsoid, radians. It takes one step of
-    /// Bowring's method.
+    /// Returns latitude and longitude of this point, radians. The point must be near the ellipsoid, because the
+    /// computation is a single step of Bowring's method.
     pub(super) fn latitude_and_longitude(self) -> [f64; 2] {
         let p = libm::sqrt(self.x * self.x + self.y * self.y);
         // b / a. The tangent of the parametric latitude is z / (p b / a).
@@ -480,7 +484,7 @@ pub(super) fn radius(normal: Vector, along: Vector) -> f64 {
     1.0 / (north2 / meridian + (1.0 - north2) / prime)
 }
 
-/// Factor that converts units of 10⁻⁷ degrees to radians.
+/// Factor that converts an angle in units of 10⁻⁷ degrees to radians.
 pub(super) const UNIT: f64 = core::f64::consts::PI / 1.8e9;
 
 /// Returns sine and cosine of an angle in units of 10⁻⁷ degrees, within a unit in the last place.
@@ -535,7 +539,7 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Tests of special cases of a line on earth: its ends, a pole, the antimeridian, its azimuth's change.
+/// Tests of special lines on earth: the ends, a pole, the antimeridian, and a line of changing azimuth.
 #[cfg(test)]
 mod tests {
     use super::{Axis, AxisError, LONGEST_M};

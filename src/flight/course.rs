@@ -5,7 +5,7 @@ use super::axis::{Axis, AxisError};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 
-/// Line on earth and speed limit with which a drone flies a mission.
+/// Line on earth from Tx to Rx and speed limit with which a drone flies a mission.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
     /// Line on earth from transmitter to receiver.
@@ -21,14 +21,16 @@ pub struct Course {
 pub enum CourseError {
     /// The positions of Tx and Rx do not define a line.
     Axis(AxisError),
-    /// The distance of Tx and Rx along the ground, m, which differs from the mission's.
+    /// The distance of Tx and Rx along the ground is not the mission's distance. The value is the distance along the
+    /// ground, m.
     Distance(f64),
 }
 
 impl Course {
-    /// Returns the course of a drone that flies `mission` between `sites` with a maximum of `speed_m_s`.
+    /// Returns the course of a drone that flies `mission`: its line on earth and its speed limit.
     ///
-    /// `speed_m_s` is 0.1 to 20 m/s, or 0 for that of [`Pace::default`]. Constant work.
+    /// `sites` are the positions of Tx and Rx. `speed_m_s` is the speed limit, 0.1 to 20 m/s, or 0 for that of [`Pace::default`].
+    /// Constant work.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -43,7 +45,7 @@ impl Course {
     /// ```
     ///
     /// # Errors
-    /// [`CourseError`] if the sites define no line, or one of another length than the mission's.
+    /// [`CourseError`] if Tx and Rx define no line, or a line of another length than the mission's.
     #[inline(never)] // frees its stack before the relay needs some
     pub fn try_new(sites: Sites, speed_m_s: f32, mission: &Mission) -> Result<Self, CourseError> {
         let axis = Axis::between(sites).map_err(CourseError::Axis)?;

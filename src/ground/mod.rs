@@ -26,13 +26,13 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay, 15 s, after which another node with its index is accepted. Relays use the same time.
+/// Silence of a relay, 15 s, after which another node with its node number is accepted. Relays use the same time.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
-/// Time after which the ground station repeats a question that a relay has not answered.
+/// Time after which the ground station repeats a hello that the polled relay has not answered.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Number of unanswered questions to one relay before the next relay is polled.
+/// Number of unanswered hellos to one relay after which the next relay is polled.
 const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
@@ -74,25 +74,25 @@ pub struct Ground {
     base: u16,
     end: Side,
     node: u16,
-    /// Number of relays that the station can reach: one over a wire, up to four over a shared channel.
+    /// Number of relays in radio reach of the station: one over a wire, up to four over a shared channel.
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last question which mission the relays fly; 0 before the first question.
+    /// Number of the last query for the mission that the relays fly; 0 before the first query.
     query_number: u16,
     flown: Option<FlownMission>,
-    /// Distance of the polled relay, in relays along the chain: 1 for the nearest.
+    /// Distance of the relay that is polled now, in relays along the chain: 1 for the nearest.
     distance: u16,
     unanswered: u8,
-    /// Mission that the polled relay holds, once it has reported it.
+    /// Newest mission that the polled relay has stored, by its last hello; `None` before that.
     relay_mission: Option<MissionId>,
-    /// True from a question to the polled relay until its next hello, which is the answer.
+    /// True from a hello to the polled relay until that relay's next hello, which is the reply.
     query_sent: bool,
-    /// Number of the relay's hello that the next offer of the mission answers; `None` if no offer is due.
+    /// Number in the relay's hello, which the next mission offer must repeat; `None` if no offer is due.
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
-    /// Clock that never runs backwards. Every upload and every question starts it again.
+    /// Clock that never runs backwards. It starts again with every upload and every query.
     clock: MonotonicClock,
     reports: PendingReports,
     deframer: Deframer,
@@ -101,9 +101,10 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Creates a ground station for relays that were loaded with `base`.
+    /// Creates a ground station for relays that loaded the mission `base` before flight.
     ///
-    /// `end` is `Upstream` at the transmitter. The epoch in `auth` must be larger at every start.
+    /// `end` is the station's end of the chain: `Upstream` at Tx, `Downstream` at Rx. The epoch (start counter) in
+    /// `auth` must be larger at every start.
     pub fn new(base: &Mission, end: Side, network: u16, wiring: Wiring, auth: Auth) -> Self {
         let all = base.relays();
         let reach = match wiring {
@@ -140,10 +141,10 @@ impl Ground {
         }
     }
 
-    /// Asks the chain which mission it flies; [`Ground::flown`] returns the answer. Ends an upload in progress.
+    /// Queries the mission that the relays fly; [`Ground::flown`] returns the answer. Ends an upload in progress.
     ///
-    /// The polled relay also sends the upload that it holds, so that the ground station learns what earlier uploads
-    /// have changed.
+    /// The polled relay also sends the uploaded mission that it has stored, if any. The ground station thus learns
+    /// the changes of earlier uploads.
     pub fn request_flown(&mut self, now: Instant) {
         self.upload = None;
         self.progress = Progress::Idle;
@@ -155,15 +156,15 @@ impl Ground {
         self.start(now);
     }
 
-    /// Returns the mission of the polled relay, once it has answered [`Ground::request_flown`].
+    /// Returns the mission of the polled relay. `None` until the relay has answered [`Ground::request_flown`].
     pub const fn flown(&self) -> Option<&FlownMission> {
         self.flown.as_ref()
     }
 
-    /// Starts uploading `upload`, in place of an upload in progress.
+    /// Starts to upload the mission `upload` to the relays. It replaces an upload in progress.
     ///
     /// # Errors
-    /// Returns [`UploadError::Base`] if the upload is for relays that were loaded with another mission.
+    /// Returns [`UploadError::Base`] if the upload is for relays that loaded another mission before flight.
     pub fn upload(&mut self, now: Instant, upload: Upload) -> Result<(), UploadError> {
         if upload.base() != self.base {
             return Err(UploadError::Base);
@@ -174,7 +175,7 @@ impl Ground {
         Ok(())
     }
 
-    /// Schedules the first hello of an upload or a question, for the relay that is polled at present.
+    /// Schedules the first hello of an upload or a query, to the relay that is polled now.
     fn start(&mut self, now: Instant) {
         self.relay_mission = None;
         self.offer_number = None;
@@ -184,15 +185,16 @@ impl Ground {
         self.repeat_at = Some(now + REPEAT_AFTER);
     }
 
-    /// Reports the interference measured at this station to the relays nearby. Returns false, and does nothing, if
+    /// Sends the interference measured at this station to the relays in reach. Returns false, and does nothing, if
     /// `power_w` is outside 1e-30 to 1e6 W.
     ///
-    /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged long enough
-    /// for the relative error of [`Listen`](crate::Listen). One measurement per [`Listen::every`](crate::Listen::every) is
-    /// enough.
+    /// `power_w` is the mean received power with the receiver's noise but without the chain's own signals, averaged
+    /// long enough for the relative error of [`Listen`](crate::Listen). One measurement per
+    /// [`Listen::every`](crate::Listen::every) is enough.
     ///
-    /// A link carries one frame of 23 bytes and a tag, a shared channel one to each of the four nearest relays. A relay that is
-    /// absent or has restarted is sent a handshake instead. Reports are not acknowledged: the next one replaces a lost one.
+    /// A link carries one frame of 23 bytes and a tag, a shared channel one to each of the four nearest relays. A
+    /// relay that is absent or has restarted is sent a handshake instead. Reports are not acknowledged: the next one
+    /// replaces a lost one.
     pub fn measured(&mut self, power_w: f32) -> bool {
         if !is_level(power_w) {
             return false;
@@ -210,8 +212,8 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of rejected intact frames. Their sender is not in reach, or they are forged, replayed or
-    /// malformed.
+    /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
+    /// replayed or malformed, or from a relay with another loaded mission.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -222,13 +224,14 @@ impl Ground {
 
     /// Returns the counters of sent and received frames.
     ///
-    /// `mission` counts relays with another loaded mission, `foreign` other networks, `overheard` frames to other nodes.
+    /// `mission` counts frames of relays that loaded another mission before flight, `foreign` frames of other
+    /// networks, `overheard` frames to other nodes.
     pub const fn stats(&self) -> &Stats {
         &self.stats
     }
 
-    /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay's key has been
-    /// verified.
+    /// Returns the node numbers of the relays in reach, nearest first. The second value is true if the relay has
+    /// proven that it has the key.
     ///
     /// After a restart or a new handshake a relay is unverified until it answers. Work: four relays at most.
     pub fn relays_in_reach(&self) -> impl Iterator<Item = (u16, bool)> {
@@ -286,21 +289,21 @@ impl Ground {
         bump(counter);
     }
 
-    /// Returns true while the question which mission the chain flies is unanswered.
+    /// Returns true while the query for the mission that the relays fly is unanswered.
     const fn is_querying(&self) -> bool {
         self.upload.is_none()
             && self.query_number != 0
             && !matches!(&self.flown, Some(flown) if flown.is_known())
     }
 
-    /// Returns true if `upload` answers the question which mission the chain flies.
+    /// Returns true if `upload` answers the query for the mission that the relays fly.
     ///
-    /// `answer` is the number of the offer that contains it, which echoes the number of the question.
+    /// `answer` is the number in the relay's offer, which must repeat the number of the query.
     fn answers_query(&self, upload: &Upload, answer: u16) -> bool {
         self.is_querying() && answer == self.query_number && upload.base() == self.base
     }
 
-    /// Records the upload that relay `by` has sent in answer to the question which mission it flies.
+    /// Records the uploaded mission that relay `by` has sent as the answer to the query.
     fn on_upload(&mut self, by: u16, upload: Upload) {
         let flies = matches!(&self.flown, Some(flown) if flown.by == by && flown.flies && flown.version == upload.version());
         self.flown = Some(FlownMission {
@@ -313,8 +316,8 @@ impl Ground {
         self.repeat_at = None;
     }
 
-    /// Handles a hello of relay `by` that answers the question which mission it flies. If the relay holds an upload,
-    /// it sends that in its next message.
+    /// Handles a hello of relay `by` that answers the query for the mission that it flies. If the relay has stored an
+    /// uploaded mission, it sends that mission in its next message.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
@@ -335,7 +338,7 @@ impl Ground {
         self.flown = Some(flown);
     }
 
-    /// Handles a hello of relay `by`, which reports the mission that it holds.
+    /// Handles a hello of relay `by`, which reports the newest mission that the relay has stored.
     fn on_hello(&mut self, by: u16, distance: u16, hello: Hello) {
         if self.is_querying() {
             return self.on_query_reply(by, distance, hello);
@@ -394,7 +397,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next question if it is due: to the same relay again, or to the next relay. Takes constant time.
+    /// Schedules the next hello if it is due: to the same relay again, or to the next relay. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if self.repeat_at.is_none_or(|again| again > now) {
@@ -421,7 +424,7 @@ impl Ground {
         self.at(self.distance)
     }
 
-    /// Returns the node number of the relay at `distance` along the chain from this station.
+    /// Returns the node number of the relay that is `distance` relays away from this station.
     fn at(&self, distance: u16) -> u16 {
         match self.end {
             Side::Upstream => distance,
@@ -429,7 +432,7 @@ impl Ground {
         }
     }
 
-    /// Returns the latest time of the next [`Ground::handle_timeout`] call. `None` once there is nothing left to do.
+    /// Returns the latest time for the next call of [`Ground::handle_timeout`]; `None` if no timer runs.
     pub fn poll_timeout(&self) -> Option<Instant> {
         Some(self.clock.external(self.repeat_at?))
     }
@@ -489,7 +492,8 @@ impl Ground {
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 
-    /// Writes the interference report to the next relay, or a handshake if that relay could not read it.
+    /// Writes the interference report to the next relay. A handshake is written instead if that relay cannot verify
+    /// frames of this station yet.
     fn next_report(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         let (distance, power_w) = self.reports.poll(self.reach)?;
         let message = Message::Level {
@@ -508,23 +512,24 @@ const fn is_under_way(progress: Progress) -> bool {
     )
 }
 
-/// Newest mission that a relay holds, as the relay has reported it.
+/// Newest mission that a relay has stored, by the relay's own report.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FlownMission {
     /// Node number of the relay that answered.
     pub by: u16,
-    /// Version of the mission: 0 for the mission that was loaded before flight.
+    /// Version of the mission; 0 for the one that was loaded before flight.
     pub version: u16,
-    /// True if the relay flies the mission; false while it only holds it.
+    /// True if the relay flies the mission now; false if it has only stored it.
     pub flies: bool,
-    /// Values of the mission. `None` for the mission loaded before flight, and until the relay has sent them; older
-    /// firmware never sends them.
+    /// Uploaded mission with all its parameters. `None` for the mission loaded before flight, and until the relay has
+    /// sent it, which older firmware never does.
     pub upload: Option<Upload>,
 }
 
 impl FlownMission {
-    /// Returns true once the values of the mission are known: received, or those loaded before flight.
+    /// Returns true once all parameters of the mission are known. They are those received, or those loaded before
+    /// flight.
     pub const fn is_known(&self) -> bool {
         self.version == 0 || self.upload.is_some()
     }
@@ -537,11 +542,11 @@ pub enum Progress {
     /// Idle: there is no upload.
     #[default]
     Idle,
-    /// The mission is offered; no relay is known to hold it.
+    /// The mission is being offered; no relay is known to have stored it.
     Offering,
-    /// A relay holds the mission; the ground station polls until the chain flies it.
+    /// A relay has stored the mission. The ground station polls until the relays fly it.
     Stored {
-        /// Node number of the relay that holds the mission.
+        /// Node number of the relay that has stored the mission.
         by: u16,
     },
     /// A relay flies the mission, but the station does not know yet if all relays do.
@@ -549,40 +554,41 @@ pub enum Progress {
         /// Node number of the relay that flies the mission.
         by: u16,
     },
-    /// The mission is active in all relays of a view (an agreed set of members). Other relays do not take part until
-    /// they fly the mission.
+    /// Complete: all relays of a view (agreed members of the chain) fly the mission. Relays outside this view take no
+    /// part until they fly the mission, too.
     Flown {
-        /// Node number of the relay that reports that its whole view flies the mission.
+        /// Node number of the relay that reports that all relays of its view fly the mission.
         by: u16,
-        /// Latest view (agreed set of members) that the reporting relay knows.
+        /// Latest view (agreed members of the chain) that the reporting relay knows.
         view: ViewId,
-        /// Number of relays that fly the mission. They are the reporting relay, and those of its view farther from
-        /// the station.
+        /// Number of relays that fly the mission. They are the relay `by`, and the relays of its view that are
+        /// farther from the station.
         relays: u16,
     },
-    /// A relay refuses the mission: no valid line on earth, or outside that relay's own geofence. The chain does not
-    /// fly it.
+    /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the positions of Tx and
+    /// Rx, or that relay's geofence.
     Refused {
-        /// Node number of the relay that reports the refusal: its own, or that of a relay farther away.
+        /// Node number of the relay that reports the refusal. It refuses the mission itself, or a relay farther from
+        /// the station does.
         by: u16,
     },
-    /// The upload is outdated: a relay holds a newer mission.
+    /// The upload is outdated, because a relay has stored a newer mission.
     Outdated {
         /// Version of the newer mission.
         version: u16,
     },
 }
 
-/// Number of interference reports after which the station repeats its handshake. A relay that has restarted can read
-/// reports only after a handshake.
+/// Number of interference reports after which the station repeats its handshake. Without a new handshake a restarted
+/// relay could not verify the reports.
 const REPORTS_PER_HANDSHAKE: u8 = 16;
 
-/// Last interference that the station measured, and the relays to which its report is pending.
+/// Last interference power measured at the station, and the relays to which it must be reported.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PendingReports {
-    /// Last measured interference, W; 0 before the first.
+    /// Last measured interference power, W; 0 before the first measurement.
     power_w: f32,
-    /// Relays to which the report is pending: bit d - 1 for the relay at distance d.
+    /// Bit mask of the relays to which the report is pending. Bit d - 1 is the relay at distance d.
     pending: u8,
     measurements: u8,
 }
@@ -595,7 +601,8 @@ impl PendingReports {
         measurements: 0,
     };
 
-    /// Records a measurement, W, for the relays at distances 1 to `reach`. Returns true if a handshake to them is due first.
+    /// Records the interference `power_w`, W, for a report to the relays at distances 1 to `reach`. Returns true if a
+    /// handshake must be sent to them first.
     pub(super) fn record(&mut self, power_w: f32, reach: u16) -> bool {
         self.power_w = power_w;
         self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));
@@ -610,7 +617,8 @@ impl PendingReports {
         }
     }
 
-    /// Returns the distance of the next relay to send the report to, at most `reach`, and the power, W.
+    /// Returns the distance of the next relay to report to, at most `reach`, and the interference power, W. `None` if
+    /// no report is pending.
     pub(super) fn poll(&mut self, reach: u16) -> Option<(u16, f32)> {
         let distance = (1..=reach).find(|distance| self.pending & bit(*distance) != 0)?;
         self.pending &= !bit(distance);
@@ -618,7 +626,7 @@ impl PendingReports {
     }
 }
 
-/// Returns the bit mask of the relay at `distance`, 1 to 8, in the set of pending reports.
+/// Returns the bit of the relay at `distance`, 1 to 8, in a bit mask; 0 for other distances.
 const fn bit(distance: u16) -> u8 {
     match 1_u8.checked_shl(distance.saturating_sub(1) as u32) {
         Some(bit) => bit,

@@ -12,18 +12,20 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove a restart. Fewer of them may be late
-/// messages of an earlier association.
+/// Number of consecutive messages of another association (session) that prove a restart. Fewer messages of another
+/// association may be late ones, from before.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of reminders, one per second, after which a halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Number of one-second reminders after which a neighbour's last x expires, unless it sends again.
+/// Number of reminders, one per second, after which a neighbour's last x is no longer used. A new message of the
+/// neighbour restarts the count.
 const SEEN_REMINDERS: u8 = 15;
 
-/// Notice to a neighbour that this relay has left the association (session) with it. The relay is no longer flown to
-/// its setpoints. The notice is repeated until the neighbour starts a new association.
+/// Notice that tells a neighbour that this relay has left the association (session) with it. The relay leaves it
+/// because its drone no longer flies to the setpoints. The notice is repeated until the neighbour starts a new
+/// association.
 #[derive(Clone, Copy, Debug)]
 struct LeaveNotice {
     own_number: u16,
@@ -42,26 +44,28 @@ pub(super) struct Association {
     pub(super) node: u16,
     /// Random number by which this relay identifies the association (session) with the neighbour.
     pub(super) own_number: u16,
-    /// Number by which the neighbour identifies the association with this relay; 0 until it is known.
+    /// Number by which the neighbour identifies this association (session); 0 until it is known.
     pub(super) peer_number: u16,
     /// Number of consecutive messages that belong to another association (session) of the neighbour.
     foreign_messages: u8,
     /// True if a message to the neighbour is pending.
     pub(super) due: bool,
-    /// True while the neighbour requests an open chain: all relays the minimum separation apart along x.
+    /// True while the neighbour requests an open chain. In an open chain all relays are the minimum separation apart
+    /// along x.
     pub(super) open_requested: bool,
-    /// True while the messages to the neighbour request an open chain: all relays the separation apart.
+    /// True while the messages to the neighbour request an open chain. In an open chain all relays are the minimum
+    /// separation apart along x.
     open_sent: bool,
     /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without one.
     halt_reminders_left: u8,
     /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
-    /// Number of the association that the neighbour has left, 0 for none. A neighbour that has left one is absent:
-    /// its drone does not follow setpoints.
+    /// Number of the association (session) that the neighbour has left, 0 for none. After that the neighbour counts
+    /// as absent: its drone does not fly to setpoints.
     left_number: u16,
-    /// Pending notice to the neighbour that this relay has left an association with it.
+    /// Pending notice to the neighbour that this relay has left an association (session) with it.
     leave_notice: Option<LeaveNotice>,
-    /// Last x received from the neighbour, in any association, m; NaN before the first.
+    /// Last x received from the neighbour, m, in any association (session); NaN before the first.
     seen_m: f32,
     /// Number of reminders, one per second, until the neighbour's last x expires.
     seen_reminders_left: u8,
@@ -87,8 +91,8 @@ impl Association {
         }
     }
 
-    /// Returns true if no neighbour follows setpoints on this side. The chain ends here, or the neighbour's drone is
-    /// not flown to setpoints.
+    /// Returns true if there is no neighbour on this side that flies to its setpoints. The chain ends here, or the
+    /// neighbour's drone is in manual control or on the ground.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
@@ -120,13 +124,13 @@ impl Association {
         }
     }
 
-    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The distance must be
-    /// larger than the errors of both reports.
+    /// Returns true if this relay's reported x is on the wrong side of the neighbour's last x. The difference must
+    /// exceed the errors of both reports.
     pub(super) fn is_on_wrong_side(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
-    /// Returns true if this relay's reported x is on the right side of the neighbour's last x. The distance must be
+    /// Returns true if this relay's reported x is on the right side of the neighbour's last x. The difference must be
     /// at least the errors of both reports.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
@@ -136,25 +140,27 @@ impl Association {
         self.left_number != 0
     }
 
-    /// Marks the neighbour as absent: it has left the association with that number, and may be anywhere.
+    /// Marks the neighbour as absent, because it has left the association (session) of that number. An absent
+    /// neighbour may be anywhere.
     pub(super) const fn mark_absent(&mut self, association: u16) {
         self.left_number = association;
     }
 
-    /// Accepts the number that the neighbour gave to the association. An absent neighbour counts as back.
+    /// Accepts the number that the neighbour gave to the association (session) with this relay. A neighbour that was
+    /// absent counts as back.
     pub(super) const fn pair(&mut self, association: u16) {
         self.peer_number = association;
         self.left_number = 0;
     }
 
-    /// Returns true if `fence` states that the neighbour has left this association (session). A repetition of that
-    /// message does not count again, because the next association has another number.
+    /// Returns true if `fence` states that the neighbour has left the current association (session). A repetition of
+    /// that message does not count again, because the next association has another number.
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
 
-    /// Returns a new association in place of this one, which this relay has left. It includes a leave notice if the
-    /// neighbour's number is known, because the neighbour then relies on the old association.
+    /// Returns a new association (session) in place of this one, which this relay has left. It includes a leave
+    /// notice if the neighbour's number is known, because the neighbour then relies on the old association.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own_number: self.own_number,
@@ -171,7 +177,7 @@ impl Association {
         }
     }
 
-    /// Returns a new association with the same neighbour. A pending leave notice is kept.
+    /// Returns a new association (session) with the same neighbour. A pending leave notice is kept.
     pub(super) fn renew(&self, jitter: &mut Jitter) -> Self {
         Self {
             leave_notice: self.leave_notice,
@@ -179,8 +185,8 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to an association that this relay, or the neighbour, has left. This relay's
-    /// leave notice is then sent again, until the neighbour starts a new association.
+    /// Returns true if a message belongs to an association (session) that either relay has left. If this relay has
+    /// left it, its leave notice is sent again, until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -199,7 +205,7 @@ impl Association {
         fence.association == self.left_number
     }
 
-    /// Schedules a pending leave notice again; returns true if there is one.
+    /// Schedules a pending leave notice for sending again; returns true if there is one.
     pub(super) const fn remind(&mut self) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             leave_notice.due = true;
@@ -207,7 +213,7 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the notice that this relay has left its association, if it is due.
+    /// Returns the message that this relay has left its association (session), if it is due.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
         core::mem::take(&mut leave_notice.due).then(|| Fence {
@@ -224,8 +230,8 @@ impl Association {
         known
     }
 
-    /// Returns a fence message of this association (session). Its number, x and distance are 0, for the caller to
-    /// fill in.
+    /// Returns a message of this association (session) about the fence, a limit of x between two relays. The
+    /// message's fence number, x and distance are 0, for the caller to fill in.
     pub(super) fn fence(&self, own: &Own) -> Fence {
         Fence {
             association: self.own_number,
@@ -242,23 +248,23 @@ impl Association {
         }
     }
 
-    /// Stores the neighbour's request for an open chain, or its end, from a message of this association. A reply is
-    /// due if the neighbour has not received the last request of this relay.
+    /// Stores the neighbour's request for an open chain, or its end, from a message of this association. In an open
+    /// chain all relays are the separation apart along x. A reply is due if the message shows that the neighbour has
+    /// not received this relay's last request.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.open_requested = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
-    /// Sets or clears the request for an open chain in the messages to the neighbour. A message is due after a
-    /// change.
+    /// Sets or clears the request for an open chain (all relays the separation apart) to the neighbour. A message is
+    /// due after a change.
     pub(super) const fn forward_open(&mut self, opens: bool) {
         self.due |= self.open_sent != opens;
         self.open_sent = opens;
     }
 
-    /// Stores a halt request that a message of the neighbour contains, or ends it if it contains none. Only a message
-    /// with a valid position (`is_placed`) ends a request, because a rebooted neighbour does not know its earlier
-    /// one.
+    /// Stores the halt request in the neighbour's message. A message without a request ends an earlier one, but only
+    /// if the message has a valid position (`is_placed`): a rebooted neighbour does not know its earlier request.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -289,9 +295,10 @@ impl Association {
         self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
-    /// Returns the message of a relay that does not follow setpoints or has just started, if it is due.
+    /// Returns the due message of a relay that does not fly to setpoints or has just started.
     ///
-    /// The message contains the relay's position, and a halt request to forward. It needs no association.
+    /// The message contains the relay's position, and a halt request to forward. It is valid without an association
+    /// (session).
     pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.leave_notice.is_none();
         let place = own.reported.filter(|_| is_due)?;
@@ -304,26 +311,26 @@ impl Association {
         })
     }
 
-    /// Counts a consecutive message of another association. Returns true once there are too many of them to be late
-    /// ones.
+    /// Counts a message of another association (session). Returns true once so many came in a row that the neighbour
+    /// must have restarted.
     pub(super) const fn count_foreign(&mut self) -> bool {
         self.foreign_messages = self.foreign_messages.saturating_add(1);
         self.foreign_messages >= MAX_FOREIGN_MESSAGES
     }
 }
 
-/// Obstacles on one side that limit this relay's x. They are a lost relay that may still hover, and a drone that is
-/// not flown to setpoints.
+/// Obstacles on one side of this relay, which limit its x. They are a lost relay that may still hover, and a drone
+/// that does not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
-    /// Nearest lost node on this side, and the limit of this relay's x because of that node, m.
+    /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m.
     lost: Option<(u16, f32)>,
-    /// x at which this relay is the separation away from a nearby lost relay, m; NaN if none is nearby. Until this
-    /// relay has reached it, perhaps only lateral offset and altitude separate the two.
+    /// x at which this relay has the separation from a lost relay nearby, m; NaN if no lost relay is near. Until this
+    /// relay has reached that x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
-    /// True if a lost relay was on the wrong side of this one along x, by the last messages.
+    /// True if a lost relay was last reported on the wrong side of this one along x.
     disordered: bool,
-    /// Node number and last reported position of a neighbour whose drone is not flown to setpoints.
+    /// Node number and last reported position of a neighbour whose drone does not fly to setpoints.
     unflown: Option<(u16, Placement)>,
 }
 
@@ -341,8 +348,8 @@ impl KeepOut {
         self.lost.map(|(_, limit_m)| limit_m)
     }
 
-    /// Adds a lost relay: its number is `node`, and it limits this relay's x to `limit_m`, m. If there was one
-    /// before, the nearer node and the tighter limit are kept. The lost relays are at `side`.
+    /// Adds a lost relay at `side` as an obstacle. Its number is `node`, and it limits this relay's x to `limit_m`,
+    /// m. If there was one before, the nearer node and the tighter limit are kept.
     #[inline(never)] // called from both sides
     pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32) {
         let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
@@ -352,7 +359,8 @@ impl KeepOut {
         });
     }
 
-    /// Handles a message from `node`: lost relays there, or farther away on `side`, are no obstacles now.
+    /// Removes lost relays as obstacles after a message from `node`. They are that node, and nodes farther away on
+    /// `side`.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -366,8 +374,8 @@ impl KeepOut {
         }
     }
 
-    /// Stores the position of a neighbour that reports that its drone is not flown to setpoints. Such a message with
-    /// the number of the current association is late, and ignored.
+    /// Stores the position of a neighbour that reports that its drone does not fly to setpoints. A report with the
+    /// number of the current association (session) is late, and ignored.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.peer_number;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
@@ -375,13 +383,13 @@ impl KeepOut {
         }
     }
 
-    /// Removes the neighbour's drone as an obstacle: it is flown to its setpoints again.
+    /// Removes the neighbour's drone as an obstacle, because it flies to its setpoints again.
     pub(super) const fn remove_unflown(&mut self) {
         self.unflown = None;
     }
 
-    /// Returns the obstacles after a change of the line from Tx to Rx. A drone that does not follow setpoints is left
-    /// out, because its x along the new line is unknown.
+    /// Returns the obstacles that remain after a change of the line from Tx to Rx. A drone that does not fly to
+    /// setpoints is dropped, because its x along the new line is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
@@ -396,16 +404,16 @@ impl KeepOut {
         }
     }
 
-    /// Returns true if a drone without setpoints blocks this relay's path to its agreed position.
+    /// Returns true if a drone that does not fly to setpoints blocks the path to the agreed position.
     pub(super) fn blocks(&self, own: &Own) -> bool {
         let ways = own.setpoint.zip(own.target);
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
-    /// Returns the last position on the path from `from` to `to` that keeps clear of the obstructing drone. That
-    /// drone does not follow setpoints. The path keeps the separation from it; if `from` is closer, the path comes no
-    /// nearer. Along x the path ends before that drone, unless lateral offset and altitude separate the two. Within
-    /// the separation along x only moves to the side, or up or down, away from the drone remain.
+    /// Returns the last position on the path from `from` to `to` that is the separation away from a drone. The drone
+    /// does not fly to setpoints. If `from` is closer, the path comes no nearer. Along x the path ends before that
+    /// drone, unless lateral offset and altitude separate the two. Within the separation along x only moves to the
+    /// side, or up or down, away from the drone remain.
     pub(super) fn path_end(
         &self,
         from: Placement,
@@ -434,10 +442,9 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits this relay's x to `x_m` because of relays that were lost before its first setpoint.
+    /// Limits this relay's x to `x_m`, the x of its first setpoint, because some relays were never heard.
     ///
-    /// They were never heard and may hover anywhere beyond the first setpoint, which is at `x_m`. At `near_m` this
-    /// relay is the separation away from them.
+    /// These may hover anywhere beyond `x_m`. At `near_m` this relay has the separation from them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -445,7 +452,8 @@ impl KeepOut {
         }
     }
 
-    /// Marks the last lost relay as possibly closer than the separation, until this relay is at `near_m`.
+    /// Records that the last lost relay may be closer than the separation. This ends when this relay is at x =
+    /// `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
@@ -460,8 +468,9 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once `is_beyond` returns true for `near_m`. This relay is then the separation
-    /// away from the lost relay, and `near_m` becomes the limit of its x.
+    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, which then limits its x. There it
+    /// has the separation from the lost relay. `is_beyond` returns true if this relay has passed the x that it is
+    /// given.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -474,12 +483,13 @@ impl KeepOut {
         }
     }
 
-    /// Marks that a lost relay may be on the wrong side of this one along x.
+    /// Records that a lost relay may be on the wrong side of this one along x.
     pub(super) const fn mark_disordered(&mut self) {
         self.disordered = true;
     }
 
-    /// Returns true while a lost relay may be on the wrong side of this one. No path along x then leads away from it.
+    /// Returns true while a lost relay may be on the wrong side of this one along x. It is then unknown in which
+    /// direction a move along x leads away from it.
     pub(super) const fn is_disordered(&self) -> bool {
         self.disordered
     }
@@ -488,8 +498,8 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Adds the obstacle for relays at `side` that were never heard. They may hover anywhere beyond `limit_m`, until
-    /// any of them has sent a message.
+    /// Adds an obstacle at `side`: relays that were never heard. They may hover anywhere beyond `limit_m`, until any
+    /// of them has sent a message.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),
@@ -500,7 +510,7 @@ impl KeepOut {
     }
 }
 
-/// Message between neighbours about their fence: a plane across x with one of the two on either side.
+/// Message between neighbours about their fence, a plane x = constant that separates the two.
 ///
 /// It contains the complete state, so it may be lost, duplicated, delayed or reordered.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -508,22 +518,22 @@ impl KeepOut {
 pub struct Fence {
     /// Number that the sender gave to its association (session) with this neighbour, never 0.
     pub association: u16,
-    /// Echo of the association number that the destination sent last, 0 for none.
+    /// Echo of the association (session) number that the destination sent last, 0 for none.
     pub echo: u16,
-    /// Number of the fence plane. Its owner, the relay upstream, counts from 0 before the first plane. The follower,
-    /// the relay downstream, repeats the newest number received.
+    /// Number of the fence, the plane x = constant between the two relays; 0 before the first. The relay upstream
+    /// (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
     pub number: u16,
-    /// x of the fence if its owner (upstream) sends it, else the lowest x that the follower may reach.
+    /// x of the fence, m, from the relay upstream; from the relay downstream, its lowest possible x, m.
     ///
-    /// Before the first fence the owner sends the highest x that it may reach. m, -1e7 to 1e7.
+    /// Before the first fence the relay upstream sends its highest possible x. -1e7 to 1e7.
     pub x_m: f32,
     /// Agreed x of the sender, m, -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, they are those of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the owner (upstream) requests to keep from the fence plane, m, 0 to 1e5. If it is less
-    /// than the separation, the follower must not change its lateral offset or altitude.
+    /// Distance along x that the relay upstream requests to keep from the fence, m, 0 to 1e5. If it is less than the
+    /// separation, the relay downstream must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -532,23 +542,23 @@ pub struct Fence {
 impl Fence {
     /// Flag: the sender has arrived at its lateral offset and altitude.
     pub const ARRIVED: u8 = 1;
-    /// Flag of the follower (downstream): it agrees to the distance `apart_m` of the newest fence.
+    /// Flag of the relay downstream: it agrees to the distance `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
     /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
     /// beyond it, needs that to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
     /// Flag: echo of the last [`REQUESTS_OPENING`](Self::REQUESTS_OPENING) received from the destination.
     pub const OPENING_RECEIVED: u8 = 8;
-    /// Flag: the sender has left this association. It does not fly to its setpoints, or did not for a time. Positions and the
-    /// number of the fence are not valid.
+    /// Flag: the sender has left this association (session). It does not fly to its setpoints, or did not for a time.
+    /// Positions and the number of the fence are not valid.
     pub const LEFT: u8 = 16;
     /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond it, is
     /// on the wrong side of a neighbour along x, or does not know its order. The request is repeated every second,
     /// and is valid in any association (session).
     pub const HALTS: u8 = 32;
-    /// Flag: the position in this message does not let the neighbour move; it only shows the order along x. The
-    /// follower sets it while its order with its own neighbour downstream is not confirmed. With
-    /// [`LEFT`](Self::LEFT): the sender does not follow setpoints, and `x_m` is its last reported x.
+    /// Flag: the position in this message only shows the order of the two relays along x. It does not let the
+    /// neighbour move. The relay downstream sets the flag while its order with its own downstream neighbour is not
+    /// confirmed. With [`LEFT`](Self::LEFT): the sender does not fly to setpoints, and `x_m` is its last reported x.
     pub const UNPLACED: u8 = 64;
 
     pub(super) const fn without_position(association: u16, echo: u16) -> Self {
@@ -583,16 +593,16 @@ impl Fence {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
-    /// Hold reason: messages have not confirmed yet that the two relays are in the right order along x.
+    /// Hold reason: messages have not confirmed yet that this relay and the neighbour are in order along x.
     Unheard,
     /// Hold reason: the neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
     Order,
-    /// Hold reason: the two agreed positions are too close along x. Lateral offsets and altitudes do not keep the
-    /// relays the separation apart.
+    /// Hold reason: the agreed positions of this relay and the neighbour are too close along x. Lateral offsets and
+    /// altitudes do not keep the two the separation apart.
     Close,
     /// Hold reason: a lost relay may still hover between this relay and its agreed position.
     Lost,
-    /// Hold reason: the neighbour's drone is not flown to setpoints, and is in the way or makes no room.
+    /// Hold reason: the neighbour's drone does not fly to setpoints, and is in the way or makes no room.
     NotFlown,
     /// Hold reason: the setpoint has not moved for at least five seconds. The neighbour has not made room.
     Pending,

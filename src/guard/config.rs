@@ -6,10 +6,10 @@ use crate::root::sqrt;
 use crate::time::Duration;
 use crate::without_quorum::WithoutQuorum;
 
-/// Default of [`GuardConfig::lag`]: the stopping time at the default pace of the autopilot link.
+/// Default of [`GuardConfig::lag`]: the time to stop from the default speed of the autopilot link.
 const LAG: Duration = Duration::from_millis(9_800);
 
-/// Maximum distance from the geofence, m in each coordinate, at which a relay may start.
+/// Maximum distance from the geofence at which a relay may start, m in each coordinate.
 pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 
 /// Geofence: the box of the allowed setpoints, in coordinates of the line from Tx to Rx.
@@ -43,7 +43,7 @@ impl Geofence {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
-    /// Geofence that no setpoint leaves.
+    /// Geofence of the setpoints. A relay that starts outside returns into it; no setpoint inside leaves it.
     pub geofence: Geofence,
     /// Minimum distance between relays, m: 0 to 1e5; the same on all relays.
     pub separation_m: f32,
@@ -97,8 +97,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the configuration with a larger geofence, for relays that leave the line. They do so while there is no
-    /// quorum.
+    /// Returns the configuration with a geofence large enough for relays that leave the line. Relays leave the line
+    /// Tx to Rx while they have no quorum, if `without_quorum` says so.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.geofence;
@@ -141,7 +141,7 @@ impl GuardConfig {
     }
 
     /// Returns the position nearest to `place` that is no farther outside the geofence than `before`. If `before` is
-    /// inside, the result is inside as well.
+    /// inside the geofence, the result is inside as well.
     pub(super) fn clamp_toward(&self, place: Placement, before: Placement) -> Placement {
         let fence = &self.geofence;
         let cut = |is: f32, before: f32, least: f32, most: f32| {
@@ -168,10 +168,10 @@ impl GuardConfig {
             && (place.altitude_m - box_place.altitude_m).abs() <= near
     }
 
-    /// Returns the x to which relay `node` should fly while the chain is open, m; `x_m` is its agreed x.
+    /// Returns the x to which relay `node` flies while the chain is open, m; `x_m` is its agreed x.
     ///
-    /// In an open chain the order is kept, and these x are the separation apart, if all relays of the mission then
-    /// fit into the geofence.
+    /// Open means that all relays keep their order, and are the separation apart along x, if all relays of the
+    /// mission then fit into the geofence.
     #[inline(never)] // called from several places
     pub(super) fn open_chain_x(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.geofence.least_x_m;
@@ -183,8 +183,8 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.geofence.most_x_m)
     }
 
-    /// Returns the minimum distance along x, m, at which two relays are the separation apart in space. `one` and
-    /// `other` are their lateral offsets and altitudes.
+    /// Returns the distance along x that two relays need to be the separation apart in space, m. `one` and `other`
+    /// are their lateral offsets and altitudes.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))

@@ -7,30 +7,32 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Limit to compare wrapping fence numbers: a fence is newer if its number minus the last is below it.
+/// Limit for the comparison of wrapping fence numbers. A fence is newer if its number minus the last one, modulo
+/// 2^16, is above 0 and below the limit.
 const AHEAD: u16 = 0x8000;
 
-/// State of the fence plane toward Tx: the neighbour upstream places it, this relay stays beyond it.
+/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The neighbour upstream places it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence plane that the neighbour has announced, 0 before the first.
+    /// Number of the newest fence (limit of x) from the neighbour upstream, 0 before the first.
     number: u16,
-    /// x of the newest fence plane that the neighbour has announced, m.
+    /// x of the newest fence that the neighbour upstream has announced, m: this relay stays beyond it.
     fence_m: f32,
-    /// Distance along x that the neighbour upstream requests to keep from this relay, m. It is infinite before its
+    /// Distance along x that the neighbour upstream requests to keep from the fence, m. It is infinite before its
     /// first request.
     requested_m: f32,
-    /// Distance along x to the neighbour upstream that this relay has agreed to, m; infinite before any.
+    /// Distance along x to the neighbour upstream to which this relay has agreed, m. Infinite, which is also the
+    /// value before any agreement, stands for the separation.
     agreed_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
     /// Lateral offset and altitude of the setpoint of the neighbour upstream.
     across: CrossSection,
-    /// True once this relay is known to be beyond a fence plane that the neighbour has announced.
+    /// True once this relay is known to be beyond a fence (limit of x) from the neighbour upstream.
     clear: bool,
-    /// True if this relay has reported to the neighbour that it is beyond the newest fence plane.
+    /// True if the neighbour upstream was informed that this relay is beyond the newest fence (limit of x).
     owner_informed: bool,
 }
 
@@ -59,8 +61,8 @@ impl FenceFollower {
         self.association.node = node;
     }
 
-    /// Starts a new association (session). The limit of x because of the previous neighbour remains in `keep_out`. If
-    /// that neighbour was never heard, the limit is this relay's position.
+    /// Starts a new association (session) with the neighbour upstream. The limit of x because of the previous
+    /// neighbour remains in `keep_out`. If that neighbour was never heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -84,8 +86,8 @@ impl FenceFollower {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The limits along x
-    /// do not apply to manual flight.
+    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to its setpoints, and
+    /// the limits of x do not apply to manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -94,8 +96,8 @@ impl FenceFollower {
         };
     }
 
-    /// Starts a new association because the line from Tx to Rx has changed. Lost relays remain obstacles, unflown
-    /// drones do not.
+    /// Starts a new association (session) because the line from Tx to Rx has changed. Lost relays remain obstacles;
+    /// drones that do not fly to setpoints do not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -104,8 +106,9 @@ impl FenceFollower {
         };
     }
 
-    /// Handles a notice that the neighbour upstream does not follow setpoints any more. This relay comes no nearer to
-    /// it. If the two were in the right order along x, the neighbour sets no other limit.
+    /// Handles the notice that the neighbour upstream no longer flies to setpoints. This relay then comes no nearer
+    /// to that neighbour. If the two were in the right order along x, the neighbour limits this relay's x in no other
+    /// way.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -168,7 +171,8 @@ impl FenceFollower {
         (self.number != 0).then(|| self.across.at(self.target_m))
     }
 
-    /// Returns the smallest allowed x, m. If it is above the current setpoint, this relay has to go there.
+    /// Returns the smallest x that is allowed for this relay, m. If it is above the current setpoint, this relay has
+    /// to fly there.
     #[inline(never)] // called from several places
     pub(super) fn min_x(&self, own: &Own) -> f32 {
         let granted = match (self.association.has_no_flown_neighbour(), self.number) {
@@ -179,7 +183,7 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Returns true if nothing upstream forbids this relay to change its lateral offset or altitude.
+    /// Returns true if the upstream side lets this relay change its lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
@@ -192,8 +196,9 @@ impl FenceFollower {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true if the neighbour upstream may still be closer than the separation after a start. It has announced
-    /// a fence plane, but this relay is not yet known to be beyond one.
+    /// Returns true if this relay and its neighbour upstream may still be as close as at the start. That may be
+    /// closer than the separation. The neighbour has announced a fence (limit of x), but this relay is not yet known
+    /// to be beyond one.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
@@ -203,9 +208,9 @@ impl FenceFollower {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the neighbour upstream requests, unless that is too small. Together with
-    /// `downstream_m`, the distance to the neighbour downstream, it must be at least the separation: this relay's two
-    /// neighbours are then that far apart.
+    /// Agrees to the distance along x that the neighbour upstream requests, unless that is too small. This relay's
+    /// two neighbours must stay the separation apart: the requested distance plus `downstream_m`, the distance to the
+    /// neighbour downstream, must be at least the separation.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -214,8 +219,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the distance along x that the neighbour upstream keeps at least, m. The limits on the downstream side
-    /// use it.
+    /// Returns the least possible distance along x to the neighbour upstream, m. Infinity stands for the separation.
+    /// The limits toward the neighbour downstream are computed from this distance.
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
@@ -224,16 +229,17 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if this relay is known to be beyond its neighbour upstream, or has no flown one.
+    /// Returns true if this relay is known to be beyond its neighbour upstream along x. Also true if that neighbour
+    /// does not fly to setpoints, or the chain ends here.
     ///
-    /// A neighbour announces a fence plane once it has found this relay beyond it. False while a lost relay may be on
-    /// the wrong side.
+    /// The neighbour's fence (limit of x) shows it: the neighbour announces one only after it has found this relay to
+    /// be beyond. False while a lost relay may be on the wrong side.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.has_fence())
     }
 
-    /// Returns true if the neighbour upstream was reported at a larger x than this relay.
+    /// Returns true if the neighbour upstream was reported at a larger x than this relay, the wrong order.
     ///
     /// Also true while a lost relay may be on the wrong side of this one.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
@@ -241,13 +247,14 @@ impl FenceFollower {
             || !self.is_ordered() && self.association.is_on_wrong_side(own, Side::Upstream)
     }
 
-    /// Returns true if the neighbour has announced a fence plane in this association.
+    /// Returns true if the neighbour upstream has announced a fence (limit of x) in this session.
     pub(super) const fn has_fence(&self) -> bool {
         self.number != 0
     }
 
-    /// Updates after a position report if this relay is beyond the newest fence plane. A message is due then, because
-    /// the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those downstream, m.
+    /// Records that this relay is beyond the newest fence (limit of x), if its known position shows that. A message
+    /// is due then, because the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those
+    /// downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -257,8 +264,8 @@ impl FenceFollower {
 
     /// Returns the highest possible x of the relays upstream during the start, m.
     ///
-    /// Until this relay is beyond the first fence plane, the neighbour upstream, and relays beyond it, may be closer
-    /// than the separation. Afterwards all are below this relay, and the result is negative infinity.
+    /// Until this relay is beyond the first fence (limit of x), the relays upstream may be closer than the
+    /// separation. Afterwards all are before this relay, and the result is negative infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.has_fence() && !self.clear {
             self.fence_m - self.requested_m.min(own.config.separation_m)
@@ -267,8 +274,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. If `placed` is false (the
-    /// order with its neighbour downstream is not confirmed), a relay only sends a halt request.
+    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. If `placed` is false, there
+    /// is only a message with a halt request, because this relay's order with its neighbour downstream is not
+    /// confirmed.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

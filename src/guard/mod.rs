@@ -79,7 +79,7 @@
 //! - A relay that starts, or is flown again, beside one that is not flown has not heard it, and holds its position until that one
 //!   is flown or is replaced as a neighbour.
 //! - A rebooted relay does not know its earlier neighbours: it has to start with those of the mission, and silent ones have to be
-//!   replaced by `link`, so that rule 9 applies.
+//!   replaced by `set_neighbour`, so that rule 9 applies.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
 
 mod association;
@@ -104,7 +104,7 @@ use owner::FenceOwner;
 
 /// Guard of one relay: computes safe setpoints on the way to the agreed position.
 ///
-/// Call [`commit`](Self::commit), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`link`](Self::link) with new inputs.
+/// Call [`commit`](Self::commit), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`set_neighbour`](Self::set_neighbour) with new inputs.
 /// After each call [`steer`](Self::steer), fly to its result, then send the messages of [`poll`](Self::poll). Every call takes at
 /// most some hundred operations and two square roots, independent of the length of the chain.
 #[derive(Clone, Copy, Debug)]
@@ -112,9 +112,9 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     started_at: Instant,
-    /// Last reported position, from which the first setpoint starts.
+    /// Last reported position before the first setpoint, which is this position.
     initial_place: Option<Placement>,
-    /// True while the drone is flown to this guard's setpoints.
+    /// True while the drone flies to this guard's setpoints.
     flown: bool,
     follower: FenceFollower,
     owner: FenceOwner,
@@ -128,10 +128,11 @@ pub struct Guard {
     refused: u32,
 }
 
-/// Number of reminders, one per second, between two messages of a relay that does not follow setpoints.
+/// Number of reminders, one per second, between two messages of a relay that does not fly to setpoints. It sends more
+/// often while it moves.
 const UNFLOWN_EVERY: u8 = 4;
 
-/// Number of consecutive reminders with an unknown order along x after which the chain halts.
+/// Number of reminders, one per second, after which an unknown order along x halts the chain.
 const MAX_UNORDERED: u8 = 3;
 
 impl Guard {
@@ -167,7 +168,7 @@ impl Guard {
         self.owner.association.due = true;
     }
 
-    /// Returns true if `place`, limited to the geofence, is the agreed position that the guard has now.
+    /// Returns true if `place`, limited to the geofence, is the current agreed position.
     pub fn is_for(&self, place: Placement) -> bool {
         self.own.target == Some(self.own.config.clamp(place))
     }
@@ -190,10 +191,11 @@ impl Guard {
         }
     }
 
-    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. It is `true` at the start.
+    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. `flown` is true at the
+    /// start.
     ///
-    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere. Flown again,
-    /// the relay begins as after a start, with the next reported position.
+    /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere.
+    /// Flown again, the relay begins as after a start, with the next reported position.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
         if flown == self.flown {
             return false;
@@ -226,15 +228,15 @@ impl Guard {
         self.owner.leave_line(&mut self.jitter);
     }
 
-    /// Changes the geofence. A relay outside of it returns with the next setpoint.
+    /// Changes the geofence. A relay that is outside the new one returns into it with the next setpoint.
     pub fn set_geofence(&mut self, fence: Geofence) {
         self.own.config.geofence = fence;
     }
 
-    /// Handles a fence message of node `from`, a neighbour at `side`.
+    /// Handles a message about a fence (limit of x) from node `from`, a neighbour at `side`.
     ///
-    /// A message out of range is counted and ignored. One of an earlier association (session) or of another node is
-    /// ignored.
+    /// A message out of range is counted and ignored. A message of an earlier association (session) or of another
+    /// node is ignored.
     pub fn handle_fence(&mut self, side: Side, from: u16, fence: &Fence) {
         if !fence.is_valid() {
             return bump(&mut self.refused);
@@ -251,11 +253,11 @@ impl Guard {
         }
     }
 
-    /// Sets the neighbour at `side`, `None` at the end of the chain; no effect if it is the current one.
+    /// Sets the neighbour at `side`, `None` at the end of the chain. No effect if that is the current neighbour.
     ///
     /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget), or until
     /// that neighbour, or a node between the two, is linked and has sent a message.
-    pub fn link(&mut self, side: Side, neighbour: Option<u16>) {
+    pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
             Side::Upstream if self.follower.association.node != node => {
@@ -347,7 +349,7 @@ impl Guard {
         self.own.setpoint
     }
 
-    /// Ends the restriction near a lost neighbour once this relay is the separation away from it.
+    /// Lifts the restrictions near a lost neighbour once this relay is the separation away from it.
     fn clear_near(&mut self) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         self.follower
@@ -358,9 +360,9 @@ impl Guard {
             .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Decides if this relay needs an open chain: all relays the separation apart along x. A request of one neighbour
-    /// for an open chain is forwarded to the neighbour on the opposite side. `clear` is true if this relay may change
-    /// its lateral offset and altitude.
+    /// Requests an open chain, if needed: all relays the separation apart along x. This relay or a neighbour may need
+    /// it; a neighbour's request is forwarded to the neighbour on the opposite side. `clear` is true if this relay
+    /// may change its lateral offset and altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let is_blocked = !clear && !own.has_agreed_cross_section();
@@ -376,14 +378,13 @@ impl Guard {
         down.forward_open(downward);
     }
 
-    /// Returns true if the order of this relay and both neighbours along x is known to be right.
+    /// Returns true if this relay is known to be between its two neighbours along x.
     fn is_ordered(&self) -> bool {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
 
-    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. Within the errors of
-    /// the reports, each neighbour may be on the right side of this relay although the two neighbours are not in
-    /// order.
+    /// Returns true if this relay and its neighbours are known to be in the wrong order along x. This is so if one
+    /// neighbour is on the wrong side of this relay, or if the upstream neighbour is beyond the downstream one.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -391,7 +392,7 @@ impl Guard {
             || up.seen_m() - down.seen_m() > 2.0 * self.own.config.hover_m
     }
 
-    /// Returns true if messages or reported positions show this relay between its two neighbours along x.
+    /// Returns true if fences (limits of x) or reported positions show this relay between its neighbours.
     fn is_seen_in_order(&self) -> bool {
         let own = &self.own;
         let seen = |association: &Association, side| association.is_seen_in_order(own, side);
@@ -461,7 +462,8 @@ impl Guard {
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
-    /// Schedules all messages again that may have been lost; returns true if there are any. Call it about every second.
+    /// Schedules again all messages that may have been lost; returns true if there are any. To be called about every
+    /// second.
     pub fn remind(&mut self) -> bool {
         let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
         self.unordered = if begun && !self.is_ordered() {
@@ -503,12 +505,12 @@ impl Guard {
         }
     }
 
-    /// Returns the reason that keeps this relay from its agreed position, on the given side. `None` if there is none,
+    /// Returns the reason on the given side that keeps this relay from its agreed position. `None` if there is none,
     /// or no agreed position.
     ///
-    /// While a new agreement spreads it may refer to positions of the previous one. While the drone is not flown to
-    /// setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a neighbour that is flown
-    /// to them.
+    /// Shortly after a new agreement the reason may still refer to the previous agreed positions. While the drone
+    /// does not fly to setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a
+    /// neighbour that does.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         if !self.flown {
@@ -541,7 +543,8 @@ impl Guard {
         }
     }
 
-    /// Returns the reason if the setpoint has not moved toward `side` for five reminders, else `None`.
+    /// Returns the hold reason for a move toward `side` that has waited for five reminders; else `None`. There is one
+    /// reminder per second. The reason is `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {

@@ -31,7 +31,8 @@ impl Span {
     }
 }
 
-/// Interval along x, m, in which this relay may be, between its last report and its setpoints.
+/// Interval of x, m, in which this relay may be. It contains the last reported x and the setpoints that the relay may
+/// still fly to.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
     pub(super) setpoint_m: f32,
@@ -42,22 +43,22 @@ pub(super) struct ReachableInterval {
     /// Interval that contains the x of all setpoints since the time `recent_since`, m.
     recent_span: Span,
     recent_since: Instant,
-    /// Interval that contains the x of earlier setpoints, m. At the last position report the relay may still have
-    /// flown to one of them.
+    /// Interval that contains the x of earlier setpoints, m. When the last position was reported, the relay may still
+    /// have been on its way to one of them.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report is recent enough to show the effect of the first setpoint.
+    /// True once a position report is recent enough to show that the relay flies to the first setpoint.
     known: bool,
 }
 
 impl ReachableInterval {
-    /// Returns the interval in which the relay may be before its first setpoint: its x is not known.
+    /// Returns the state before the first setpoint, in which the relay's x is unknown.
     pub(super) const fn unknown(now: Instant) -> Self {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval in which the relay may be after the first setpoint, at `x_m`. Until that takes effect,
-    /// the relay may still fly to an earlier one.
+    /// Returns the interval after the first setpoint, at `x_m`. It counts as unknown until a report shows the effect
+    /// of that setpoint, because the relay may still fly to an earlier one.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             setpoint_m: x_m,
@@ -83,8 +84,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Extends the interval of the relay's possible x by a new setpoint `x_m`. The relay may first fly on toward the
-    /// last setpoint, and then turn.
+    /// Extends the interval of the relay's possible x by the new setpoint `x_m`. The relay may first fly on toward
+    /// the last setpoint, and then turn.
     pub(super) fn extend_to(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.setpoint_m).abs() > 0.0 {
             self.setpoint_m = x_m;
@@ -126,7 +127,7 @@ impl ReachableInterval {
     }
 }
 
-/// Number of reminders, one per second, after which an unmoved setpoint counts as held up.
+/// Number of reminders, one per second, after which a setpoint that has not moved counts as held up.
 const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
@@ -141,17 +142,17 @@ pub(super) struct Own {
     cross_section_changed_at: Instant,
     /// True once the relay has arrived at the setpoint's lateral offset and altitude.
     pub(super) arrived: bool,
-    /// True while the chain is open here, on request: neighbours are the separation apart along x.
+    /// True while neighbours or this relay request an open chain: all relays the separation apart along x.
     pub(super) open: bool,
     /// True while this relay holds its position, because the order of relays along x is wrong or unknown.
     pub(super) halted: bool,
     pub(super) reported: Option<Placement>,
-    /// Position in the last message to a neighbour while the drone was not flown to setpoints.
+    /// Position in the last message that was sent while the drone did not fly to setpoints.
     pub(super) sent_place: Placement,
     /// Number of reminders, one per second, since the last change of the setpoint.
     reminders: u8,
-    /// Last setpoint at which this relay arrived, or its first one. A halt on the way from there stops the relay no
-    /// farther outside the geofence than that.
+    /// Last setpoint at which this relay arrived, or its first one. If the relay halts on its way from there, it
+    /// stops no farther outside the geofence than that setpoint.
     last_arrival: Placement,
 }
 
@@ -185,8 +186,9 @@ impl Own {
         self.setpoint = Some(setpoint);
     }
 
-    /// Returns the position from which the relay's next path starts: `setpoint` once the relay is there. Before, the
-    /// relay may stop on its way, so x is limited to the reported one and its error.
+    /// Returns the position from which the relay's next path starts. It is `setpoint` once the relay has arrived
+    /// there. Before, the relay may stop on its way. The x returned is then at most the error of the position report
+    /// away from the reported x.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -203,9 +205,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint is held up at `side`: it has not moved for five reminders. The agreed position is
-    /// farther toward `side`; or it has another lateral offset or altitude, and this side forbids that move (`clear`
-    /// is false).
+    /// Returns true if the setpoint has not moved for five reminders, and `side` may be the cause. This is so if the
+    /// agreed position is farther toward `side`, or if it has another lateral offset or altitude and this side
+    /// forbids that move (`clear` is false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -218,7 +220,7 @@ impl Own {
         self.reminders >= MAX_REMINDERS_STILL && moves
     }
 
-    /// Returns true if the relay has moved away from the last position that it has sent without setpoints.
+    /// Returns true if the relay has moved away from the position that it sent last in manual control.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.sent_place.cross_section())
@@ -227,7 +229,8 @@ impl Own {
         })
     }
 
-    /// Clears the setpoint and the known x, because the relay is no longer flown or the line changes.
+    /// Clears the setpoint and the known x. The drone no longer flies to setpoints, or the line from Tx to Rx
+    /// changes.
     pub(super) const fn release(&mut self, now: Instant) {
         self.setpoint = None;
         self.reachable = ReachableInterval::unknown(now);
@@ -270,7 +273,7 @@ impl Own {
         }
     }
 
-    /// Returns true if two positions agree in lateral offset and altitude, within the hover error.
+    /// Returns true if two lateral offsets and altitudes agree, within the error of a hovering relay.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most

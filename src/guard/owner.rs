@@ -7,31 +7,33 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence plane toward Rx: this relay places it, the neighbour downstream stays beyond it.
+/// State of the fence toward Rx, a plane x = constant that the neighbour downstream stays beyond. This relay places
+/// it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence plane that this relay has announced, 0 before the first.
+    /// Number of the newest fence (limit of x) to the neighbour downstream, 0 before the first.
     number: u16,
-    /// x of the newest fence plane that this relay has announced, m; infinite before the first.
+    /// x of the newest fence that this relay has announced, m; infinite before the first. The neighbour downstream
+    /// stays beyond it.
     fence_m: f32,
-    /// Distance along x that this relay requests to keep from the fence plane, m; infinite before any.
+    /// Distance along x that this relay requests to keep from the fence, m; infinite before any request.
     requested_m: f32,
-    /// Distance along x to the neighbour that is in force, m. The neighbour has agreed to it, or this relay has
-    /// requested a larger one since. Infinite stands for the separation.
+    /// Distance along x to the neighbour downstream that is in force, m. The neighbour has agreed to it, or this
+    /// relay has requested a larger one since. Infinite stands for the separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
     /// Agreed x of the neighbour downstream, m.
     target_m: f32,
-    /// Lateral offset and altitude of the setpoint of the neighbour downstream. `arrived` is true once the neighbour
-    /// has arrived there.
+    /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour is
+    /// there.
     across: CrossSection,
     arrived: bool,
-    /// True if the neighbour has received the newest fence plane.
+    /// True if the neighbour downstream has received the newest fence (limit of x).
     is_acknowledged: bool,
-    /// True once the neighbour has reported that it is beyond a fence plane.
+    /// True once the neighbour downstream has reported that it is beyond a fence (limit of x).
     clear: bool,
 }
 
@@ -62,8 +64,8 @@ impl FenceOwner {
         self.association.node = node;
     }
 
-    /// Starts a new association (session). The limit of x because of the previous neighbour remains in `keep_out`. If
-    /// that neighbour was never heard, the limit is this relay's position.
+    /// Starts a new association (session) with the neighbour downstream. The limit of x because of the previous
+    /// neighbour remains in `keep_out`. If that neighbour was never heard, the limit is this relay's position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -81,8 +83,8 @@ impl FenceOwner {
         };
     }
 
-    /// Leaves the association and notifies the neighbour, because this relay is no longer flown. The limits along x
-    /// do not apply to manual flight.
+    /// Leaves the association (session) and notifies the neighbour. The drone no longer flies to its setpoints, and
+    /// the limits of x do not apply to manual flight.
     pub(super) fn leave(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out,
@@ -91,8 +93,8 @@ impl FenceOwner {
         };
     }
 
-    /// Starts a new association because the line from Tx to Rx has changed. Lost relays remain obstacles, unflown
-    /// drones do not.
+    /// Starts a new association (session) because the line from Tx to Rx has changed. Lost relays remain obstacles;
+    /// drones that do not fly to setpoints do not.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -101,8 +103,9 @@ impl FenceOwner {
         };
     }
 
-    /// Handles a notice that the neighbour downstream does not follow setpoints any more. This relay comes no nearer
-    /// to it. If the two were in the right order along x, the neighbour sets no other limit.
+    /// Handles the notice that the neighbour downstream no longer flies to setpoints. This relay then comes no nearer
+    /// to that neighbour. If the two were in the right order along x, the neighbour limits this relay's x in no other
+    /// way.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -119,15 +122,17 @@ impl FenceOwner {
         self.association.peer_number != 0
     }
 
-    /// Returns true if no flown neighbour is downstream, or if its x is known to be beyond this relay's.
+    /// Returns true if the neighbour downstream is known to be beyond this relay along x. Also true if that neighbour
+    /// does not fly to setpoints, or the chain ends here.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour()
                 || self.has_reply() && self.is_beyond(own))
     }
 
-    /// Returns true if the neighbour downstream has reported an x on the wrong side of this relay. The report counts
-    /// with or without an association (session). Also true while a lost relay may be on the wrong side.
+    /// Returns true if the neighbour downstream was reported at a smaller x than this relay. That is the wrong order.
+    /// The report counts with or without an association (session). Also true while a lost relay may be on the wrong
+    /// side.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
             true
@@ -138,12 +143,12 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the neighbour is known to be beyond this relay along x.
+    /// Returns true if the neighbour downstream is known to be beyond this relay along x.
     ///
-    /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence plane, two relays
-    /// whose reports are closer than the errors along x are in order only if they may pass each other: lateral offset
-    /// and altitude then keep them the separation apart. A pair that was in order may have moved by the errors once
-    /// more since then, each time that one of them halts or is rebooted.
+    /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence (limit of x), two
+    /// relays whose reports are closer than the errors along x are in order only if they may pass each other: lateral
+    /// offset and altitude then keep them the separation apart. A pair that was in order may have moved by the errors
+    /// once more since then, each time that one of them halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
@@ -155,8 +160,8 @@ impl FenceOwner {
         self.follower_low_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream can be lower only
-    /// because of the errors of the reports.
+    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream can be lower than this
+    /// one only because of the errors of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.follower_low_m < low_m - 2.0 * own.config.rounding();
@@ -168,14 +173,15 @@ impl FenceOwner {
     }
 
     /// Returns the distance along x that this relay keeps from the neighbour downstream, m. `kept_m` is the distance
-    /// agreed with the neighbour upstream; the sum of both is at least the separation.
+    /// to the neighbour upstream. Both together are at least the separation, so that the two neighbours are that far
+    /// apart.
     pub(super) fn step(&self, own: &Own, kept_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
     /// Returns the least possible distance along x to the neighbour downstream, m. It is 0 near a lost relay, and
-    /// until the neighbour is beyond the first fence plane. `kept_m` is the distance agreed with the neighbour
+    /// until the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the neighbour
     /// upstream.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
@@ -186,8 +192,8 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the distance along x to the neighbour downstream is below the separation. Lateral offset and
-    /// altitude then must not change, because they may separate the two relays.
+    /// Returns true if the distance along x to the neighbour downstream is below the separation. This relay must not
+    /// change its lateral offset or altitude then, because these may be all that separates the two.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
@@ -247,7 +253,8 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the largest x, m, at which this relay keeps the distance `apart` from the neighbour, m.
+    /// Returns the largest x, m, at which this relay keeps the distance `apart` from its neighbour. The neighbour is
+    /// downstream; `apart` is along x, m.
     #[inline(never)] // called from several places
     pub(super) fn max_x(&self, own: &Own, apart: f32) -> f32 {
         let granted = match (
@@ -261,15 +268,16 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Returns true if nothing downstream forbids this relay to change its lateral offset or altitude.
+    /// Returns true if the downstream side lets this relay change its lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the neighbour downstream may still be closer than the separation after a start. It has
-    /// answered, but has not reported yet that it is beyond a fence plane.
+    /// Returns true if this relay and its neighbour downstream may still be as close as at the start. That may be
+    /// closer than the separation. The neighbour has answered, but has not reported yet that it is beyond a fence
+    /// (limit of x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
@@ -279,13 +287,14 @@ impl FenceOwner {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the neighbour is known to be beyond the newest fence plane, which it has received.
+    /// Returns true if the neighbour has the newest fence (limit of x) and is known to be beyond it.
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the smallest distance along x that the agreed positions need, m. It is below the separation only if
-    /// the agreed positions are that close, and both relays have arrived at their lateral offsets and altitudes.
+    /// Returns the smallest distance along x that the two agreed positions require, m. It is below the separation
+    /// only if the agreed positions are that close, and both relays have arrived at their lateral offsets and
+    /// altitudes.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -301,9 +310,9 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the next fence plane: its x, m, the distance to keep from it, m, and true if x is final. `None` if the
-    /// neighbour is not known to be beyond this relay. `upstream_m` is the highest possible x of the relays upstream,
-    /// m.
+    /// Returns the next fence: its x, m, the distance to keep from it, m, and true if its x is final. The fence is a
+    /// limit of x that the neighbour downstream stays beyond. `None` if the neighbour is not known to be beyond this
+    /// relay. `upstream_m` is the highest possible x of the relays upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -327,8 +336,9 @@ impl FenceOwner {
         Some((goal.max(nearest), step_m, goal >= nearest))
     }
 
-    /// Schedules a message if the best position of the fence plane has changed. A final position is sent at once.
-    /// While this relay moves, a position that is not final waits for the next reminder.
+    /// Schedules a message if the best x of the fence has changed. The fence is a limit of x for the neighbour
+    /// downstream. A final x is sent at once. While this relay moves, an x that is not final waits for the next
+    /// reminder.
     pub(super) fn schedule_fence(&mut self, own: &Own, kept_m: f32, upstream_m: f32) {
         if let Some((x_m, step_m, last)) = self.next_fence(own, kept_m, upstream_m) {
             let stays = last || own.reachable.has_arrived();
@@ -341,8 +351,8 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
-    /// Returns the pending message to the neighbour downstream. If `moves` is true, it announces the best fence
-    /// plane. The plane moves in no other place, so that only sent planes get a number.
+    /// Returns the pending message to the neighbour downstream; with a new fence (limit of x) if `moves`. Fences are
+    /// numbered only here, so that every numbered fence is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

@@ -15,8 +15,8 @@ pub(crate) mod tests;
 /// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x between two relays, as a fraction of the distance D. It is at least two steps of an f32, so the
-/// positions remain distinct after rounding, even near Rx.
+/// Smallest step in x between two relays, as a fraction of the distance D. It is at least two steps of an f32, even
+/// near Rx, so that the positions remain distinct after rounding.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step in x between two positions, as a fraction of the distance D.
@@ -100,8 +100,8 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays, `min_separation_m` apart, need more than `distance_m`. A rounding of 5e-7 `distance_m` for each
-    /// relay is included.
+    /// The relays, `min_separation_m` apart, need more than `distance_m`. This includes a margin for rounding of 5e-7
+    /// `distance_m` for each relay.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -209,11 +209,11 @@ pub enum Interference {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
-    /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position follows from
-    /// that of the sender before it.
+    /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each position is computed from that
+    /// of the previous relay, which sends to it.
     TowardRx,
-    /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each relay's position follows
-    /// from that of its receiver, where the interference is known.
+    /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each position is computed
+    /// from that of the relay's receiver, where the interference is known.
     TowardTx,
 }
 
@@ -314,7 +314,7 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a drone-to-drone hop per watt of its sender, 1/W, from which the hop's SIR is computed. It is eta /
+    /// Gain of a drone-to-drone hop per watt of its sender, 1/W. The hop's SIR is computed from it. It is eta /
     /// (`mu_los` `p_MSI`), with path-loss factors and the interferer's power; in an interference field `Upsilon_max`
     /// / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
@@ -329,7 +329,8 @@ pub struct Mission {
     pub(super) noise_at_a_metre: f32,
 }
 
-/// Maximum noise relative to the interferer's power received at 1 m. Above it the interferer would be lost in f32 rounding.
+/// Maximum noise relative to the interferer's power received at 1 m. With more noise the interferer would be lost in
+/// f32 rounding.
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
@@ -704,13 +705,14 @@ impl Mission {
         sqrt(apart * apart - across_squared)
     }
 
-    /// Returns [`Mission::least_step`] plus a margin for rounding, m.
+    /// Returns the minimum step in x for the separation of two neighbours, m, plus a margin for rounding.
+    /// `across_squared`, m^2, is their squared distance across the line, in y and altitude.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index`, m, that leaves the relays after it their separation. After it means
-    /// later in the order of computation.
+    /// Returns the farthest allowed x of relay `index`, m. At this x the relays that are computed after relay `index`
+    /// can still keep their minimum separation.
     ///
     /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the maximum squared
     /// distance across the line (in y and altitude) between two neighbours among those relays, m^2; it reduces the
@@ -719,8 +721,8 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest x of relay `index`, m, if the relays computed after it need no separation. Farthest means
-    /// toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest allowed x of relay `index`, m, without a separation of the relays after it. After means
+    /// in the order of computation. Farthest means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
@@ -733,7 +735,8 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their separation.
+    /// Returns the largest x of relay `index`, m, with enough space for the relays between it and Rx. Each of those
+    /// relays needs the minimum separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -767,7 +770,7 @@ impl Mission {
     }
 }
 
-/// Factor on a hop's gain that makes its optimal length half as long. The SIR is gain over squared length.
+/// Factor on a hop's gain for which the optimal hop is half as long. The SIR is gain over squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -813,7 +816,8 @@ impl Mission {
     }
 }
 
-/// Substitute for an unknown interferer, so far away that (X - x)^2 + Y^2 is constant to 1e-7.
+/// Interferer that stands for an unknown one. It is so far away that all receivers have the same interference, to
+/// 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,
@@ -822,9 +826,9 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns the gains of a mission with an unknown interferer. They are those of the first hop, of other hops per W,
-/// and of the last hop per W. With relays of `power_w`, W, they give SIR = (D / d)^2 on every hop of length d, so
-/// hops of equal length are best.
+/// Returns gains for a mission with an unknown interferer, with which hops of equal length are best. They are those
+/// of the first hop, of other hops per W, and of the last hop per W. With relays of `power_w`, W, they give SIR = (D
+/// / d)^2 on every hop of length d.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

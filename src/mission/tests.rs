@@ -3,7 +3,7 @@
 use super::{Band, Interference, Interferer, Mission, MissionConfig, MissionError, Profile};
 use crate::channel::{AirGround, Channel};
 
-/// The interferer of the paper's multi-hop scenario.
+/// Interferer of the paper's multi-hop scenario, which the tests use.
 pub(crate) const fn interferer() -> Interferer {
     Interferer {
         power_w: 80.0,

@@ -30,21 +30,22 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays on the way compute first. Frames are then twice as long, and each
-/// relay may take thirty portions of work.
+/// Factor on the wait for a reply if the relays on the path compute before they forward the message. Their frames are
+/// then twice as long, and each relay may take thirty steps of a computation.
 const SLOW: u32 = 4;
 
-/// Maximum of n in the wait between retransmissions, 2 << n hop times: at most eight hop times.
+/// Number of retransmissions after which the wait for a reply stops doubling. The wait after n of them is 2 << n hop
+/// times, so it is at most eight.
 const LOG_MOST: u32 = 2;
 
-/// Wait before the first retransmission on a lossy channel, in hop times. It is long enough for the neighbour's
-/// reply, also after a duplicate.
+/// Wait before the first retransmission on a lossy channel, in hop times. The neighbour's reply arrives earlier, even
+/// a reply to a duplicate.
 const SOON: u32 = 4;
 
 /// Number of messages after a loss for which the channel counts as lossy.
 const MEMORY: u8 = 8;
 
-/// Progress of a message along the chain, as seen by one relay.
+/// Progress of a message that goes along the chain and returns with a result, as seen by one relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Stage {
     /// No message is known, or this relay has not forwarded it yet.
@@ -53,8 +54,8 @@ pub(crate) enum Stage {
     Outstanding,
     /// The result of the message is known.
     Completed,
-    /// The message was cancelled after sending. This is like `Completed`, but its times are not used as a sign of
-    /// life of a neighbour.
+    /// The message was cancelled after sending. Duplicates are answered as in `Completed`, but the times of the
+    /// message do not count as a sign of life of a neighbour.
     Cancelled,
 }
 
@@ -67,7 +68,7 @@ pub(crate) enum Reply {
     InProgress,
 }
 
-/// Path between this relay and the relay that replies, to compute the wait for the reply.
+/// Path from this relay to the one that replies. The wait for the reply is computed from it.
 #[derive(Clone, Copy)]
 pub(crate) struct Path {
     /// Duration of one hop: transmission and handling of one frame.
@@ -78,7 +79,7 @@ pub(crate) struct Path {
     pub(crate) slow: bool,
 }
 
-/// State of one relay for a message that travels along the chain, and for the reply that comes back.
+/// State of one relay for a message that goes along the chain, and for the reply with its result.
 #[derive(Clone, Debug)]
 pub(crate) struct Circulation {
     stage: Stage,
@@ -88,13 +89,13 @@ pub(crate) struct Circulation {
     reply_due: Option<Reply>,
     /// Number of retransmissions since the next relay replied last.
     retries: u8,
-    /// True once the next relay has replied that it has the message.
+    /// True once the next relay has replied that it has received the message.
     is_received: bool,
-    /// True if this or the previous relay has noticed a loss of the current message.
+    /// True if the channel counts as lossy: this message or one of the last messages has been lost once.
     is_lossy: bool,
     /// Number of further messages during which the channel still counts as lossy.
     lossy_messages: u8,
-    /// Number of times that the reply is still repeated without a request, on a lossy channel.
+    /// Number of further repetitions of the reply. On a lossy channel a reply is repeated without a request.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
@@ -165,8 +166,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Completes the message, and schedules the reply with its result. `path` leads to the initiator. It has no hops
-    /// at the initiator itself, which sends no reply.
+    /// Completes the message and schedules the reply with its result. `path` leads to the initiator. At the initiator
+    /// itself it has no hops, and no reply is sent.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -180,13 +181,13 @@ impl Circulation {
         self.stop(Stage::Completed);
     }
 
-    /// Gives the message up, as if this relay had never had it.
+    /// Withdraws the message: this relay forgets that it ever had it.
     pub(crate) const fn withdraw(&mut self) {
         self.stop(Stage::Idle);
     }
 
-    /// Cancels the message: it counts as completed without a result, and its times are forgotten. A later
-    /// message is therefore not taken for its answer, which would prove that a neighbour is alive.
+    /// Cancels the message: it counts as completed without a result. Its times are forgotten, because a later message
+    /// must not be taken for its reply, which would prove that a neighbour is alive.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -222,7 +223,7 @@ impl Circulation {
         self.await_result(now, path);
     }
 
-    /// Schedules the message again if its result is awaited, because the next relay can be reached again.
+    /// Schedules the message again if its result is still awaited. Called when the next relay can be reached again.
     pub(crate) const fn resend(&mut self) {
         self.is_forward_due |= self.is_outstanding();
     }
@@ -232,8 +233,8 @@ impl Circulation {
         core::mem::take(&mut self.is_forward_due) && self.is_outstanding()
     }
 
-    /// Starts the retransmission timer of a message forwarded at `now`. `path` leads to the last relay, from which
-    /// the result comes.
+    /// Starts the retransmission timer of a message forwarded at `now`. `path` leads to the last relay, which sends
+    /// the result back.
     pub(crate) fn await_result(&mut self, now: Instant, path: Path) {
         let round_trip = (2 * u32::from(path.hops) + 2) * if path.slow { SLOW } else { 1 };
         let hops = match self.retries {
@@ -302,7 +303,8 @@ pub(crate) struct LateMessages(u8);
 impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
-    /// Counts a message with an old number. Returns true if there were too many in a row, and resets the count.
+    /// Counts a message with an old number. Returns true if it is the fourth in a row ([`SUSPICIOUS`]); the count
+    /// then starts again.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;
@@ -328,7 +330,7 @@ mod tests {
 
     const START: Instant = Instant::from_millis(1_000);
 
-    /// Starts a message at `now` and sends it.
+    /// Starts a message at `now` and forwards it.
     fn send(circulation: &mut Circulation, now: Instant) {
         circulation.start(now);
         assert!(circulation.poll_forward());

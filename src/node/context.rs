@@ -10,9 +10,9 @@ use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// Active mission; its number of relays is that of the view (agreed set of members).
+    /// Mission that this relay flies now, with the number of relays reduced to the members of the view.
     pub(crate) mission: Mission,
-    /// Interference that the active mission configures, independent of the current estimate.
+    /// Interference that the active mission configures. The current estimate does not change it.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
     /// Node number: 1 is the relay next to Tx.
@@ -23,7 +23,7 @@ pub(crate) struct Member {
     pub(crate) digest: u16,
     /// Identifier of the active mission.
     pub(crate) active: MissionId,
-    /// Last accepted view (agreed set of members).
+    /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,
     /// Index of this relay among the members of the view: 1 for the member next to Tx.
     pub(crate) index: u16,
@@ -45,8 +45,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank, 1 for the leader, and the number of relays in the loaded mission. View changes do
-    /// not alter them.
+    /// Returns this relay's rank in the loaded mission (1 at the leader's end), and its number of relays. View
+    /// changes do not alter them.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -55,8 +55,8 @@ impl Member {
         (place, self.all)
     }
 
-    /// Returns the digest that each message of a pass along the chain contains. It identifies the active mission and
-    /// the accepted view (agreed set of members).
+    /// Returns the digest that every message of a pass along the chain contains. It identifies the active mission and
+    /// the accepted view (agreed members of the chain).
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
     }
@@ -67,11 +67,11 @@ impl Member {
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// Identifier of the newest mission that this relay has stored.
+    /// Identifier of the newest mission that this relay has stored. The relay may still fly an older one.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last one on the way from the leader: it has no next neighbour.
+    /// True if this relay is the last one of its chain, with no neighbour on the side away from the leader.
     pub(crate) end: bool,
-    /// Remaining time of the leases of other relays.
+    /// Remaining leases of other relays, which delay the use of a new view's positions.
     pub(crate) other_leases: OtherLeases,
 }
 
@@ -92,8 +92,8 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if relays optimise their positions jointly. This requires the joint method, and a choice of
-    /// lateral offset or altitude.
+    /// Returns true if every relay solves the whole chain by the joint method. It requires this method in the
+    /// settings, and a mission in which the lateral offset or the altitude is free.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let free = !(config.band.is_single() && config.lateral.is_single());
@@ -146,7 +146,8 @@ impl<'a> Context<'a> {
         (0.0..=self.mission().config().distance_m).contains(&place.x_m)
     }
 
-    /// Returns the altitudes, m, that this relay may take: only `altitude_m` if it holds its altitude.
+    /// Returns the range of altitudes that this relay may take, m. It is `altitude_m` alone if the relay keeps a
+    /// fixed altitude.
     pub(crate) fn band(&self, altitude_m: f32) -> Band {
         if self.settings().hold_altitude {
             Band::at(altitude_m)
@@ -159,11 +160,13 @@ impl<'a> Context<'a> {
 /// Remaining leases of other relays, as far as this relay knows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Longest remaining time for which members of this relay's view may rely on this relay.
+    /// Longest remaining lease that members of this relay's view can have because of this relay. A lease is granted
+    /// only after all members, and so this relay, have taken part in a renewal.
     pub(crate) lease_left: Duration,
-    /// Last accepted view (agreed set of members).
+    /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,
-    /// Longest remaining lease of views before `view`; `None` if a member may not have accepted `view`.
+    /// Longest remaining lease of any view before `view`. `None` if unknown, because a member may not have accepted
+    /// `view`.
     pub(crate) earlier_lease_left: Option<Duration>,
 }
 
@@ -175,8 +178,8 @@ impl OtherLeases {
         earlier_lease_left: Some(Duration::from_micros(0)),
     };
 
-    /// Returns the time until all leases of views before `view` have expired, in tenths of a second. `u16::MAX` if it
-    /// is not known.
+    /// Returns the time until all leases of views before `view` have expired, in tenths of a second. `u16::MAX` if
+    /// the time is not known.
     pub(crate) fn earlier_lease_tenths(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
@@ -200,17 +203,17 @@ pub(crate) struct Effects {
     pub(crate) resent: bool,
     /// True if this relay has started a pass (message along the chain) or a view proposal.
     pub(crate) began: bool,
-    /// True if a new view (agreed set of members) is needed.
+    /// True if a new view (agreed members of the chain) is needed.
     pub(crate) view_needed: bool,
-    /// Sign of life: neighbour that has replied to a message, and the time of that message. The neighbour was alive
-    /// at that time or later.
+    /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
+    /// proves that the neighbour was alive after that time.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the view proposal that was received or made.
+    /// Origin of the view proposal that this relay has received or made now.
     pub(crate) proposed_by: Option<Proposer>,
-    /// True if a view proposal is outstanding: no pass along the chain continues before its decision.
+    /// True if a view proposal is outstanding. No pass along the chain continues before its decision.
     pub(crate) view_proposed: bool,
     pub(crate) event: Option<LayerEvent>,
-    /// Changes of the interference estimate and of the faulty receivers.
+    /// Changes of the interference estimate and of the set of faulty interference sensors.
     pub(crate) sensed: Sensed,
 }
 
@@ -221,7 +224,7 @@ pub(crate) enum Ignored {
     Duplicate,
 }
 
-/// Neighbour, named by the direction from the leader to the last relay: next or previous.
+/// Neighbour of a relay, the next or the previous one on the way from the leader to the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Peer {
     Next,
@@ -237,7 +240,7 @@ pub(crate) enum LayerEvent {
     Infeasible,
     /// The lease of the last agreement has expired.
     Lapsed,
-    /// A request for a new view is due, to the neighbour toward the leader.
+    /// A hello that requests a new view is due, to the neighbour toward the leader.
     RequestView,
     /// A view proposal has been decided.
     ProposalDecided(ProposalOutcome),
@@ -250,7 +253,7 @@ pub(crate) struct Sensed {
     pub(crate) new_estimate: bool,
     /// The measurements do not fit a single source of interference.
     pub(crate) unclear: bool,
-    /// Node whose measurements do not fit the other nodes' measurements.
+    /// Node whose measurements contradict those of the other nodes.
     pub(crate) faulty_sensor: Option<u16>,
 }
 
@@ -299,7 +302,8 @@ impl Effects {
         ..Self::NONE
     };
 
-    /// Effects of a message of a view in which this relay cannot take part: a new view is needed.
+    /// Effects of a message of a view to which this relay does not belong. The message is ignored, and a new view is
+    /// requested.
     pub(crate) const FOREIGN: Self = Self {
         view_needed: true,
         ..Self::STALE
@@ -312,7 +316,7 @@ impl Effects {
         }
     }
 
-    /// Returns the effects with the origin of a view proposal.
+    /// Returns these effects with `proposer` as the origin of a view proposal.
     pub(crate) const fn by(self, proposer: Proposer) -> Self {
         Self {
             proposed_by: Some(proposer),
@@ -321,7 +325,7 @@ impl Effects {
     }
 }
 
-/// Pause between two portions of a long computation, so that the caller's loop can run.
+/// Pause between two steps of a long computation, so that the caller's loop can do other work.
 pub(crate) const PAUSE: Duration = Duration::from_micros(250);
 
 /// Maximum duration of a lease, as a multiple of `dead_after`.
@@ -332,8 +336,8 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the longest time in which the first message passes `all` relays and its result comes back. Half of the
-/// frames are assumed to be lost.
+/// Returns the maximum time in which the first message passes `all` relays and its result comes back. It assumes that
+/// half of the frames are lost.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

@@ -49,96 +49,99 @@ use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 
-/// Sender of a frame that bears this relay's own index.
+/// Sender of a frame that bears this relay's own node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sender {
-    /// The frame is this relay's own.
+    /// The relay itself: the frame is an echo of its own.
     Itself,
-    /// Another node, whose claim to the index is not known; with signed frames perhaps a forger.
+    /// Another node, whose claim to the node number is not known. With signed frames it may be a forger.
     Unknown,
-    /// Another node, with its claim to this relay's index.
+    /// Another node that claims this relay's node number, with its claim.
     Rival(Rival),
 }
 
-/// Claim of another node to this relay's index.
+/// Claim of another node to this relay's node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if the claim has a newer epoch than this relay; false if it has the same epoch.
+    /// True if the other node's epoch (start counter) is newer than this relay's; false if it is the same.
     pub(crate) newer_epoch: bool,
-    /// True if the other node is passive: it has no setpoint and takes part in nothing.
+    /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the claim is known to be sent after this relay's start. It names this relay's claim number, or a key
-    /// proves it.
+    /// True if the claim was certainly sent after this relay's start. It then names this relay's claim number, or is
+    /// signed.
     pub(crate) is_current: bool,
 }
 
-/// Bit of the claim number that a relay with a position sets, to win the index against a later node.
+/// Bit that a relay with a position sets in its claim number, to win against a later node. Of two nodes with the same
+/// node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
-/// Wait before the first unprompted claim to this relay's index. Each further interval is twice the previous one.
+/// Wait before the first unprompted claim to this relay's node number. The next intervals double from claim to claim.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start until this relay sends claims to its index unprompted. A hundred relays take about as long to
-/// agree.
+/// Time from the start to the first unprompted claim to this relay's node number. The first agreement of a hundred
+/// relays takes about as long.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum interval between the first unprompted claims to this relay's index. Later claims follow every
+/// Maximum of the doubling intervals between unprompted claims to this relay's node number. Later claims follow every
 /// `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of repeated claims that answer an active node's claim to the same index. They are [`least_interval`] apart.
+/// Number of claims by which this relay answers an active node's claim to the same node number. They are
+/// [`least_interval`] apart.
 const DEFENCES: u8 = 32;
 
-/// Number of claims that answer another node's frame with this index, if that frame is no claim.
+/// Number of claims that this relay sends after a frame with its node number that is no claim.
 ///
-/// With a key it is the number of claims after this relay has raised its claim number.
+/// With signed frames it is the number of claims after this relay has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
 
-/// Returns the minimum interval between claims to this relay's index. It is long enough that claims of two relays and
-/// the echoes of these claims do not fill the channel.
+/// Returns the minimum interval between claims of this relay. The claims of two relays and their echoes then do not
+/// fill the channel.
 fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Returns the interval between claims of a passive relay to its index, a quarter of `probe_after`. Many claims fit
-/// into the time after which it becomes active.
+/// Returns the interval between claims of a passive relay, a quarter of `probe_after`. It sends many claims before it
+/// becomes active again, so the loss of some does no harm.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
 
-/// State of this relay's claims to its index, and of another node that uses the same index.
+/// State of this relay's claims to its node number, and of another node with the same number.
 #[derive(Clone, Debug)]
 pub(crate) struct IndexClaims {
     number: u32,
-    /// Largest claim number received from another node with this index and epoch.
+    /// Largest claim number received from another node with the same node number and epoch.
     rival: u32,
-    /// Claim number of the other node with this index, as received last; 0 before any.
+    /// Last claim number received from another node with the same node number; 0 before any.
     last_rival: u32,
-    /// Contact with another node of this index: time of its last frame, and a flag. The flag is true if this relay
-    /// already had a position when it received the first frame.
+    /// Last contact with another node of this number: its time, and a flag; `None` before any. The flag is true if
+    /// this relay already had a position at the first contact.
     contest: Option<(Instant, bool)>,
-    /// Times at which a duplicate was last observed: of this relay's index, and of a neighbour's index.
+    /// Times at which a number was last seen used by two nodes: this relay's number, a neighbour's number.
     observed: [Option<Instant>; 2],
-    /// Time when this relay last received a frame that it had sent itself.
+    /// Time at which this relay last received a frame that it had sent itself.
     echoed: Option<Instant>,
-    /// Time when a passive relay becomes active again; `None` while it is active.
+    /// Time at which a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next claim to this relay's index that no other claim has prompted.
+    /// Time of the next claim that this relay sends unprompted, not in reply to a frame.
     next_claim: Option<Instant>,
     /// Time from the next unprompted claim to the one after it.
     interval: Duration,
-    /// Number of claims still to send because another active node uses this index.
+    /// Number of claims still to send because another active node uses this number. They are [`least_interval`]
+    /// apart.
     defences: u8,
-    /// Earliest time of the next claim to this index.
+    /// Earliest time at which this relay may send its next claim.
     quiet_until: Instant,
     claim_due: bool,
-    /// True if all sessions with other nodes must be restarted under the current claim number.
+    /// True if all authentication sessions must be restarted under the new claim number.
     sessions_due: bool,
     jitter: Jitter,
 }
 
-/// Index that two nodes use: this relay's own, or that of a neighbour.
+/// Node number that two nodes use: this relay's own, or a neighbour's.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Duplicated {
     Own,
@@ -173,7 +176,8 @@ impl IndexClaims {
         self.number
     }
 
-    /// Records that two nodes use one index; returns true if the duplicate should be reported.
+    /// Records that two nodes use the same number. Returns true if that has not been observed for twice `dead_after`,
+    /// and must be reported.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -189,7 +193,7 @@ impl IndexClaims {
         since.is_none_or(|since| since > settings.dead_after.times(2))
     }
 
-    /// Returns the sender of `claim` to this relay's index.
+    /// Returns the sender of `claim`, a claim to this relay's node number: this relay or another node.
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
         if claim.number | RAISED == self.number | RAISED {
             return Sender::Itself;
@@ -206,7 +210,8 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Returns true if this relay has had a position since before it first received the duplicate node.
+    /// Records a frame of another node with this number. Returns true if this relay has a lease, and had one when it
+    /// received the first such frame.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -215,7 +220,8 @@ impl IndexClaims {
         held && has_lease
     }
 
-    /// Handles a frame with this relay's index; returns true if the relay becomes passive.
+    /// Handles a frame that bears this relay's node number. Returns true if this relay becomes passive. `has_lease`
+    /// is true while it has a setpoint and a lease.
     pub(crate) fn handle_frame(
         &mut self,
         now: Instant,
@@ -244,7 +250,8 @@ impl IndexClaims {
         false
     }
 
-    /// Compares the claim of another node with this relay's. Returns true if this relay becomes passive.
+    /// Compares another node's claim to this number with this relay's claim. Returns true if this relay becomes
+    /// passive.
     fn compare(
         &mut self,
         now: Instant,
@@ -287,7 +294,7 @@ impl IndexClaims {
         true
     }
 
-    /// Schedules a claim to this relay's index, unless one was sent recently.
+    /// Schedules a claim to this relay's node number, unless one was sent a moment ago.
     fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);
@@ -295,7 +302,7 @@ impl IndexClaims {
         }
     }
 
-    /// Schedules repeated claims to this relay's index, for some time or until `rival` is passive.
+    /// Schedules repeated claims in answer to `rival`, for some seconds or until `rival` is passive.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {
@@ -311,9 +318,9 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts the claims to this relay's index that are sent unprompted, at intervals. Links without a key need them,
-    /// and so does the defence against another node. A shared channel needs no others, because any frame of the other
-    /// node is received directly.
+    /// Starts the claims that this relay sends unprompted. They are needed on point-to-point links without a key, and
+    /// against another active node. On a shared channel a relay receives the frames of another node with its number
+    /// directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -325,17 +332,17 @@ impl IndexClaims {
         self.passive_until.is_some()
     }
 
-    /// Returns true if a claim to this relay's index is due, and marks it as sent.
+    /// Returns true if a claim to this relay's node number is due, and marks it as sent.
     pub(crate) const fn poll_claim(&mut self) -> bool {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns the claim number with which all sessions must be restarted; `None` if that is not due.
+    /// Returns the new claim number if all authentication sessions must be restarted with it; else `None`.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }
 
-    /// Handles expired timers; returns true if the relay becomes active.
+    /// Handles expired timers. Returns true if the passive relay becomes active.
     pub(crate) fn handle_timeout(&mut self, now: Instant, settings: &Settings) -> bool {
         if self.passive_until.is_some_and(|until| until <= now) {
             self.activate(now, settings);
@@ -367,7 +374,7 @@ impl IndexClaims {
         self.schedule_unprompted(now + AFTER_START, settings);
     }
 
-    /// Handles the report that the other node with this index is gone. Returns true if this relay becomes active.
+    /// Handles the report that the other node with this number is gone. Returns true if this relay becomes active.
     pub(crate) fn clear(&mut self, now: Instant, settings: &Settings) -> bool {
         let passive = self.is_passive();
         if passive {
@@ -415,8 +422,8 @@ mod tests {
         }
     }
 
-    /// Checks that a claim to the index from before this relay's last start is only answered. Such a claim names
-    /// another claim number than the relay's, and has no other effect.
+    /// Checks that a claim from before this relay's last start has no effect but a reply. Such a claim does not name
+    /// this relay's current claim number.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
@@ -448,7 +455,7 @@ mod tests {
         }
     }
 
-    /// Checks which of two nodes with one index becomes passive, for all rows of the state table. It tries every
+    /// Checks which of two nodes with one number becomes passive, for all rows of the state table. It tries every
     /// order of the claim numbers, and every lease, epoch and state of the other node.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
@@ -487,8 +494,8 @@ mod tests {
         }
     }
 
-    /// Checks that a relay raises its claim only if it had a position before it received its duplicate. The duplicate
-    /// has the same index; 40 s later it counts as received for the first time again.
+    /// Checks that a relay raises its claim only if it had a position before it met its duplicate. After 40 s of
+    /// silence the next contact counts as the first one.
     #[test]
     fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();
@@ -583,8 +590,8 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// Checks that a relay repeats its claim to its index after a claim of an active node. It does so for four
-    /// seconds, or until that node is passive.
+    /// Checks that a relay repeats its claim for four seconds after a claim of its active duplicate. It stops early
+    /// once the duplicate is passive.
     #[test]
     fn an_index_is_defended_for_4_s_or_until_the_other_is_passive() {
         let settings = Settings::default();

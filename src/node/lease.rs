@@ -16,6 +16,18 @@
 //! | any | completion received | forward it; at the leader: extend the lease from the start of this renewal, schedule the next one |
 //! | any | lease expired | request a new view; the setpoint stays |
 //!
+//! # Expiry
+//! The expiry stops no motion: the relay keeps its setpoint and requests a new view.
+//!
+//! | state | after the expiry | code |
+//! | --- | --- | --- |
+//! | setpoint, guard, fences | unchanged | `Node::steer` |
+//! | `Relay::lease` | `None` | [`Lease::until`] |
+//! | `Event::LeaseLapsed` | raised once per view | `LayerEvent::Lapsed` in `Node::apply` |
+//! | view | requested by hellos to the neighbour toward the leader | `Effects::view_needed`, `LayerEvent::RequestView` |
+//! | links to the neighbours | kept until `NoQuorumTimer` expires, which runs while there is no quorum | `Node::drop_links_if_expired` |
+//! | `Settings::without_quorum` | applies if the new view has no quorum, not at the expiry | `Node::wanted_place` |
+//!
 //! # Safety
 //! No relay uses an old agreement once positions of a later view may be used. Suppose that every member took part in renewal n
 //! and that relay r forwarded it at time t: r relies on the agreement until t + span. Every other member reports the completion
@@ -39,7 +51,7 @@ use crate::wire::message::{Message, Pulse, Pulsed};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// No lease yet: there is no agreement in this view, or not all members are known to have it.
+    /// No lease yet: this view has no agreement, or not all members are known to have it.
     Pending,
     Until(Instant),
     Lapsed,
@@ -57,13 +69,13 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Time until which other members may rely on this relay.
+    /// Time until which the lease of another member may run because this relay took part in a renewal.
     vouched_until: Instant,
-    /// Last accepted view, and the earliest time at which its positions may be used.
+    /// Last accepted view, and the earliest time at which positions agreed on in it may be used.
     accepted: (ViewId, Instant),
     /// Latest possible expiry of the leases granted before the accepted view; `None` if it is unknown.
     older_leases_end: Option<Instant>,
-    /// True once all relays of the view are known to have accepted it, or to have taken part in a renewal.
+    /// True once all members are known to have accepted the view, or to have taken part in a lease renewal.
     is_whole: bool,
     /// True once this relay has agreed on its position in this view.
     is_agreed: bool,
@@ -79,7 +91,8 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// Creates the lease of a relay that was switched on at `now`. It may have been in a view that it does not remember.
+    /// Creates the lease state of a relay that starts at `now`. The relay may have been in a view that it does not
+    /// remember, so others may rely on it for `dead_after`.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Pending,
@@ -95,8 +108,8 @@ impl Lease {
         }
     }
 
-    /// Extends the time for which other members may rely on this relay by the longest possible lease. A lease of a
-    /// view from before this relay's restart may still run at these members.
+    /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. A lease
+    /// from before this relay's restart may still run at these members.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }
@@ -109,13 +122,13 @@ impl Lease {
         }
     }
 
-    /// Returns true until the first lease of this view is granted.
+    /// Returns true until the first lease of this view is granted to this relay.
     pub(crate) const fn is_pending(&self) -> bool {
         matches!(self.state, LeaseState::Pending)
     }
 
-    /// Returns the silence after which a neighbour may be lost. It is the span of the last lease renewal, at least
-    /// `dead_after`.
+    /// Returns the silence after which a neighbour may count as lost. It is the lease duration of the last renewal,
+    /// but at least `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let span = self.current.map_or(0, |current| current.span);
         from_tenths(span).max(settings.dead_after)
@@ -130,12 +143,12 @@ impl Lease {
         }
     }
 
-    /// Accepts `view`, which follows `base` and whose positions must not be used before `rest`.
+    /// Accepts `view`, which follows the view `base`. Its positions must not be used before `rest`.
     ///
-    /// A member of `base` that has not accepted `view` may still hold a lease. If this relay was a member of `base`,
-    /// that lease ends when others may no longer rely on this relay, because no renewal completes without it. The age
-    /// of an outstanding renewal counts as a round trip only if this relay was a member of `base` and no relay is
-    /// `lost`; else it measures an outage.
+    /// A member of `base` that has not accepted `view` may still have a lease. No renewal completes without all
+    /// members, so if this relay was a member, that lease ends by `vouched_until`. The age of an outstanding renewal
+    /// counts as a round trip only if this relay was a member of `base` and no relay is `lost`; otherwise it measures
+    /// an outage.
     pub(crate) fn accept_view(
         &mut self,
         now: Instant,
@@ -154,7 +167,7 @@ impl Lease {
         self.end();
     }
 
-    /// Ends the lease. There is none until this relay agrees on its position in another view.
+    /// Ends the lease. There is no new one before this relay has agreed on a position in a later view.
     pub(crate) fn end(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
@@ -164,7 +177,8 @@ impl Lease {
         self.circulation.withdraw();
     }
 
-    /// Records that all members have accepted this relay's view.
+    /// Records that all members have accepted this relay's view. Leases of earlier views then end by the time from
+    /// which the view's positions may be used.
     pub(crate) fn confirm_view(&mut self) {
         self.older_leases_end = Some(self.accepted.1);
         // The initial view is configured and needs no acceptance.
@@ -176,8 +190,8 @@ impl Lease {
         self.is_whole
     }
 
-    /// Records that this relay has agreed on its position. At the leader all members have then agreed, and the first
-    /// lease renewal is scheduled.
+    /// Records that this relay has agreed on its position. At the leader (`leads`) this means that all members have
+    /// agreed, so the first lease renewal is scheduled.
     pub(crate) fn on_agreement(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
@@ -185,7 +199,8 @@ impl Lease {
         }
     }
 
-    /// Handles a lease renewal or its reply, of this relay's view and from the neighbour that may send it.
+    /// Handles a lease renewal, or the reply to one. It belongs to this relay's view and comes from the right
+    /// neighbour.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         match message {
             Message::Pulse(pulse) => self.on_pulse(context, *pulse),
@@ -220,9 +235,9 @@ impl Lease {
         effects
     }
 
-    /// Extends the lease after all members took part in the renewal `pulse`, unless it has expired already. `next` is
-    /// the span of the next renewal. If it is more than twice as long, the first lease is not granted: it would
-    /// expire before its renewal.
+    /// Extends the lease, because all members took part in the renewal `pulse`. The lease runs from the time at which
+    /// this relay forwarded `pulse`. No first lease is granted if `next`, the duration in the next renewal, is more
+    /// than twice as long: it would expire before that renewal completes.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -247,8 +262,8 @@ impl Lease {
         }
     }
 
-    /// Completes the current lease renewal and schedules the reply. The leader extends its own lease and schedules
-    /// the next renewal.
+    /// Completes the current lease renewal and schedules the reply to the previous relay. The leader instead extends
+    /// its own lease and schedules the next renewal.
     fn complete_renewal(&mut self, context: &Context<'_>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
@@ -286,7 +301,7 @@ impl Lease {
         half.max(self.round_trip.times(2).min(most)).max(PAUSE)
     }
 
-    /// Returns the duration of the lease that the leader announces, in tenths of a second.
+    /// Returns the lease duration that the leader announces in the next renewal, in tenths of a second.
     fn announced_span(&self, settings: &Settings) -> u16 {
         let slow = self.round_trip.times(3).as_micros();
         let wanted = slow.saturating_add(self.period(settings).times(2).as_micros());
@@ -377,9 +392,9 @@ mod tests {
     use crate::time::{Duration, Instant};
     use crate::view::ViewId;
 
-    /// Returns the span of the lease that the leader announces after a view change, in tenths of a second. A renewal
-    /// of view 1 is unfinished since 40 s, and the leader has just accepted a view that follows view `base` and loses
-    /// no relay.
+    /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
+    /// change it was in view 1, with a renewal unfinished for 40 s. The new view follows view `base` and loses no
+    /// relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

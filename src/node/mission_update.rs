@@ -37,9 +37,9 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
-/// Number that this relay's hellos contain, with the times of its first and last use.
+/// Number in this relay's hellos, with the times of its first and last use; 0 is no number.
 ///
-/// A mission offer that answers a hello repeats its number. The number 0 means none.
+/// A mission offer must repeat it, which proves that the offer is not a recording.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -47,22 +47,22 @@ struct Asked {
     last: Instant,
 }
 
-/// State of the mission offers to the neighbour, and to the ground station, on one side.
+/// State of this relay's mission offers on one side, to the neighbour and to the ground station.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Number of the neighbour's last hello, 0 before any. An offer that answers the hello repeats it.
+    /// Number in the neighbour's last hello, 0 before any. An offer to the neighbour repeats it.
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` before any.
     heard: Option<Instant>,
     /// True if a mission offer to the neighbour is pending.
     is_due: bool,
-    /// Time at which the offer to the neighbour is repeated; `None` if it is not.
+    /// Time at which the offer to the neighbour is sent again; `None` if it is not sent again.
     at: Option<Instant>,
     /// Number of offers sent since the last change of the mission or of the neighbour.
     tries: u8,
     /// True if a hello to the ground station is pending.
     reports: bool,
-    /// Number of the ground station's hello that requests the stored upload; 0 for none.
+    /// Number in the ground station's hello that requests the uploaded mission; 0 if none is requested.
     ground_asks: u16,
 }
 
@@ -78,26 +78,26 @@ impl Offering {
     };
 }
 
-/// Reaction to an offered mission.
+/// Result of handling an offered mission.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offered {
     /// The mission is newer and has been stored.
     Stored,
-    /// The mission is rejected: no valid line on earth, or outside the geofence. `is_new` is true the first time that
-    /// this mission is rejected.
+    /// The mission is rejected: it does not fit the positions of Tx and Rx, or the geofence. `is_new` is true at the
+    /// first rejection of this mission.
     Refused { why: LineError, is_new: bool },
-    /// The mission is ignored: not newer than the stored one, or for other relays.
+    /// The mission is ignored: it is not newer than the stored one, or is meant for other relays.
     Passed,
 }
 
 /// Time until the first repetition of a mission offer, in hop times.
 const OFFER_HOPS: u32 = 4;
-/// Number of mission offers after which the interval between them doubles.
+/// Number of mission offers after which the interval between offers doubles.
 const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;
 
-/// Missions known to one relay, and its offers to the neighbours.
+/// Missions that one relay has stored, and its offers of the newest one to its neighbours.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
     /// Identifier of the newest stored mission.
@@ -109,17 +109,18 @@ pub(crate) struct MissionUpdate {
 /// State of mission uploads, which only relays with the feature `upload` have.
 #[derive(Clone, Copy, Debug)]
 struct Uploads {
-    /// Upload of the newest stored mission; `None` for the one loaded before flight.
+    /// Newest mission that was uploaded to this relay; `None` if it has only the one loaded before flight.
     upload: Option<Upload>,
-    /// Sites of Tx and Rx of the active mission if it has its own; positions are then along their line.
+    /// Positions of Tx and Rx that the active mission has of its own; `None` for the configured ones. All x are
+    /// measured along the line between them.
     sites: Option<Sites>,
     /// Distance from Tx to Rx of the mission loaded before flight, m.
     loaded_m: f32,
-    /// Range of altitudes of the mission loaded before flight, m.
+    /// Range of altitudes of the mission loaded before flight, m, including the common altitude.
     loaded_band: Band,
-    /// Identifier of the last refused mission. This relay has refused it, or one beyond a neighbour.
+    /// Identifier of the last mission that was refused, by this relay or by a relay beyond a neighbour.
     refused: Option<MissionId>,
-    /// Number that this relay's hellos bear now, and the previous one. A mission offer must contain one of them.
+    /// Number in this relay's hellos now, and the previous one. A mission offer must repeat one of the two.
     asked: [Asked; 2],
     /// State of the mission offers toward Tx and toward Rx.
     offering: [Offering; 2],
@@ -163,7 +164,7 @@ impl MissionUpdate {
         self.latest
     }
 
-    /// Returns the mission with the identifier `id` if it is the active or the stored one, else `None`.
+    /// Returns the active mission or the stored upload, if `id` identifies one of them; else `None`.
     pub(crate) fn mission_of(&self, member: &Member, id: MissionId) -> Option<Mission> {
         if id == member.active {
             return Some(member.mission);
@@ -172,7 +173,8 @@ impl MissionUpdate {
         Mission::try_new(*upload.config()).ok()
     }
 
-    /// Returns the number that a hello sent now bears; 0 if uploads are not accepted.
+    /// Returns the number for the next hello, which an offer must repeat; 0 if uploads are not accepted. The number
+    /// changes every `dead_after`.
     pub(crate) fn next_offer_number(&mut self, now: Instant, member: &Member) -> u16 {
         let uploads = self.uploads.first_mut();
         let Some(uploads) = uploads.filter(|_| accepts_uploads(member)) else {
@@ -191,8 +193,7 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if `answer` is the number of a hello that this relay has sent recently. Recently means within
-    /// twice `dead_after`.
+    /// Returns true if this relay has sent a hello with the number `answer` within twice `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -207,7 +208,7 @@ impl MissionUpdate {
         })
     }
 
-    /// Records the number of a hello of the neighbour at `side`, which an offer can answer.
+    /// Records the number in a hello of the neighbour at `side`. The next mission offer repeats it.
     pub(crate) fn record_hello_number(&mut self, side: Side, nonce: u16, now: Instant) {
         if let Some(offering) = self.offering(side) {
             offering.nonce = nonce;
@@ -222,7 +223,7 @@ impl MissionUpdate {
         }
     }
 
-    /// Starts the repetitions of offers at `side` again, for a new mission or a new neighbour.
+    /// Allows all repetitions of an offer at `side` again, because the mission or the neighbour is new.
     pub(crate) fn reset_offers(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.tries = 0;
@@ -235,10 +236,11 @@ impl MissionUpdate {
         }
     }
 
-    /// Returns the pending offer to the neighbour `to` at `side`, and marks it as sent.
+    /// Returns the pending mission offer to the neighbour `to` at `side`, and marks it as sent.
     ///
-    /// `holds` is that neighbour's mission, older than this relay's, or unknown. The returned number is that of the hello that the
-    /// offer answers; `None` if a hello has to be requested first, because the last one is older than half of `dead_after`.
+    /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The returned number is that
+    /// of the neighbour's hello, which the offer repeats. It is `None` if the hello is older than half of
+    /// `dead_after`, so that a new one must be requested first.
     pub(crate) fn poll_offer(
         &mut self,
         (side, to): (Side, u16),
@@ -261,7 +263,7 @@ impl MissionUpdate {
         Some((upload, answers.then_some(offering.nonce)))
     }
 
-    /// Schedules the offer at `side` again once its timer has expired.
+    /// Schedules the offer to the neighbour on each side again if its timer has expired.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             if let Some(offering) = self.offering(side)
@@ -278,8 +280,8 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules answers to the ground station at `side`: a hello if `reports` is true. If `asks` is the number of a
-    /// hello of the station, the stored upload is scheduled, too.
+    /// Schedules replies to the ground station at `side`. It is sent a hello if `reports` is true, and the stored
+    /// upload if `asks` has the number of the station's request.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -293,31 +295,33 @@ impl MissionUpdate {
         offering.is_some_and(|offering| core::mem::take(&mut offering.reports))
     }
 
-    /// Returns the upload that the ground station at `side` has requested, and the number of its hello.
+    /// Returns the upload that the ground station at `side` has requested, with the number of its request. `None` if
+    /// nothing is requested, or there is no upload.
     pub(crate) fn poll_requested(&mut self, side: Side) -> Option<(Upload, u16)> {
         let answer = core::mem::take(&mut self.offering(side)?.ground_asks);
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
-    /// Returns the last refused mission, unless it is `active` or older than the stored mission.
+    /// Returns the last refused mission. `None` if there is none, if it is `active`, or if the stored mission is
+    /// newer.
     pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
-    /// Records that a neighbour refuses a mission. Returns true if this is the first refusal, and concerns the stored
-    /// mission.
+    /// Records that a neighbour reports mission `refused` as refused. Returns true if it is the stored mission, and
+    /// was not known to be refused.
     pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
 
-    /// Records that mission `id` is refused; returns true for the first refusal.
+    /// Records that mission `id` is refused. Returns true if this was not known before.
     fn refuse(&mut self, id: MissionId) -> bool {
         let uploads = self.uploads.first_mut();
         uploads.is_some_and(|uploads| uploads.refused.replace(id) != Some(id))
     }
 
-    /// Stores `upload` if it is for this relay, allowed here and newer than the stored mission.
+    /// Stores `upload` if it is newer than the stored mission, and fits this relay's mission and geofence.
     pub(crate) fn store_if_newer(&mut self, member: &Member, upload: &Upload) -> Offered {
         let id = upload.id();
         if id <= self.latest {
@@ -359,8 +363,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Restores the mission `upload` after a start, if the relay is still `untouched`; returns the mission.
-    /// `untouched` is true before the first message.
+    /// Restores the stored mission `upload` after a start, and returns it. It fails if the relay is no longer
+    /// `untouched`, which it is until it takes part in the chain.
     pub(crate) fn resume(
         &mut self,
         member: &Member,
@@ -376,7 +380,7 @@ impl MissionUpdate {
         Ok(mission)
     }
 
-    /// Returns the stored mission if it is an upload.
+    /// Returns the stored mission if it was uploaded; `None` if only the one loaded before flight is known.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
         match self.uploads() {
             Some(uploads) => uploads.upload.as_ref(),
@@ -384,14 +388,14 @@ impl MissionUpdate {
         }
     }
 
-    /// Returns the upload to offer to a neighbour that `holds` an older or unknown mission.
+    /// Returns the upload to offer to a neighbour. `None` if the neighbour's newest mission, `holds`, is as new.
     pub(crate) fn offer_for(&self, holds: Option<MissionId>) -> Option<Upload> {
         let older = holds.is_none_or(|holds| holds < self.latest);
         self.upload().copied().filter(|_| older)
     }
 
-    /// Checks that this relay can use `upload`: its base mission, line and geofence must fit. A relay whose
-    /// interference is a field (a known distribution along x) accepts none, even if the digest of the base matches.
+    /// Checks that `upload` fits the loaded mission, the positions of Tx and Rx, and the geofence. A relay whose
+    /// interference is a field (a known distribution along x) accepts no upload at all.
     fn fits(&self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         let config = upload.config();
         let loaded = self.uploads().ok_or(UploadError::Base)?;
@@ -416,28 +420,29 @@ impl MissionUpdate {
     }
 }
 
-/// Methods for the line between Tx and Rx along which positions of the active mission are measured.
+/// Methods for the line from Tx to Rx, along which the x of the active mission is measured.
 impl MissionUpdate {
-    /// Returns the geographic sites of Tx and Rx of the active mission, if it has its own.
+    /// Returns the positions of Tx and Rx that the active mission has of its own. `None` if the configured positions
+    /// apply.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.uploads()?.sites
     }
 
-    /// Returns the digest that identifies the line along which this relay's positions are measured.
+    /// Returns the digest by which two relays check that they use the same x axis (line from Tx to Rx).
     pub(crate) fn line_digest(&self, member: &Member) -> u16 {
         between(member.digest, self.sites())
     }
 
-    /// Adopts the sites of Tx and Rx of the stored mission as those of the active one. Returns true if the sites have
-    /// changed, so that all positions are void.
+    /// Makes the Tx and Rx positions of the stored mission those of the active one. Returns true if they have
+    /// changed, which makes all relay positions invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
         uploads.is_some_and(|uploads| core::mem::replace(&mut uploads.sites, sites) != sites)
     }
 
-    /// Returns the configured geofence, if any, fitted to the active mission. It grows along x with the line of a
-    /// mission that has its own sites.
+    /// Returns the configured geofence for the active mission; `None` without a guard. If the mission has Tx and Rx
+    /// positions of its own, the limit of x is shifted by the difference in length.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {
@@ -449,10 +454,11 @@ impl MissionUpdate {
 }
 
 impl Uploads {
-    /// Checks a mission with `config` against the configured geofence; the error names the limit exceeded.
+    /// Checks that a mission with `config` is within the configured geofence. The error names the limit exceeded.
     ///
-    /// The length of a mission with sites of its own (`sited`) is not limited. If the geofence was extended to this
-    /// relay's own altitude, the loaded mission's limit is used instead: all relays must decide alike.
+    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. An altitude limit that
+    /// equals this relay's own fixed altitude is replaced by that of the loaded mission, because all relays must
+    /// decide alike.
     fn encloses(
         &self,
         member: &Member,
@@ -491,7 +497,7 @@ impl Uploads {
     }
 }
 
-/// Returns the range of altitudes of a mission, m, extended to the relays' common altitude.
+/// Returns the range of altitudes of a mission, m, extended to include the relays' common altitude.
 fn altitudes_of(config: &MissionConfig) -> Band {
     let common_m = config.common.altitude_m;
     Band {

@@ -10,40 +10,44 @@ use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
 
-/// True with the feature `field` (known field of interference). Without it `Settings::measure` is rejected, and the
-/// code is unreachable.
+/// True with the feature `field` (known distribution of interference along x). Without it `Settings::measure` is
+/// rejected, and the code is unreachable.
 const FIELD: bool = cfg!(feature = "field");
 
 /// Measurement of a relay or of a ground station, which the firmware passes to the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
-    /// Interference power at a relay's setpoint, for a mission with a known field of interference.
+    /// Interference power at a relay's setpoint, for a mission with an interference field. A field is a known
+    /// distribution of the interference along x.
     Interference {
         /// Received power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
     },
-    /// Mean interference power at a position on the way or at the setpoint.
+    /// Mean interference power at a position, for the estimate of an unknown interferer.
     ///
-    /// It is averaged until its relative error is that of [`Listen`](crate::sensing::Listen). It excludes the signals of the
-    /// chain, and includes the receiver's noise, which the relay subtracts (`MissionConfig::noise_w`).
+    /// It is averaged until its relative error is that of [`Listen`](crate::sensing::Listen). It excludes the signals
+    /// of the chain, and includes the receiver's noise, which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
-        /// Position of the drone. Each coordinate is at most 100 times the distance from Tx to Rx away from Tx.
+        /// Position of the drone at the measurement. In each coordinate it is at most 100 times the distance from Tx
+        /// to Rx away from Tx.
         at: Placement,
         /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
     },
-    /// Mean interference power at the ground transmitter, for relay 1 or another of the first four relays.
+    /// Mean interference power measured at Tx, on the ground. The firmware passes it to one of the first four relays,
+    /// usually relay 1.
     Transmitter {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Mean interference power at the ground receiver, for one of the last four relays. The view's last relay uses it.
+    /// Mean interference power measured at Rx, on the ground. The firmware passes it to one of the last four relays;
+    /// the last relay of the view uses it.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// SIR of the first hop, measured by relay 1 at its setpoint; Algorithm 4 compares it with the target.
+    /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from it.
     FirstHop {
         /// Linear SIR, above 0.
         sir: f32,
@@ -51,7 +55,7 @@ pub enum Sample {
 }
 
 impl Sample {
-    /// Returns true for measurements of an unknown interferer, which need `Settings::listen`.
+    /// Returns true for measurements from which an unknown interferer is estimated. They need `Settings::listen`.
     pub(crate) const fn is_heard(self) -> bool {
         matches!(
             self,
@@ -80,7 +84,8 @@ impl Meter {
         }
     }
 
-    /// Adds a sample; returns true if it was accepted. `at` is the setpoint of relay 1, `None` at other relays.
+    /// Adds a sample; returns true if it was accepted. `at` is relay 1's setpoint, which an SIR of the first hop
+    /// needs; `None` at other relays.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,

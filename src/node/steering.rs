@@ -7,13 +7,14 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Interval after which messages to the neighbours about motion are repeated, as they may be lost.
+/// Interval after which the fence messages to the neighbours are repeated, because they may be lost. A fence is the
+/// plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
 /// True with the feature `guard`; without it no setpoint is limited.
 const GUARD: bool = cfg!(feature = "guard");
 
-/// Setpoint control of one relay.
+/// Setpoint control of one relay: the way to the agreed position, limited by the guard.
 #[derive(Clone, Debug)]
 pub(crate) struct Steering {
     guard: Option<Guard>,
@@ -23,14 +24,14 @@ pub(crate) struct Steering {
 }
 
 impl Steering {
-    /// State before [`begin`](Self::begin): without a guard and a setpoint.
+    /// State before [`begin`](Self::begin): no guard, and no setpoint.
     pub(crate) const NONE: Self = Self {
         guard: None,
         remind_at: None,
         reported_setpoint: None,
     };
 
-    /// Creates the guard that `settings` request, for a relay with these `neighbours`.
+    /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,
@@ -76,20 +77,21 @@ impl Steering {
     }
 
     /// Sets the neighbour at `side`; `None` at the end of the chain.
-    pub(crate) fn link(&mut self, side: Side, neighbour: Option<u16>) {
+    pub(crate) fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         if let Some(guard) = self.guard() {
-            guard.link(side, neighbour);
+            guard.set_neighbour(side, neighbour);
         }
     }
 
-    /// Handles a motion message (fence) of the neighbour `from` at `side`.
+    /// Handles a fence message of the neighbour `from` at `side`. A fence is the plane across x that keeps two
+    /// neighbours apart.
     pub(crate) fn handle(&mut self, side: Side, from: u16, fence: &Fence) {
         if let Some(guard) = self.guard() {
             guard.handle_fence(side, from, fence);
         }
     }
 
-    /// Schedules the motion messages (fences) to the neighbours again once the timer has expired.
+    /// Schedules the fence messages to both neighbours again if their timer has expired.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.remind_at.is_some_and(|at| at <= now) {
             self.remind_at = None;
@@ -100,7 +102,7 @@ impl Steering {
         }
     }
 
-    /// Sets whether the drone flies to the setpoints from `now` on. Returns true if the guard did not know this.
+    /// Records at `now` if the drone follows the setpoints (`flown`). Returns true if that is a change for the guard.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -109,7 +111,8 @@ impl Steering {
         is_news
     }
 
-    /// Starts again along another line from Tx to Rx at `now`, which is `None` after a start of the relay.
+    /// Restarts the guard with another x axis, because the positions of Tx and Rx have changed. `now` is `None` after
+    /// a start of the relay.
     pub(crate) fn switch_line(&mut self, now: Option<Instant>) {
         if let Some(guard) = self.guard() {
             guard.leave_line(now);
@@ -130,8 +133,8 @@ impl Steering {
         }
     }
 
-    /// Removes the limits of the setpoint because of lost relays at `side`, which are gone. `others` states that the
-    /// view has more relays at that side.
+    /// Removes the limits of the setpoint that lost relays at `side` cause, because they have left the air. `others`
+    /// is true if the view has more relays on that side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
@@ -147,7 +150,7 @@ impl Steering {
         self.guard.as_ref().filter(|_| GUARD)?.neighbour_place(side)
     }
 
-    /// Returns the next motion message (fence), with its side and its destination node.
+    /// Returns the next fence message, with its side and its destination node; `None` if none is pending.
     pub(crate) fn poll_transmit(&mut self) -> Option<(Side, u16, Fence)> {
         self.guard()?.poll()
     }

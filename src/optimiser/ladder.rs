@@ -11,8 +11,8 @@ use crate::root::sqrt;
 /// Number of target SIRs in a full ladder, the set of targets that one sweep along the chain tries.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps between neighbouring targets from the middle gap to either end of a full ladder. The middle gap is
-/// included.
+/// Number of gaps between neighbouring targets from the middle gap of a full ladder to either end. The middle gap is
+/// counted.
 const HALF: usize = TARGETS / 2;
 
 /// Ladder: target SIRs (linear, rising) that the relays try in one pass along the chain (a sweep). They are encoded
@@ -20,16 +20,16 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Target SIR just below the middle gap of the ladder (list of targets), or its only target.
+    /// Target SIR just below the middle gap of the list, or the only target of a list of one.
     anchor: f32,
-    /// Width of the middle gap between two targets, relative, as a float of 5 exponent and 3 mantissa bits. It is
-    /// 3e-8 to 120; with the code 0 `anchor` is the only target.
+    /// Code of the relative width of the middle gap between two targets, 3e-8 to 120. It is a float of 5 exponent and
+    /// 3 mantissa bits. Code 0: `anchor` is the only target.
     gap: u8,
-    /// Growth of the gaps between targets from the middle to the ends. Each gap is 1 + `growth` / 16 times the next
-    /// one toward the middle.
+    /// Code of the growth of the gaps between targets from the middle of the list to its ends. Each gap is 1 +
+    /// `growth` / 16 times the next one toward the middle.
     growth: u8,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of it for the sake of the next one.
+    /// of that x for the sake of the next relay.
     plain: bool,
 }
 
@@ -45,8 +45,8 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay takes the farthest
-    /// x that meets the target.
+    /// Returns the same targets for a pass that is plain if `plain` is true. In a plain pass every relay takes the
+    /// farthest x that meets the target.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }

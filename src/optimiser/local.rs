@@ -6,7 +6,8 @@
 //! after Algorithm 1, a grid has no better point, but this method finds one.
 //!
 //! With a way back each hop counts by its worse direction, and close to the interferer the relay also hears the next one worse. So
-//! a row may have a maximum on each side of the interferer, and each is searched from even samples.
+//! a row may have several maxima on each side of the interferer: smooth ones, and narrow ones where the SIRs of both hops are equal.
+//! Each side is sampled evenly. The best sample is improved by steps that halve, and equal SIRs are found by bisection.
 //!
 //! Accuracy and effect: `host-tests/tests/adjust.rs`.
 
@@ -27,7 +28,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Intervals of a row's samples on each side of the interferer, with a way back.
+/// Number of intervals into which a row of positions is sampled on each side of the interferer. Only for traffic in
+/// both directions; a row has one altitude.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -36,7 +38,8 @@ const ROUNDING: f32 = 3e-7;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Search from coarse to fine altitudes: at most 1080 evaluations of both hops, with a way back 4770.
+    /// Search from coarse to fine altitudes. At most 1080 evaluations of both hops; for traffic in both directions
+    /// 8730.
     #[default]
     Fine,
     /// Search on the paper's grid of positions: `columns` by `rows` evaluations of both hops.
@@ -48,42 +51,45 @@ pub enum Local {
     },
 }
 
-/// Neighbouring relay of the searching relay.
+/// Neighbour of the relay that searches its best position: the other end of one of its two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
-    /// Position of the neighbouring relay.
+    /// Position of the neighbour.
     pub place: Placement,
-    /// Minimum distance between the relay and this one, m.
+    /// Minimum distance between the neighbour and the relay that searches, m.
     pub apart_m: f32,
-    /// Transmit power, W.
+    /// Transmit power of the neighbour, W.
     pub power_w: f32,
 }
 
-/// Hops to and from one relay, whose SIRs the local search evaluates.
+/// Hops from the previous node to a relay and on to the next node, for any position of the relay.
 ///
-/// With the squared lengths l of both hops and the inverse interference q at the relay, the SIRs of the hop from the node before
-/// are A q / l and `returned` / l, those of the hop to the node after `received` / l and A' q / l. The second one of each is of
-/// the way back, divided by r.
+/// With the squared lengths l of both hops and the inverse interference q at the relay, the SIRs of the hop from the
+/// previous node are A q / l and, for traffic toward Tx, `returned` / l. Those of the hop to the next node are
+/// `received` / l and A' q / l. The second one of each is divided by r, the required ratio of backward to forward
+/// SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the node before.
+    /// Gain A of the hop from the previous node. Its SIR is A times inverse interference over squared length.
     gain: f32,
-    /// Gain of the relay times the inverse interference at the node after, or K of the hop to Rx, m^2.
+    /// SIR of the relay's signal at the next node, times the squared length of the hop, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
-    /// Noise nu = N eta / P, 1/m^2: noise over the interferer's power received at 1 m; 0 without noise.
+    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / P, 1/m^2; 0 without noise.
     noise: f32,
 }
 
-/// Way back over both hops; infinite gains without one.
+/// Gains of both hops for traffic from Rx to Tx; infinite for a mission of one direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// Gain of the relay times the inverse interference at the node before, over r, m^2. `K_tx` / r to Tx.
+    /// SIR of the relay's signal at the previous node, times the squared length of the hop, over r, m^2. r is the
+    /// required ratio of backward to forward SIR.
     returned: f32,
-    /// Gain A' of the node after, over r.
+    /// Gain A' of the backward hop from the next node to the relay, over r. r is the required ratio of backward to
+    /// forward SIR.
     gain: f32,
 }
 
@@ -120,7 +126,8 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the hops of a relay of `power_w` watts. `before` is `None` for relay 1, `after` for relay N.
+    /// Returns the hops of a relay of `power_w` watts. `before` is the previous node, `None` for Tx; `after` is the
+    /// next one, `None` for Rx.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -158,7 +165,8 @@ impl Hops {
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
-    /// With a way back, those of each hop's worse direction, the way back divided by r.
+    /// For traffic in both directions, each is the smaller one of the SIR toward Rx and the SIR toward Tx divided by
+    /// r.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -179,7 +187,7 @@ impl Hops {
         cfg!(feature = "reverse") && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the smaller SIR of both hops with the relay at `at`: the paper's local SIR.
+    /// Returns the SIR of the worse of both hops with the relay at `at`: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
@@ -195,7 +203,7 @@ impl Hops {
     }
 }
 
-/// Search in progress for a relay's best position between its two neighbours.
+/// Search for a relay's best position between its two neighbours, which is continued in steps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalSearch {
     how: Local,
@@ -215,6 +223,8 @@ pub struct LocalSearch {
     found: Option<Placement>,
     /// Linear SIR of the worse hop at the position found, or at the current position if none is better.
     best_sir: f32,
+    /// Number of evaluations at the current altitude, counted for traffic in both directions only.
+    evaluations: u16,
 }
 
 impl LocalSearch {
@@ -239,11 +249,12 @@ impl LocalSearch {
             best_row: (at.altitude_m.max(low_m).min(high_m), -1.0),
             found: None,
             best_sir: hops.worse(at),
+            evaluations: 0,
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus one row. A row has 24 evaluations, for
-    /// both directions 106.
+    /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. An altitude
+    /// takes 24 evaluations, for traffic in both directions 194.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -264,10 +275,14 @@ impl LocalSearch {
     /// Records `at` as the best position if it is allowed and better than all before. Returns the SIR of its worse
     /// hop, or -1 if it is not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
+        self.record(at, self.hops.worse(at))
+    }
+
+    /// Records `at`, whose worse hop has the SIR `sir`, as [`weigh`](Self::weigh) does.
+    fn record(&mut self, at: Placement, sir: f32) -> f32 {
         if !self.hops.is_clear(at) {
             return -1.0;
         }
-        let sir = self.hops.worse(at);
         if sir > self.best_sir {
             self.best_sir = sir;
             self.found = Some(at);
@@ -281,8 +296,8 @@ impl LocalSearch {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the next altitude from coarse to fine. Returns the number of evaluations, `None` after the last
-    /// round.
+    /// Searches the next altitude of the search from coarse to fine. Returns the number of evaluations that this
+    /// took, or `None` after the last round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;
@@ -296,6 +311,7 @@ impl LocalSearch {
         if self.round >= ROUNDS {
             return None;
         }
+        self.evaluations = 0;
         let part = f32::from(self.row) / f32::from(ROWS - 1);
         let altitude_m = self.altitude(part);
         let sir = self.crossing(altitude_m);
@@ -304,7 +320,7 @@ impl LocalSearch {
         }
         self.row += 1;
         Some(if self.hops.is_both_ways() {
-            2 * (2 * u16::from(HALVINGS) + u16::from(SAMPLES) + 1)
+            self.evaluations.max(1)
         } else {
             u16::from(HALVINGS) + 4
         })
@@ -344,37 +360,65 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Searches `low` to `high` of a row with a way back for the largest worse SIR, which it returns.
+    /// Returns the best SIR of the worse hop for x in `low` to `high`, for traffic in both directions.
     ///
-    /// The best of even samples is improved by steps that halve. It is the maximum if there is one maximum around that sample.
+    /// The best of evenly spaced x is improved by steps that halve. A maximum where the SIRs of both hops are equal may
+    /// be narrower than the spacing, so the first two such x are searched by bisection.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
             return -1.0;
         }
+        let place = |x_m: f32| Placement::on_line(x_m.max(low).min(high), altitude_m);
         let (mut best, mut top) = (-1.0, low);
-        let mut try_at = |search: &mut Self, x_m: f32| {
-            let x_m = x_m.max(low).min(high);
-            let sir = search.weigh(Placement::on_line(x_m, altitude_m));
+        let mut crossings = [None; 2];
+        let mut before = None;
+        for at in 0..=SAMPLES {
+            let x_m = low + step * f32::from(at);
+            let (incoming, outgoing) = self.hops.both(place(x_m));
+            let sir = self.record(place(x_m), incoming.min(outgoing));
             if sir > best {
                 (best, top) = (sir, x_m);
             }
-            top
-        };
-        let mut from = low;
-        for at in 0..=SAMPLES {
-            from = try_at(self, low + step * f32::from(at));
+            let sign = incoming > outgoing;
+            if before.is_some_and(|before| before != sign)
+                && let Some(crossing) = crossings.iter_mut().find(|one| one.is_none())
+            {
+                *crossing = Some((x_m - step, x_m, sign));
+            }
+            before = Some(sign);
         }
         for _ in 0..HALVINGS {
             step *= 0.5;
-            _ = try_at(self, from - step);
-            from = try_at(self, from + step);
+            let from = top;
+            for x_m in [from - step, from + step] {
+                let sir = self.weigh(place(x_m));
+                if sir > best {
+                    (best, top) = (sir, x_m);
+                }
+            }
+        }
+        self.evaluations += u16::from(SAMPLES) + 1 + 2 * u16::from(HALVINGS);
+        for (mut left, mut right, sign) in crossings.into_iter().flatten() {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (left + right);
+                let (incoming, outgoing) = self.hops.both(place(middle));
+                if (incoming > outgoing) == sign {
+                    right = middle;
+                } else {
+                    left = middle;
+                }
+            }
+            best = best
+                .max(self.weigh(place(left)))
+                .max(self.weigh(place(right)));
+            self.evaluations += u16::from(HALVINGS) + 2;
         }
         best
     }
 
-    /// Evaluates the next point of the grid, altitudes first. Returns the number of evaluations, 1, or `None` after
-    /// the last point.
+    /// Evaluates the next position of the grid; altitudes vary first. Returns the number of evaluations, 1, or `None`
+    /// after the last position.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;
@@ -402,8 +446,8 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns a search by a relay at `altitude_m`, between two relays at `beside_m`, 100 m apart. `apart_m` is the
-    /// minimum separation, and `band` the allowed altitudes, m.
+    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. The relay is at `altitude_m`,
+    /// the neighbours are at `beside_m`. `apart_m` is the minimum separation, and `band` the allowed altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

@@ -22,11 +22,12 @@ use crate::place::Station;
 use crate::root::sqrt_in_place;
 use crate::sir::{Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx. Only for traffic in both directions.
+/// Maximum number of positions at which the last relay tries to receive Rx well enough. Only for traffic in both
+/// directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of field points evaluated per call. It limits the number of targets in a call, which is at least
-/// one.
+/// Maximum number of points of an interference field that are evaluated per call. It limits the number of targets per
+/// call, which is at least one.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Previous relay in a pass along the chain, as described in its message.
@@ -41,7 +42,7 @@ pub struct Behind {
 }
 
 impl Behind {
-    /// Returns a previous relay above the line (y = 0) that uses the mission's interference field.
+    /// Returns a previous relay with this altitude and power, at y = 0 and without measured interference.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -50,29 +51,29 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all that determines its *reach* for a target SIR. The reach is the farthest
-/// x, in the direction of the pass, that meets the target.
+/// Relay in a pass along the chain, with all data from which its *reach* is computed. The reach for a target SIR is
+/// the farthest x, in the direction of the pass, that meets the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission of the chain.
     pub mission: &'a Mission,
     /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
-    /// Index of the relay in the chain, 1 next to Tx.
+    /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
     pub index: u16,
     /// Lateral offset, altitude and power of the relay.
     pub own: Station,
     /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the mission's interference field.
     pub measured_per_w: Option<f32>,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of it for the sake of the next one.
+    /// of that x for the sake of the next relay.
     pub plain: bool,
-    /// Maximum x of the relay, m, that leaves later relays their separation, by the joint method. `None` with other
-    /// methods.
+    /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
+    /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
 }
 
-/// Returns the x at which a pass starts, once for every target, m. It is the x of Tx, or of Rx in an interference
+/// Returns the x at which a pass starts, repeated for every target, m. It is the x of Tx, or of Rx in an interference
 /// field.
 pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
@@ -125,9 +126,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Continues [`extend`](Self::extend) by as many reaches as one call may compute. It returns true once all are
-    /// computed. Bounded by 16 reaches (farthest x for a target); in an interference field by 128 of its points, or
-    /// by one target.
+    /// Continues [`extend`](Self::extend) within the work of one call; returns true once all are computed. The limit
+    /// is 16 reaches (farthest x for a target); in an interference field 128 of its points, or one target.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -180,16 +180,16 @@ impl<'a> Link<'a> {
         }))
     }
 
-    /// Returns the maximum x of the previous relay in a pass toward Tx, m. Later relays toward Rx need no separation
-    /// in x.
+    /// Returns the maximum x of the previous relay in a pass toward Tx, m.
     ///
-    /// Relays may be above each other if their altitudes allow that.
+    /// No separation in x is reserved for the relays toward Rx, since relays may be above each other if their
+    /// altitudes allow that.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay that starts closest to Tx, for a receiver from `low` to `high`, m. In a plain
-    /// pass the receiver is at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop from this relay that lets it take the smallest x. The hop's receiver is at x from `low` to
+    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -264,8 +264,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m`, m, at which this relay receives the previous one. `from_m` is the
-    /// farthest x of the previous relay. `None` if there is none.
+    /// Returns the largest x up to `most_m`, m, at which this relay receives the previous one. The previous relay may
+    /// be anywhere up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -273,8 +273,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns [`Link::ending`], the chain's slack and this last relay's x, for traffic in both directions. `hop`
-    /// leads from Rx to this relay, and `slack` returns the slack toward Rx for an x of this relay.
+    /// Returns the chain's spare length and this last relay's x, m, for traffic in both directions. `hop` leads from
+    /// Rx to this relay, and `slack` returns the spare length toward Rx for an x of this relay. The relay stays short
+    /// of `reach` if it otherwise receives Rx too weakly.
     fn held(
         &self,
         hop: &FromRx,
@@ -307,9 +308,9 @@ impl<'a> Link<'a> {
 
     /// Returns the x that the previous relay must take to meet `target` if this relay is at x = `place`.
     ///
-    /// `from_m` is the farthest x of the previous relay. `None` if it has no such position: the search takes its
-    /// possible positions for an interval, which may have holes. Bounded by two reaches, in an interference field by
-    /// three for each of its points.
+    /// `from_m` is the farthest x of the previous relay. `None` if the previous relay has no such position. The
+    /// search assumes that its possible positions are an interval, although there may be holes. Bounded by two
+    /// reaches, in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -322,6 +323,8 @@ impl<'a> Link<'a> {
         match self.onward()? {
             Onward::Rx(hop) => hop.required_position(target, from_m, place),
             Onward::Tx(hop) => {
+                // Without the feature `field` the compiler removes this branch here.
+                self.mission.field()?;
                 let heard_m = hop.heard_up_to(target, place);
                 let Some(behind) = self.behind else {
                     let is_met = heard_m >= self.mission.config().distance_m;
@@ -370,8 +373,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a pass of target SIRs (a sweep) at its last relay, `link`. `reaches` are that relay's
-/// farthest x for each target, and `from` those of the previous relay, m.
+/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are that
+/// relay's farthest x for each target, and `from` those of the previous relay, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -387,8 +390,8 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// chain's spare length, below 0 if the target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the target that the relays are to use; `None` if the search goes on. It is an index in the ladder
-    /// (list of targets). After a commit every relay takes its position for that target.
+    /// Index of the target that the relays are to use; `None` if the search goes on. It is an index in the pass's
+    /// list of targets (ladder). The relays then take their positions for that target.
     pub commit: Option<u8>,
     /// Slack (spare length) of the chain for each target that every hop can meet, m. It is 0 or more if the chain
     /// meets the target.
@@ -396,10 +399,10 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result of a sweep of `ladder`, whose `targets` have these `slacks`. The ladder is a list of target
-    /// SIRs. A slack is the chain's spare length. A target is committed if the next higher one is known to be
-    /// infeasible and within the mission's tolerance, or if the ladder has no other target: the step of the paper's
-    /// Algorithm 1.
+    /// Returns the result of a pass of `ladder`. `slacks` are the chain's spare lengths for its `targets`.
+    ///
+    /// A target is committed if the next higher one is missed and is within the mission's tolerance of it, or if the
+    /// ladder has no other target: the step of the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -426,7 +429,7 @@ impl Verdict {
     }
 }
 
-/// Returns the index of the highest target that is met (slack of 0 or more), plus one; 0 if none is. If every relay
+/// Returns the number of targets up to the highest one that is met (slack of 0 or more); 0 if none is. If every relay
 /// has the same altitude, all lower targets are met too. In a varying field, and with different altitudes, some may
 /// be missed, and the highest one still counts.
 pub(crate) fn met(slacks: &[f32]) -> usize {
@@ -436,7 +439,7 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
         .map_or(0, |last| last + 1)
 }
 
-/// Whole chain for one target, computed without messages.
+/// Computation of a whole chain for one target, in one program and without messages.
 ///
 /// It computes each relay's reach (farthest x that meets the target) from the leader to the last relay, and then the
 /// required positions in the opposite order.
@@ -461,9 +464,9 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes all relays' reaches; returns the chain's slack (spare length) and the last x, m. That is the x of the
-    /// last relay. A reach is the farthest x that meets the target; `visit` gets it with the relay's index. `None` if
-    /// a hop cannot meet the target.
+    /// Computes the reach (farthest x that meets the target) of every relay. Calls `visit` with each relay's index
+    /// and reach, m. Returns the chain's spare length and the x of the last relay, m; `None` if a hop cannot meet the
+    /// target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();
@@ -479,8 +482,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns true if the chain meets its target. Either every relay can take the farthest x that meets the target,
-    /// or all relays can take the x that the next one requires.
+    /// Returns true if the chain meets its target. This is so if every relay can take the farthest x that meets the
+    /// target, or the x that the next relay requires of it.
     pub(crate) fn is_met(&self) -> bool {
         let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
         closes(self)
@@ -490,8 +493,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             }) || self.place(0).is_some())
     }
 
-    /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. For the
-    /// index 0 it returns the x of some relay.
+    /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. The index 0
+    /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = Self {
             plain: true,
@@ -518,8 +521,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the farthest x of relay `index` that meets the target, m. For `None` it is the x at which the pass
-    /// starts. The result is `None` if a hop cannot meet the target.
+    /// Returns the farthest x of relay `index` that meets the target, m. For the index `None` it is the x at which
+    /// the pass starts. The result is `None` if a hop cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let mut from_m = origin(self.mission);
         let Some(index) = index else {
@@ -535,8 +538,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Returns the x of relay `index`, m; `None` if a relay cannot take its required position. For an index that no
-    /// relay has, it returns some x.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
+    /// to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     pub(crate) fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

@@ -10,8 +10,8 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target SIR that the whole chain meets: a list of targets (ladder), and an index in it. The list is that of the
-/// last pass along the chain.
+/// Target SIR on which the chain has agreed, with the list of targets (ladder) that contained it. The ladder is that
+/// of the last pass along the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
@@ -24,16 +24,17 @@ pub struct Agreed {
     /// Upper bound: a SIR that no chain at these altitudes has, linear. `None` with the paper's fixed step, which
     /// excludes some chains.
     pub most: Option<f32>,
-    /// Number of sweeps along the chain that the search took.
+    /// Number of passes along the chain (sweeps) that the search took.
     pub sweeps: u32,
 }
 
-/// Solver of a chain without messages, a few hops at a time. Its size does not depend on N.
+/// Solver for a whole chain in one program, without messages. It computes a few hops per call. Its size does not
+/// depend on N.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
     reaches: PerTarget,
-    /// Farthest x of the current relay for each target, m, as far as they are computed.
+    /// Farthest x of the current relay for each target, m; the list grows from call to call.
     next: PerTarget,
     index: u16,
     behind: Option<Behind>,

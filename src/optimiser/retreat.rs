@@ -44,19 +44,21 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// Bisection steps between the positions that are best for either direction.
+/// Number of bisection steps for the receiver's x with traffic in both directions. The first interval is from the
+/// best x for forward traffic to the best x for backward traffic.
 const HALVINGS: u8 = 6;
 
-/// Relative rounding error of a hop at the limit of its target.
+/// Relative rounding error that is allowed to the length of a hop at the limit of its target.
 const ROUNDING: f32 = 4e-6;
 
-/// Maximum rounding error of a root, in steps of an f32.
+/// Number of f32 steps by which a computed root is moved, at most, until the hop meets its target.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in an interference field, prepared for many targets. The position of its receiver is known.
+/// Hop toward Rx in an interference field, from which a pass toward Tx computes the sender's x. It is prepared for
+/// many targets; the position of its receiver is known.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A of the hop, m^2, for the field's largest Upsilon = E[1/I]. For the hop to Rx it is that with the
+    /// Gain A of the hop, m^2. It is that with the field's largest Upsilon = E[1/I], or, for the hop to Rx, with
     /// Upsilon at Rx.
     gain: f32,
     /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
@@ -65,12 +67,15 @@ pub struct Retreat<'a> {
     /// Smallest x that the hop's sender may take, m.
     end_m: f32,
     to_rx: bool,
-    /// Gain A' / Upsilon on the way back, and interference at the sender; `None` for one direction.
+    /// Backward hop from the receiver to the sender; `None` for traffic in one direction. It has the gain for the
+    /// field's largest Upsilon, over r, the required ratio of backward to forward SIR, and the interference at the
+    /// sender.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
 impl<'a> Retreat<'a> {
-    /// Returns the hop from relay `index`, `own`, to a relay at `altitude_m`, m; `None` stands for Rx.
+    /// Returns the hop from relay `index` to a relay at `altitude_m`, m, or to Rx if that is `None`. `own` has the
+    /// altitude and power of relay `index`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb = own.cross_section.altitude_m - altitude_m.unwrap_or(0.0);
         Self {
@@ -90,9 +95,10 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns this hop for a mission with a way back.
+    /// Returns this hop together with the backward hop, if the mission has traffic in both directions.
     ///
-    /// The receiver sends with `power_w`, or is Rx if that is `None`. The sender has measured `measured_per_w`.
+    /// The backward hop is sent with `power_w`, or by Rx if that is `None`. Its receiver, the sender of this hop, has
+    /// measured Upsilon = `measured_per_w`.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,
@@ -121,7 +127,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns this hop without reserving a separation for the relays between `index` and Tx.
+    /// Returns this hop with a sender that may be at any x down to Tx. No separation is reserved for the relays
+    /// between `index` and Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -129,7 +136,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the receiver's smallest x, m, that leaves the sender its minimum step.
+    /// Returns the smallest x of the receiver, m: the minimum step beyond the sender's smallest x.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -151,9 +158,11 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the first x from `place` on at which the sender hears the receiver at `from_m`.
+    /// Returns the first x from `place` on at which this hop's sender receives the backward hop, m. The backward hop
+    /// is sent from `from_m`. `None` if there is no such x.
     ///
-    /// `c` is A' / gamma without Upsilon. At most one root for each field point in between.
+    /// `c` is the gain over the target for the field's largest Upsilon. At most one root for each field point in
+    /// between.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(&self, c: f32, heard: HopInterference<'_>, place: f32, from_m: f32) -> Option<f32> {
         let apart = self.climb_squared;
@@ -203,7 +212,8 @@ impl<'a> Retreat<'a> {
         is_met(start, level).then(|| hop(start)).flatten()
     }
 
-    /// Returns the largest x of the receiver that the sender at `place` hears on the way back, m.
+    /// Returns the largest x of the receiver, m, at which its backward hop meets `target`. The backward hop is
+    /// received by the sender, at `place`. Infinite for traffic in one direction.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;
@@ -216,7 +226,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns [`Retreat::reach`] on the way there.
+    /// Returns the x of [`Retreat::reach`] for the traffic toward Rx only.
     fn onward(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {
@@ -244,8 +254,8 @@ impl<'a> Retreat<'a> {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop for `target` that starts closest to Tx, for a receiver from `low` to `high`, m. `None`
-    /// if there is none.
+    /// Returns the hop with the smallest x of its sender that meets `target`, or `None`. The x of its receiver is
+    /// from `low` to `high`, m.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -284,7 +294,7 @@ impl<'a> Retreat<'a> {
         best
     }
 
-    /// Returns [`Retreat::longest`] on the way there.
+    /// Returns the hop of [`Retreat::longest`] for the traffic toward Rx only.
     pub(super) fn longest_there(
         &self,
         interference: HopInterference<'_>,
@@ -311,18 +321,18 @@ pub struct Step {
     pub from_m: f32,
 }
 
-/// Interference at one end of a hop, as a function of the receiver's position.
+/// Interference at the receiver of a hop, as a function of its x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
-    /// Same at every position: the receiver's measured Upsilon = E[1/I] over the field's largest.
+    /// Same interference at every x, as measured: Upsilon = E[1/I] over the field's largest.
     Evenly(f32),
     /// Interference field of the mission, with receiver noise.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference as the receiver measured it: Upsilon = E[1/I], 1/W. For `None` it is that of the
-    /// mission's field. Both include the receiver noise.
+    /// Returns the interference that a receiver has measured: `measured_per_w`, Upsilon = E[1/I], 1/W. For `None` it
+    /// is the mission's interference field. Both include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -340,8 +350,8 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equal ones it has the
-/// smallest receiver's x.
+/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equal hops it is the
+/// one with the smallest x of the receiver.
 ///
 /// `value` returns the sender's x for the receiver's x, y, and `quiet`, the ratio of Upsilon = E[1/I] at y to the
 /// field's largest. It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the

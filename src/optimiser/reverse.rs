@@ -73,16 +73,16 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use crate::sir::{Sender, in_noise, square, transmitter_gain};
 
-/// Maximum squared length of a hop, m^2, so that no term is infinite.
+/// Maximum squared length of a hop in the computation, m^2, which prevents infinite numbers.
 const MOST_SQUARED: f32 = 1e18;
 
-/// Hop in the direction from Rx to Tx, for the traffic that goes back; its length is not fixed.
+/// Backward hop, for the traffic from Rx to Tx, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Gain A' of the backward hop over r; for Tx `K_tx` / r, m^2. r is the required ratio of backward to forward
-    /// SIR.
+    /// Gain A' of the backward hop over r; for a hop to Tx `K_tx` / r, m^2. r is the required ratio of backward to
+    /// forward SIR.
     gain: f32,
-    /// True if Tx receives this hop, false if a relay does.
+    /// True if Tx is the receiver of this hop, false if a relay is.
     to_tx: bool,
     /// Position X of the interferer along x, m.
     interferer_x_m: f32,
@@ -121,8 +121,8 @@ impl Back {
         })
     }
 
-    /// Returns the squared length, m^2, of a backward hop received at `x_m` that has the SIR r. r is the required
-    /// ratio of backward to forward SIR.
+    /// Returns SIR / r of a backward hop received at `x_m`, times its squared length, m^2. r is the required ratio of
+    /// backward to forward SIR. Divided by a target, the result is the hop's maximum squared length.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -131,15 +131,15 @@ impl Back {
         self.gain * in_noise(squared, self.noise)
     }
 
-    /// Returns the maximum length of the backward hop along x, m, if it is received at `x_m`. `across_squared`, m^2,
-    /// is its squared length across the line. `None` if no length meets the target.
+    /// Returns the maximum length of the backward hop along x, m, for its receiver at `x_m`. `across_squared` is its
+    /// squared length across the line, m^2. `None` if no length meets the target.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns the backward hop for `target` from a sender at `x_m`, without a fixed length. `across_squared`, m^2,
-    /// is its squared length across the line.
+    /// Returns the backward hop for `target` from a sender at `x_m`, as a function of its length along x.
+    /// `across_squared` is its squared length across the line, m^2.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -153,8 +153,8 @@ impl Back {
         }
     }
 
-    /// Returns the distance in x from the interferer, m, within which a receiver misses `target`. The backward hop
-    /// has the squared length `squared`, m^2. `None` if every receiver misses it.
+    /// Returns the distance along x from the interferer below which a receiver misses `target`, m. The backward hop
+    /// has the squared length `squared`, m^2. `None` if every receiver misses the target.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         let needed = target * squared / self.gain;
         let left = 1.0 - self.noise * needed;
@@ -162,7 +162,7 @@ impl Back {
     }
 }
 
-/// Hop from Rx to the last relay, for traffic in both directions.
+/// Hop from Rx to the last relay, the first one of the traffic from Rx to Tx.
 pub(super) struct FromRx {
     /// Hop from Rx in a mirrored frame: x is the distance from Rx.
     hop: Hop,
@@ -210,9 +210,9 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx well enough. The SIR has
-    /// to meet `target` for the backward direction. `None` if there is no such x. At `x_m` itself the last relay
-    /// misses the target.
+    /// Returns the largest x in [`least_m`, `x_m`] at which the last relay receives Rx well enough, m. The SIR has to
+    /// meet `target` for the backward direction. `None` if there is no such x. At `x_m` itself the last relay misses
+    /// the target.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -275,7 +275,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Returns the smallest distance at which `hop` meets its target, by a scan in fine steps.
+    /// Returns the smallest hop length at which `hop` meets its target, m, by trial in fine steps. The test compares
+    /// [`closest`] with it.
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;
         (0..=20_000_u16)
@@ -325,8 +326,8 @@ mod tests {
         assert!(found > 12, "{found}");
     }
 
-    /// Checks that the last relay moves away from a strong interferer until it receives Rx. It begins 100 m behind
-    /// the interferer, as seen from Rx.
+    /// Checks that the last relay moves back toward Tx until it receives Rx well enough. It begins at x = 650 m,
+    /// beside a strong interferer at x = 700 m; Rx is at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

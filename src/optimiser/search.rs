@@ -56,13 +56,13 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation of the best target to use the cubic one. It is a fraction of
-/// the gap between two targets.
+/// Maximum difference of cubic and linear interpolation at which the cubic one is used. It is a fraction of the gap
+/// between two targets. Both interpolate the target at which the chain's spare length is 0.
 const BEND: f32 = 0.25;
 
-/// Ratio of the bracket's widths after and before a pass, above which the pass has stalled. The bracket is the range
-/// of targets that may be the highest. The next targets are then spread evenly, and not around an interpolated
-/// optimum.
+/// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. The bracket is the
+/// range of targets that may be the highest feasible one. After a stalled pass the next targets are spread evenly
+/// over it, and not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
@@ -80,17 +80,19 @@ pub struct Search {
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the range of possible highest targets before the last pass. It is `infeasible` / `feasible`
-    /// - 1.
+    /// Relative width of the bracket before the last pass, `infeasible` / `feasible` - 1. The bracket is the range of
+    /// targets that may be the highest feasible one.
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True for plain passes, in which every relay takes the farthest x that meets the target. They are used in the
-    /// paper's schedule, and after a relay refused to stay short of its farthest x.
+    /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule
+    /// has only such passes. They are also used after a relay could not take the x, short of its farthest, that
+    /// another relay required.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
     most: Option<f32>,
-    /// Bisection of targets after a relay has refused its required position; `None` before.
+    /// Bisection for a target that all relays accept. `None` until a relay has refused the position that the next
+    /// relay requires.
     trials: Option<StandTrials>,
     /// True for a mission with traffic in both directions.
     both_ways: bool,
@@ -277,10 +279,10 @@ impl Search {
     }
 }
 
-/// Lowers two bounds of the target SIR for traffic from Rx to Tx, and returns them.
+/// Lowers the targets `start` and `met` to include the traffic from Rx to Tx, and returns both.
 ///
-/// `start` is the upper bound of the search, lowered to that of the hop received at Tx. `met` is a feasible target,
-/// lowered to one that this hop and the hop from Rx also meet.
+/// `start`, the upper bound of the search, becomes at most the maximum SIR of the backward hop to Tx. `met`, a
+/// feasible target, becomes one that this hop and the backward hop from Rx meet, too.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -301,9 +303,9 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target at which the slack (spare length) is 0, by cubic interpolation. The target is interpolated as a
-/// logarithm. The cubic passes through the four points about the sign change. `None` if the cubic and the straight
-/// line disagree: the slack jumps there, and neither root is meaningful.
+/// Returns the target at which the chain's spare length is 0, by cubic interpolation of ln(target). The cubic passes
+/// through the four points about the sign change. `None` if the cubic and the straight line disagree: the spare
+/// length jumps there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -339,18 +341,19 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 }
 
 /// Bisection for the highest target that all relays accept. A relay refuses a target if it cannot take the position
-/// that the next relay requires.
+/// that the next relay requires of it.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest target that all relays accepted, with the ladder (list of targets) to propose it again.
+    /// Highest target that all relays accepted, with the list of targets (ladder) that proposes it again. `None`
+    /// before the first.
     best: Option<(f32, Ladder)>,
     /// True once the bisection has ended, and its best target is the one to keep.
     over: bool,
 }
 
 impl Search {
-    /// Returns the target that was to be committed but that a relay refused, or `None`.
+    /// Returns the target that was to be committed but was refused by a relay; `None` if there is none.
     ///
     /// A relay refuses if it cannot take its required position. `verdict`, the result of the pass, then commits
     /// nothing, although its slacks call for a commit.
@@ -410,8 +413,8 @@ impl Search {
         Ok(())
     }
 
-    /// Selects the next target of the bisection. Once its interval is small enough, that is the best accepted target,
-    /// to be used for good.
+    /// Selects the next target of the bisection. Once the interval is small enough, it selects the best accepted
+    /// target, with which the search ends.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

@@ -83,14 +83,15 @@ use crate::sir::{Sender, in_noise, square};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// Previous relay required at its farthest x that meets the target. Also for Tx or Rx, which do not move.
+    /// Previous node required at its farthest x that meets the target. Also returned for Tx and Rx, which cannot
+    /// move.
     AtReach,
-    /// Previous relay required at this x, m, short of its farthest one.
+    /// Previous relay required at this x, m, which is short of its farthest x that meets the target.
     At(f32),
 }
 
-/// Maximum ratio of a hop's target SIR and gain. With a larger one no hop is short enough to meet the target; up to
-/// it, all terms of the computation are finite.
+/// Maximum ratio of a hop's target SIR and gain. With a larger ratio no hop is short enough to meet the target; up to
+/// it, all numbers of the computation are finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Hop toward Rx, prepared for the computation of its maximum length for many targets.
@@ -104,8 +105,8 @@ pub struct Hop {
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer across x, (Y - y)^2 + h^2, m^2.
     aside_squared: f32,
-    /// Term of the hop's equation that does not depend on the target, m^2. It is (Y - y0) (Y + y0 - 2y) + h0 (2h -
-    /// h0). The interferer is at (X, Y), the sender at (y0, h0), the receiver at (y, h).
+    /// Part of the hop's equation that depends neither on the target nor on the length, m^2. It is (Y - y0) (Y + y0 -
+    /// 2y) + h0 (2h - h0). The interferer is at (X, Y), the sender at (y0, h0), the receiver at (y, h).
     base: f32,
     /// Squared distance of receiver and sender across x, (y - y0)^2 + (h - h0)^2, m^2.
     across_squared: f32,
@@ -116,7 +117,8 @@ pub struct Hop {
     from_tx: bool,
     /// Maximum x that the hop's receiver may take, m.
     end_m: f32,
-    /// Maximum x of the receiver, and that of its sender, m. Each leaves the relays after it their separation.
+    /// Maximum x of the receiver and of the sender, m, with enough space for the relays after it. Each of those
+    /// relays needs the minimum separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,
@@ -198,7 +200,8 @@ impl Hop {
         self
     }
 
-    /// Returns this hop without a separation between the relays after `index`; its end is closer to Rx.
+    /// Returns this hop with a receiver that may be at any x up to Rx. No separation is reserved for the relays
+    /// between `index` and Rx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -284,8 +287,8 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target`, for a sender in [0, `from_m`]. `None` if there
-    /// is none.
+    /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`]. `None` if
+    /// there is none.
     ///
     /// If the receiver has a position at least the minimum step beyond `from_m`, it is [`Hop::reach`] for a sender at
     /// `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.
@@ -299,8 +302,9 @@ impl Hop {
         })
     }
 
-    /// Returns the receiver's largest x, m, for traffic in both directions and a sender in [0, `from_m`]. `back` is
-    /// the backward hop, and `place` the largest x for a sender at `from_m`.
+    /// Returns the largest x of the receiver, m, for traffic in both directions. The sender is in [0, `from_m`].
+    /// `back` is the backward hop. `place` is the largest x with the sender at `from_m`; the result is larger if a
+    /// sender farther back receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -394,10 +398,11 @@ impl Hop {
         }
     }
 
-    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if there is none.
+    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if it has no such
+    /// position.
     ///
     /// `from_m` is the sender's farthest x that meets `target`. The required position is the allowed one closest to
-    /// the receiver, which has the best SIR.
+    /// the receiver, because it has the best SIR.
     pub fn required_position(
         &self,
         target: f32,
@@ -441,10 +446,11 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target`, as a smooth function.
+    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. That makes
+    /// the result a smooth function, as the joint method requires.
     ///
-    /// There is no minimum step; `None` if there is no such x. It is less than `from_m`, the sender's x, if the
-    /// distance across the line is longer than the hop may be.
+    /// `None` if there is no such x. It is less than `from_m`, the sender's x, if the distance across the line is
+    /// longer than the hop may be.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -494,11 +500,11 @@ impl Hop {
     }
 }
 
-/// Relative rounding error of a hop's SIR at the limit of its target.
+/// Relative rounding error that is allowed to a hop's SIR at the limit of its target.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns the sum `from_m` + `d`, rounded toward `from_m`. `None` for a hop too short for an f32: two relays never
-/// share an x.
+/// Returns the sum `from_m` + `d`, rounded toward `from_m`; `None` if that equals `from_m`. Two relays must never
+/// have the same x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -514,29 +520,29 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the maximum distance along x, m, from which a relay meets `target` at Rx. The paper's `d_max`.
+/// Returns the maximum distance along x, m, from which a relay meets `target` at Rx (`d_max`).
 ///
-/// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited to D, so
-/// that it is smooth in the target for the root search.
+/// sqrt(K / gamma - y^2 - h^2), at most 1e9; `None` if even a relay right above the receiver is too weak. Not limited
+/// to D, so that it is a smooth function of the target, which the root search needs.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
 
-/// Maximum number of Newton steps in the search for the maximum hop length with noise. The steps are taken where g,
-/// the margin of the hop, is concave. Four to eight are usual; near a double root each halves the error.
+/// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual; near
+/// a double root each halves the error.
 const STEPS: u8 = 32;
 
 /// Maximum number of steps of a search by bisection, each of which at least halves the interval.
 const HALVINGS: u8 = 32;
 
-/// Number of Newton steps to the hop length at which the margin g changes its curvature. g is that of a hop with
-/// noise. The worst case is exact to an f32 after four.
+/// Number of Newton steps for the hop length at which the margin g changes its curvature. g is the margin of a hop
+/// with noise: 0 or above where the target is met. The worst case is exact to an f32 after four.
 const TURNS: u8 = 5;
 
-/// Rounding error of g, the margin of a hop with noise, relative to what the target requires. A target that is missed
-/// by at most this counts as met.
+/// Rounding error of the margin of a hop with noise, relative to what the target requires. A target that is missed by
+/// at most this counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of the hop length at which the search for the maximum length ends.
@@ -562,7 +568,7 @@ impl Hop {
         }
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, as [`Hop::reach`], with noise.
+    /// Returns the largest x at which the receiver meets `target`, m: [`Hop::reach`] for a hop with noise.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;
@@ -600,7 +606,7 @@ pub(super) struct NoisyHop {
     pub(super) aside_squared: f32,
     /// Squared distance of the receiver from the sender across x, b^2, m^2.
     pub(super) across_squared: f32,
-    /// Difference of two squared distances across x, receiver to interferer less receiver to sender, m^2. It is
+    /// Difference of two squared distances across x, m^2: receiver to interferer less receiver to sender. It is
     /// computed without cancellation.
     pub(super) base: f32,
     /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2, above 0.
@@ -621,8 +627,8 @@ impl NoisyHop {
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the hop's margin g(d) at the length `d` along x, g'(d) / 2, and the rounding error of g. g is 0 or
-    /// above where the target is met. `d` is at most the limit by the SNR, m.
+    /// Returns the margin g(d) of the hop at the length `d` along x, g'(d) / 2, and g's rounding error. g is 0 or
+    /// above where the target is met. `d`, m, is at most the length at which the noise alone makes the SNR too low.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -644,7 +650,7 @@ impl NoisyHop {
     }
 
     /// Returns the distance from the interferer, m, at which the margin g changes its curvature's sign. `None` if g
-    /// is concave. g is 0 or above where the target is met.
+    /// is concave everywhere. g, the hop's margin, is 0 or above where the target is met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -659,7 +665,8 @@ impl NoisyHop {
     }
 
     /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m. `None` if there is none.
-    /// `high` is at most the limit by the SNR. Work: at most 96 evaluations of the hop, usually five.
+    /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually
+    /// five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -689,8 +696,8 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest length in [`low`, `high`] at which the hop's margin g is 0. `None` if there is none. g is
-    /// concave there, and below 0 at `high`, but for rounding.
+    /// Returns the largest length in [`low`, `high`], m, at which the hop's margin g is 0, or `None`. g is concave
+    /// there, and below 0 at `high`, but for rounding.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -713,7 +720,7 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the length in [`low`, `high`] at which the hop's margin g is 0. g is convex there, not negative at
+    /// Returns the length in [`low`, `high`], m, at which the hop's margin g is 0. g is convex there, not negative at
     /// `low`, and negative at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);

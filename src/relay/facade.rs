@@ -80,21 +80,22 @@ use crate::wire::upload::{Upload, UploadError};
 pub struct Relay {
     pub(super) node: Node,
     pub(super) endpoint: Endpoint,
-    /// Deframers of the upstream or shared port, and of the downstream port.
+    /// Deframers, one for each port. The first is for the upstream port or the shared channel, the second for the
+    /// downstream port.
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
 }
 
 impl Relay {
-    /// Creates a relay that is switched on at `now`.
+    /// Creates a relay that starts at `now`.
     ///
-    /// The leader starts the first search for positions by itself. It is relay 1, or relay N in a mission with an
-    /// interference field.
+    /// The leader starts the first search for positions by itself. The leader is relay 1, or relay N in a mission
+    /// with an interference field.
     ///
-    /// `seed` must differ between boards, even if their image and configuration are the same, and should differ between starts:
-    /// use a chip's unique number, a random number generator, or the noise of RAM after power-up. It lets two relays with the
-    /// same index distinguish each other, so that at most one has a setpoint. It also affects retransmission timing, sweep
-    /// numbers and the frames that a guard considers old, but no position.
+    /// `seed` must differ between boards, even if their image and configuration are the same, and should differ
+    /// between starts: use a chip's unique number, a random number generator, or the noise of RAM after power-up. It
+    /// lets two relays with the same index distinguish each other, so that at most one has a setpoint. It also
+    /// affects retransmission timing, sweep numbers and the frames that a guard considers old, but no position.
     ///
     /// # Errors
     /// Returns a [`SetupError`] that names the invalid part of `identity` or `settings`.
@@ -111,7 +112,7 @@ impl Relay {
         Ok(relay)
     }
 
-    /// Creates a relay as [`new`](Self::new) does, but in `slot`, so that the stack need not hold it.
+    /// Creates a relay as [`new`](Self::new) does, but directly in `slot`, so that it takes no stack.
     ///
     /// # Errors
     /// Returns the errors of [`new`](Self::new); `slot` is then unchanged.
@@ -158,11 +159,12 @@ impl Relay {
         self.node.begin(identity, seed, now);
     }
 
-    /// Processes bytes received at `port`, in pieces of any length. Bytes at a port that `Settings::wiring` lacks are dropped.
+    /// Processes bytes received at `port`, in pieces of any length. Bytes at a port that does not exist with this
+    /// `Settings::wiring` are dropped.
     ///
-    /// Takes a dozen instructions per byte, and a CRC for at most one frame per 16 bytes. For at most one message per 19 bytes it
-    /// computes positions for 16 target SIRs, and checks a tag if frames are signed. Longer work is left to
-    /// [`handle_timeout`](Self::handle_timeout).
+    /// Takes a dozen instructions per byte, and a CRC for at most one frame per 16 bytes. For at most one message per
+    /// 19 bytes it computes positions for 16 target SIRs, and checks a tag if frames are signed. Longer work is left
+    /// to [`handle_timeout`](Self::handle_timeout).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -197,10 +199,10 @@ impl Relay {
         }
     }
 
-    /// Handles timers that have expired by `now`, and one portion of a computation.
+    /// Handles timers that have expired by `now`, and does one step of a long computation.
     ///
-    /// The portion is bounded: 256 positions of relays while the leader predicts the result, the hops of 10 to 40 relays in the
-    /// joint method, 624 positions in Algorithm 2. Without a computation the call takes almost no time.
+    /// The step is bounded: 256 positions of relays while the leader predicts the result, the hops of 10 to 40 relays
+    /// in the joint method, 624 positions in Algorithm 2. Without a computation the call takes almost no time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -219,10 +221,11 @@ impl Relay {
         self.node.handle_timeout(self.clock.advance(now));
     }
 
-    /// Restarts the placement method from its beginning. A closed loop calls it after measuring the actual position.
+    /// Restarts the placement method from its beginning. Better positions can result once the relays have measured
+    /// the interference at the present ones.
     ///
-    /// Only the leader restarts; at other relays the call has no effect. The leader is relay 1, or relay N in a mission with an
-    /// interference field.
+    /// Only the leader restarts; at other relays the call has no effect. The leader is relay 1, or relay N in a
+    /// mission with an interference field.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -237,9 +240,10 @@ impl Relay {
         self.node.restart(self.clock.advance(now));
     }
 
-    /// Writes the next frame to send into `frame`, if there is one. Call it until it returns `None`.
+    /// Writes the next frame to send into `frame`, and returns its port and length. Call it until it returns `None`.
     ///
-    /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted); the pending frames follow once it is.
+    /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted); the pending frames follow once it
+    /// is.
     ///
     /// The work is linear in the frame's length, plus a tag if frames are signed.
     ///
@@ -298,7 +302,8 @@ impl Relay {
         self.node.poll_event()
     }
 
-    /// Returns the latest time of the next [`Relay::handle_timeout`] call. After that call it is `None` or later than `now`.
+    /// Returns the latest time for the next call of [`Relay::handle_timeout`]; `None` if no timer runs. After that
+    /// call the time is later than `now`, or `None`.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -315,10 +320,11 @@ impl Relay {
 }
 
 impl Relay {
-    /// Returns the votes on views (acceptor state) to store now, if they differ from the stored ones.
+    /// Returns the votes on views (acceptor state) if they have changed and must be stored; else `None`.
     ///
-    /// [`poll_transmit`](Self::poll_transmit) returns no frame until they are confirmed: a restarted relay that has forgotten
-    /// what it sent could vote twice, and the chain could split. Takes constant time.
+    /// [`poll_transmit`](Self::poll_transmit) returns no frame until the firmware has confirmed by
+    /// [`persisted`](Self::persisted) that they are stored. A relay that forgot its votes in a restart could vote
+    /// twice, and the chain could split. Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -336,9 +342,9 @@ impl Relay {
         self.node.unpersisted()
     }
 
-    /// Returns the present votes on views (acceptor state), stored or not.
+    /// Returns the current votes on views (acceptor state), whether they are stored or not.
     ///
-    /// A firmware may store them at the start, so that a failure of the storage shows before flight. Takes constant
+    /// A firmware may store them at the start, so that a fault of the storage shows before flight. Takes constant
     /// time.
     pub const fn view_record(&self) -> ViewRecord {
         self.node.view_record()
@@ -346,13 +352,14 @@ impl Relay {
 
     /// Confirms that `record`, returned by [`unpersisted`](Self::unpersisted), is stored. Takes constant time.
     ///
-    /// A firmware without storage confirms each record at once; its relay must then stay off for the rest of the
-    /// flight after a reboot. If the relay has a newer record meanwhile, `unpersisted` returns that one.
+    /// A firmware without storage confirms each record at once; after a reboot its relay must then stay off for the
+    /// rest of the flight. If the votes have changed meanwhile, `unpersisted` returns the newer record.
     pub const fn persisted(&mut self, record: &ViewRecord) {
         self.node.persisted(record);
     }
 
-    /// Passes a record that is not stored to `store`, and confirms it if that returns true.
+    /// Passes the votes on views to `store` if they are not stored yet. Confirms them as stored if `store` returns
+    /// true.
     ///
     /// See [`unpersisted`](Self::unpersisted).
     pub fn persist(&mut self, mut store: impl FnMut(&ViewRecord) -> bool) {
@@ -363,13 +370,14 @@ impl Relay {
         }
     }
 
-    /// Restores the record that was stored before the relay was switched off in flight.
+    /// Restores the votes on views that were stored before the relay was switched off in flight.
     ///
     /// Call it right after the relay was created; only `Relay::resume` may come before. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and [`RecordError::Begun`] if the
-    /// relay has already sent, received or computed something. The relay is then unchanged.
+    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and
+    /// [`RecordError::Begun`] if the relay has already sent, received or computed something. The relay is then
+    /// unchanged.
     pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
         self.node.resume_view(self.clock.advance(now), record)
     }
@@ -377,35 +385,37 @@ impl Relay {
 
 #[cfg(feature = "upload")]
 impl Relay {
-    /// Restores `upload`, the newest one stored before the relay was switched off. It was stored on
-    /// [`Event::Uploaded`](crate::Event::Uploaded).
+    /// Restores `upload`, the newest uploaded mission stored before the relay was switched off. The firmware stored
+    /// it on [`Event::Uploaded`](crate::Event::Uploaded).
     ///
-    /// Call it right after the relay was created, before any other input. [`Relay::new`] still takes the mission that was loaded
-    /// before flight. Takes constant time.
+    /// Call it right after the relay was created, before any other input. [`Relay::new`] still takes the mission that
+    /// was loaded before flight. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Base`] if the upload was stored for another loaded mission, [`UploadError::Line`] if there is no
-    /// line on earth for it, and [`UploadError::Begun`] if the relay has already started. The relay is then unchanged.
+    /// Returns [`UploadError::Base`] if the upload replaces another loaded mission, [`UploadError::Line`] if it does
+    /// not fit the positions of Tx and Rx or the geofence, and [`UploadError::Begun`] if the relay has already
+    /// started. The relay is then unchanged.
     pub fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         self.node.resume(upload)
     }
 
-    /// Accepts a new mission that was not received over the link. The chain adopts it like any other upload. Constant time.
+    /// Accepts an uploaded mission that the firmware has received by other means than the relay's ports. The chain
+    /// adopts it like any other upload. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it is for other relays,
-    /// [`UploadError::Line`] without a line on earth for it, and [`UploadError::Old`] if the relay holds a mission that is as
-    /// new.
+    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it replaces another
+    /// loaded mission, [`UploadError::Line`] if it does not fit the positions of Tx and Rx or the geofence, and
+    /// [`UploadError::Old`] if the relay has stored a mission that is as new.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(self.clock.advance(now), upload)
     }
 
-    /// Returns the newest mission of this relay, active or not, if it was uploaded.
+    /// Returns the newest mission that was uploaded to this relay, active or not; `None` without an upload.
     pub fn upload(&self) -> Option<&Upload> {
         self.node.upload()
     }
 
-    /// Returns the version of the active mission: 0 for the one that was loaded before flight.
+    /// Returns the version of the active mission; 0 for the one that was loaded before flight.
     pub fn version(&self) -> u16 {
         self.node.member().active.version
     }
@@ -414,7 +424,8 @@ impl Relay {
 impl Relay {
     /// Returns the current setpoint in metres in the mission's frame; `None` before the first agreement.
     ///
-    /// It is the agreed position, or with `Settings::guard` a position as close to it as is safe now.
+    /// It is the agreed position. With `Settings::guard` (collision avoidance) it is the closest safe position to
+    /// that.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -428,15 +439,16 @@ impl Relay {
         self.node.setpoint()
     }
 
-    /// Returns the agreed position, before the guard (collision avoidance) limits it. `None` before the first
-    /// agreement.
+    /// Returns the agreed position, which the guard does not limit; `None` before the first agreement. The guard is
+    /// the collision avoidance.
     pub fn agreed_place(&self) -> Option<Placement> {
         self.node.agreed_place()
     }
 
-    /// Returns true unless the drone is on the wrong side of a flown neighbour along the line.
+    /// Returns false if the drone and a neighbour that flies to setpoints are in the wrong order along x.
     ///
-    /// If false, the pilot must first fly the drone to its own side of that neighbour. `Autopilot::exchange` passes the value on.
+    /// The pilot must then first fly the drone to its own side of that neighbour. `Autopilot::exchange` passes the
+    /// value on.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -450,30 +462,32 @@ impl Relay {
         !(wrong(Side::Upstream) || wrong(Side::Downstream))
     }
 
-    /// Returns why the guard (collision avoidance) holds the drone back on `side`; `None` if it does not.
+    /// Returns the reason why the guard (collision avoidance) holds the drone back on `side`; else `None`.
     ///
     /// While the drone does not fly to setpoints only [`HoldReason::Order`] is possible. `None` also without a guard.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         self.node.hold_reason(side)
     }
 
-    /// Returns the bearing from the setpoint to the next relay at `side`, or to Tx or Rx at the end.
+    /// Returns the bearing from the setpoint to the next node at `side`: a relay, or Tx or Rx.
     ///
-    /// `None` without a setpoint, and while the position of that relay is unknown. A relay sends its position only with a guard.
+    /// `None` without a setpoint, and while the position of that relay is unknown. Relays send their positions only
+    /// if they have a guard.
     pub fn bearing(&self, side: Side) -> Option<Bearing> {
         Bearing::between(self.setpoint()?, self.node.place_toward(side)?)
     }
 
-    /// Returns the linear SIR of every hop of the agreed chain. `None` before an agreement or without known interference.
+    /// Returns the target SIR that every hop of the agreed chain meets, linear. `None` before an agreement or without
+    /// known interference.
     pub fn target(&self) -> Option<f32> {
         let known = !matches!(self.mission().interference(), Interference::Unknown);
         self.node.round().target().filter(|_| known)
     }
 
-    /// Returns an upper bound of the worst hop's SIR at the current altitudes, linear; no chain reaches it.
+    /// Returns an upper bound of the worst hop's SIR for any positions at the current altitudes, linear.
     ///
-    /// The leader (the relay that starts the search) has it after Algorithm 1 or 4. `None` at other relays, and with
-    /// the paper's fixed step, which omits possible chains.
+    /// The leader (the relay that starts the search) knows it after Algorithm 1 or 4. `None` at other relays, and
+    /// with the paper's fixed step, which does not try all chains.
     pub fn bound(&self) -> Option<f32> {
         self.node.round().bound()
     }
@@ -491,9 +505,9 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive: another relay with the same index has the larger claim.
+    /// Returns true while this relay is passive, because another node has its number and a larger claim.
     ///
-    /// A passive relay has no setpoint and takes no part in the protocol. It becomes active once the other relay has
+    /// A passive relay has no setpoint and takes no part in the protocol. It becomes active once the other node has
     /// been silent for twice `Settings::dead_after`, or when [`clear_duplicate_index`](Self::clear_duplicate_index)
     /// is called.
     pub fn is_passive(&self) -> bool {
@@ -514,98 +528,101 @@ impl Relay {
         self.node.stats()
     }
 
-    /// Returns the relay's index in the agreed view: 1 (next to the transmitter) to the number of relays.
+    /// Returns the relay's index in the accepted view: 1 next to Tx, up to the number of relays.
     ///
     /// The number of relays is that of [`mission`](Self::mission).
     pub fn index(&self) -> u16 {
         self.node.member().index
     }
 
-    /// Returns the last accepted view (agreed set of members), to which all positions refer.
+    /// Returns the last accepted view (agreed members of the chain), to which all positions belong.
     pub fn view(&self) -> ViewId {
         self.node.member().view
     }
 
     /// Returns the time at which the lease of the agreement expires; `None` while there is no lease.
     ///
-    /// Until that time no other relay uses another agreement. Without a renewal the relay then requests a new view
-    /// (agreed set of members), and keeps its setpoint.
+    /// Until that time no other relay uses another agreement. If the lease is not renewed by then, the relay requests
+    /// a new view (agreed members of the chain), and keeps its setpoint.
     pub fn lease(&self) -> Option<Instant> {
         let until = self.node.lease()?;
         Some(self.clock.external(until))
     }
 
-    /// Returns the node numbers of the neighbours toward the transmitter and toward the receiver. `None` for none.
+    /// Returns the node numbers of the neighbours toward Tx and toward Rx; `None` for no neighbour.
     ///
     /// A node number is the index that a relay was configured with; no view changes it.
     pub fn neighbours(&self) -> [Option<u16>; 2] {
         self.node.neighbours()
     }
 
-    /// Returns the active mission, with the number of relays in the view.
+    /// Returns the active mission; its number of relays is that of the view (agreed members of the chain).
     pub fn mission(&self) -> &Mission {
         &self.node.member().mission
     }
 
-    /// Returns the sites of Tx and Rx of the active mission. `None` if they are the sites configured before flight.
+    /// Returns the positions of Tx and Rx in the active mission; `None` if the configured ones apply.
     ///
-    /// They define the line of all positions. Once they change, convert between latitude, longitude and positions by
-    /// the new sites.
+    /// All positions of relays are measured along the line between them. Once they change, convert positions to
+    /// latitude and longitude by the new ones.
     pub fn sites(&self) -> Option<Sites> {
         self.node.sites()
     }
 
-    /// Returns the estimate of the interference at this relay's present position, from its measurements. It is for
-    /// missions with an interference field, which varies along the line. `None` before there are enough measurements.
+    /// Returns the interference at this relay's position, as estimated from its own measurements. It is for missions
+    /// with an interference field (a known distribution along x). `None` before there are enough measurements.
     pub fn estimate(&self) -> Option<Estimate> {
         self.node.round().meter().estimate()
     }
 
-    /// Returns Upsilon = E[1/I], 1/W, of the interference power I, as this relay has measured and uses it.
+    /// Returns Upsilon = E[1/I], 1/W, of the interference power I that this relay has measured.
     ///
-    /// `None` before there are enough measurements. Until then the relay uses the mission's value.
+    /// `None` before there are enough measurements. Until then the relay uses the value of the mission's interference
+    /// field.
     pub fn measured_per_w(&self) -> Option<f32> {
         self.node.round().meter().published()
     }
 
-    /// Returns the chain's newest estimate of the interferer, and the number of the estimate.
+    /// Returns the chain's newest estimate of the interferer, with the number of the estimate.
     ///
-    /// It is the interferer of the mission until the chain has estimated one.
+    /// Until the chain has an estimate it is the interferer that the mission configures.
     pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
 
-    /// Returns the interference measured at the transmitter (upstream) or the receiver (downstream), W.
+    /// Returns the mean interference power measured at Tx (`Upstream`) or Rx (`Downstream`), W.
     ///
-    /// It is the mean without noise; `None` before a report or without [`Settings::listen`](crate::Settings::listen).
+    /// The receiver's noise is subtracted. `None` before a report, or without
+    /// [`Settings::listen`](crate::Settings::listen).
     pub fn level_w(&self, side: Side) -> Option<f32> {
         self.node.round().sensing().level_w(side)
     }
 
-    /// Returns why the last collected measurements gave no estimate of the interferer. Only the leader (the relay
-    /// that starts the search) knows it. `None` at other relays, and after a successful estimate.
+    /// Returns the reason why the last measurements gave no estimate of the interferer. `None` if they gave one, and
+    /// at other relays than the leader (the relay that starts the search).
     pub fn unfit(&self) -> Option<Unfit> {
         self.node.round().sensing().unfit()
     }
 
-    /// Returns the number of completed rounds of Algorithm 2, and the chain's linear SIR after the last.
+    /// Returns the number of completed rounds of Algorithm 2, and the linear SIR of the worst hop then.
     ///
-    /// `None` unless this relay is the leader and the algorithm runs.
+    /// `None` unless this relay is the leader and the algorithm is running.
     pub fn rounds(&self) -> Option<(u16, f32)> {
         self.node.round().rounds()
     }
 
-    /// Returns the relay's power, and the altitude that was chosen for it last.
+    /// Returns the relay's transmit power, and the altitude that was agreed on for it last.
     pub fn profile(&self) -> Profile {
         self.node.round().profile()
     }
 }
 
 impl Relay {
-    /// Processes one measurement of the interference, W or linear SIR. `Settings::measure` or `Settings::listen` must request its
-    /// kind.
+    /// Processes a measurement of the interference. Its kind must be enabled by `Settings::measure` or
+    /// `Settings::listen`.
     ///
-    /// Takes constant time. Unusable samples are counted as [`Stats::samples_rejected`](crate::Stats::samples_rejected).
+    /// Takes constant time. Unusable samples are counted as
+    /// [`Stats::samples_rejected`](crate::Stats::samples_rejected).
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -625,7 +642,8 @@ impl Relay {
 
     /// Processes the drone's position `place`, measured at time `measured_at`. Takes constant time.
     ///
-    /// A guard needs it before the first setpoint. A position that is not a number, or farther than 1e7 m, is ignored.
+    /// A guard (collision avoidance) gives no setpoint before the first position. A position that is not a number, or
+    /// farther than 1e7 m, is ignored.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -646,12 +664,12 @@ impl Relay {
             .handle_position(now, place, self.clock.internal(measured_at));
     }
 
-    /// Reports whether the drone flies to the setpoints from now on; initially true. Takes constant time.
+    /// Records if the drone flies to the setpoints from now on (`flown`); initially true. Takes constant time.
     ///
-    /// Report false while a pilot controls the drone or it is on the ground. With `Settings::guard`, a relay that is not flown
-    /// has no setpoint, and its neighbours are informed that it may be anywhere: they keep their positions toward it. When flown
-    /// again, it starts as after power-up, with the next position from [`handle_position`](Self::handle_position). A repeated
-    /// report has no effect.
+    /// Pass false while a pilot controls the drone or it is on the ground. With `Settings::guard`, the relay then has
+    /// no setpoint, and its neighbours are informed that it may be anywhere: they keep their positions toward it.
+    /// Once it is true again, the relay starts as after power-up, with the next position from
+    /// [`handle_position`](Self::handle_position). A repeated call with the same value has no effect.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -667,26 +685,28 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Passes on [`handle_control`](Self::handle_control). `flown` is true while the drone flies to setpoints.
+    /// Records if the drone flies to the setpoints (`flown`); see [`handle_control`](Self::handle_control).
     ///
-    /// Returns true if the relay has a guard (collision avoidance) that had the other state.
+    /// Returns true if that is a change for the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         self.node.handle_control(self.clock.advance(now), flown)
     }
 
-    /// Reports that lost or unflown relays on `side` have landed or were removed. See [`handle_control`](Self::handle_control).
+    /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See
+    /// [`handle_control`](Self::handle_control).
     ///
-    /// The guard no longer keeps clear of them. It keeps clear of the other relays of the view on that side until it has heard the
-    /// nearest one; if that one is lost before, clear again. Takes constant time.
+    /// The guard (collision avoidance) no longer keeps clear of them. It keeps clear of the other relays of the view
+    /// on that side until it has received the nearest one. If that one is lost before, call this again. Takes
+    /// constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }
 
-    /// Reports that another relay with the same index is gone. See
+    /// Reports that the other node with this relay's node number is gone. See
     /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
-    /// If this relay is [passive](Self::is_passive), it becomes active with a larger claim to the index. Takes
-    /// constant time.
+    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim above that of the other
+    /// node. Takes constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }

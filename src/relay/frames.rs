@@ -11,9 +11,9 @@ use crate::wire::frame::{FrameBuf, Opened};
 use crate::wire::message::Message;
 use crate::wire::session::{Checked, Session};
 
-/// Number of heartbeat requests to a silent neighbour for each handshake that requests a reply.
+/// Number of heartbeat requests to a silent neighbour after which a handshake requests a reply.
 ///
-/// The reply shows if the neighbour mistakes another node with the same index for this relay.
+/// The reply shows if the neighbour has mistaken another node with this relay's number for this relay.
 const QUESTIONS: u16 = 4;
 
 /// Handles an intact frame of this relay's network, received at `port`.
@@ -53,7 +53,7 @@ pub(super) fn receive(
     }
 }
 
-/// Handles a frame with this relay's own index as its sender.
+/// Handles a frame whose sender number is this relay's own.
 fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: &Opened<'_>) {
     if let Some(session) = endpoint.session() {
         return node.on_duplicate_index(now, session.sender(frame));
@@ -70,7 +70,7 @@ fn receive_duplicate(node: &mut Node, endpoint: &Endpoint, now: Instant, frame: 
     node.on_duplicate_index(now, sender);
 }
 
-/// Handles a frame to this relay from a neighbour or a possible neighbour.
+/// Handles a frame addressed to this relay, from a (possible) neighbour or from a ground station.
 fn receive_addressed(
     node: &mut Node,
     endpoint: &mut Endpoint,
@@ -133,7 +133,8 @@ fn decode(node: &mut Node, now: Instant, side: Side, frame: &Opened<'_>) {
     bump(counter);
 }
 
-/// Writes the next frame into `frame`, if there is one; handshakes come before messages.
+/// Writes the next frame into `frame`, and returns its destination and length. Handshakes come before messages;
+/// `None` if nothing is pending.
 pub(super) fn poll_transmit(
     node: &mut Node,
     endpoint: &mut Endpoint,
@@ -166,7 +167,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules a handshake to node `to`, if one has to be sent with `message`.
+/// Schedules a handshake to node `to` if `message` to that node makes one necessary.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0

@@ -45,30 +45,31 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of consistent measurements, relative to the variance that the operator expects. Above it the
-/// search for a faulty relay starts.
+/// Maximum variance of the measurements' errors, in units of the variance that the operator expects. With a larger
+/// variance the search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum reduction of the fit's residual by which the exclusion of one relay shows that it is faulty. It is a
-/// squared number of standard deviations.
+/// Minimum fall of the fit's residual by which the exclusion of a relay shows that it is faulty. It is a squared
+/// number of standard deviations.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual for a search for a faulty relay, and its minimum reduction by the exclusion. An error of some 15
-/// % at one position has this residual.
+/// Minimum residual of the fit to all measurements for which a faulty relay is searched. The exclusion of the faulty
+/// relay has to lower the residual by at least as much. A measurement that is wrong by some 15 % causes this
+/// residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of two fits' variances that singles out one faulty relay: second best over best. Each fit excludes
-/// one relay. With a smaller ratio the faulty relay counts as unknown.
+/// Minimum ratio that singles out one faulty relay: the second smallest variance over the smallest. Each is the
+/// variance of a fit that excludes one relay. With a smaller ratio it remains unknown which relay is faulty.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of the relative errors for measurements to count as consistent (some 1.5 dB).
+/// Maximum variance of relative errors for measurements to count as consistent; some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits of the difference below which an excluded relay's measurement fits the others again. The first is a
+/// Limits within which an excluded relay's measurement fits the others again, so that it is used. The first is a
 /// multiple of the variance, the second a squared relative difference; the larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
@@ -76,20 +77,21 @@ const AGAIN: (f64, f64) = (25.0, 0.1);
 /// any three measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions ([`Sums::count`]) to identify a faulty relay. Older ones count less.
+/// Minimum number of measured positions with which a faulty relay can be found ([`Sums::count`]). Older ones count
+/// less.
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to the weight of one. With a larger ratio that position is lost
-/// in the rounding of the sums.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. With a larger ratio the
+/// rounding of the sums hides that relay's measurement.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Normal,
-    /// Sensing pass without this node, to find out if the others' measurements are consistent.
+    /// Collection of measurements without this node. It shows if the other nodes' measurements are consistent.
     Trying(u16),
-    /// Sensing pass that tells this node that it is excluded. `false` is for the first such pass, `true` for the
-    /// second.
+    /// Collection of measurements that tells this node that it is excluded. The `bool` is false for the first of two
+    /// such collections, true for the second.
     Announcing(u16, bool),
 }
 
@@ -99,24 +101,25 @@ pub(crate) struct Trial {
     stage: Stage,
     /// Number of sensing passes (collections of measurements) until the next search may start.
     cooldown: u8,
-    /// Node whose exclusion gave the best fit to the other nodes' measurements so far.
+    /// Node whose exclusion has given the fit with the smallest variance so far.
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
-    /// Residual of the fit that excludes the node `best`, the sum of squared relative errors.
+    /// Residual of the fit without the node `best`: the sum of the squared relative errors.
     seen_best: f32,
-    /// Variance of the relative errors in the fit that excludes the node `best`, the smallest so far.
+    /// Smallest variance of the relative errors among the fits that each exclude one node. It belongs to the fit that
+    /// excludes the node `best`.
     least: f32,
-    /// Second smallest variance of the relative errors among the fits that exclude one node.
+    /// Second smallest variance of the relative errors among the fits that each exclude one node.
     second: f32,
 }
 
-/// Use of the measurements that a sensing pass collected, during the search for a faulty relay.
+/// Use of the measurements that were just collected, as the search for a faulty relay decides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Use the measurements of this sensing pass for the interference estimate.
     Review,
-    /// Use the measurements although they are inconsistent: the faulty relay is unknown.
+    /// Use the measurements although they are inconsistent, because it is unknown which relay is faulty.
     Unknown,
     /// Discard the measurements of this sensing pass, and start another sensing pass soon.
     Again,
@@ -133,7 +136,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// Node whose measurements the next sensing pass (collection of measurements) excludes, 0 for none.
+    /// Node that the next collection of measurements leaves out, 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Normal => 0,
@@ -141,8 +144,8 @@ impl Trial {
         }
     }
 
-    /// Evaluates the `sums` of a collection of measurements in the search for a faulty relay. The view has `relays`
-    /// relays, whose node numbers are within 1 to `nodes`.
+    /// Evaluates the `sums` of collected measurements in the search for a faulty relay. The chain has agreed on
+    /// `relays` members, whose node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -230,12 +233,12 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Ratio of a relay's measurement to the estimate above which the relay checks its own measurement. Such a
-/// measurement has so little weight that the leader's search would not find it, and it does not disturb the others.
+/// Ratio of a relay's measurement to the estimate, or its inverse, above which the relay checks itself. Such a
+/// measurement has so little weight in the sums that the leader's search would not find it.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd: far off the estimate and off the other relays. `expected` is
-/// the estimate there, and `others` has the sums of the other relays' measurements.
+/// Returns true if the measurement at `place` is absurd, so that the relay excludes itself. It is then far off
+/// `expected`, the current estimate there, and does not fit the other relays' measurements, whose sums are `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,
@@ -257,7 +260,7 @@ pub(crate) fn is_absurd(
 
 /// Returns true if the measurement of an excluded relay still does not fit the other relays.
 ///
-/// It is v = 1e-12 W / I at `place`, and is compared with the value e that the fit to the other relays' sums,
+/// The measurement v = 1e-12 W / I at `place` is compared with the value e that the fit to the other relays' sums,
 /// `others`, gives there. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the
 /// current estimate; it sets the measurement's weight.
 pub(crate) fn is_off(
@@ -300,10 +303,9 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than two limits. The difference is (ratio - 1 / ratio) /
-/// 2, squared.
-///
-/// The limits are a multiple of the variance `unsure`, and a fixed number.
+/// Returns true if a ratio of powers differs from 1 by more than its errors explain. The squared difference is
+/// compared with two limits: `deviations` times the variance `unsure`, and `least`. The larger limit counts. The
+/// difference is (ratio - 1 / ratio) / 2.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -312,15 +314,15 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits of the difference above which the level measured at Tx or Rx does not fit the relays'. The first is a
-/// multiple of the variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first is a multiple
+/// of the variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
 /// faulty.
 const FEWEST_FOR_ENDS: u16 = 3;
 
-/// Ratio of the level measured at Tx or Rx to the expected level, and its relative variance.
+/// Level measured at Tx or Rx over the expected level, with the relative variance of this ratio.
 #[derive(Clone, Copy, Debug)]
 struct EndLevel {
     ratio: f64,
@@ -340,9 +342,9 @@ pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Compares the levels measured at Tx and Rx with `fit`; returns which of the two do not fit.
+/// Compares the levels measured at Tx and Rx with the relays' measurements. Returns which of the two do not fit.
 ///
-/// `fit` is the fit to the relays' measurements.
+/// `fit` is the source that was fitted to the relays' measurements.
 pub(super) fn judge_ends(
     mission: &Mission,
     fit: &Fit,

@@ -30,14 +30,14 @@ pub enum InterferenceEstimate {
     /// Estimate not changed by measurements: the interference that the mission configures.
     #[default]
     Mission,
-    /// Unknown interference; the relays spread along the line to measure.
+    /// Unknown interference; the relays take this spacing along the line Tx to Rx in order to measure it.
     Unknown(Spread),
     /// Single interfering transmitter on the ground.
     Source {
         /// Estimated position and power of the interfering transmitter.
         source: Interferer,
-        /// Interference power at the ground receiver, W. 0 if it has not measured: then the source's path loss over
-        /// the ground is used.
+        /// Interference power measured at the ground receiver, W. 0 if it has not measured; its interference is then
+        /// computed from the source and the path loss over the ground.
         receiver_w: f32,
     },
 }
@@ -73,9 +73,9 @@ pub enum Spread {
     /// Spacing with all hops of the same length.
     #[default]
     Even,
-    /// First hop, from Tx, half as long as the other hops.
+    /// Spacing with the first hop, from Tx, half as long as the other hops.
     TowardTx,
-    /// Last hop, to Rx, half as long as the other hops.
+    /// Spacing with the last hop, to Rx, half as long as the other hops.
     TowardRx,
 }
 
@@ -99,52 +99,56 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Difference of a new estimate from the current one up to which it is never adopted. It is a mean square relative
-/// difference of the interference.
+/// Mean square relative change of the interference up to which a new estimate is never adopted.
 const WORTH: f64 = 1e-5;
 
-/// Difference of a new estimate from the current one above which the interference may have changed. It is a mean
-/// square relative difference of the interference.
+/// Mean square relative change of the interference up to which a new estimate is only a refinement. A refinement is
+/// adopted if it is based on more information. A larger change may mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's change to its variance for its adoption: stationary interferer.
+/// Minimum ratio of an estimate's mean square change to that due to chance, for a stationary source. With a smaller
+/// ratio the estimate is not adopted.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's change to its variance for its adoption: moving interferer.
+/// Minimum ratio of an estimate's mean square change to that due to chance, for a moving source. With a smaller ratio
+/// the estimate is not adopted.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's change to its variance for its adoption: settled chain. There is then another
-/// interferer, and the estimation starts again.
+/// Minimum ratio of an estimate's mean square change to that due to chance, in a settled chain. So large a change
+/// means another interferer, so the count of refinements starts again.
 const ANOTHER: f64 = 64.0;
 
 /// Squared relative change of the level measured at Rx that counts as a change of the interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of a moving interferer's track, over the measurements' variance. With a larger one the
-/// prediction is discarded.
+/// Maximum squared deviation of a moving interferer's track from the fit, over the fit's variance. With a larger one
+/// the track is discarded, and the interferer's position is not predicted.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum growth of the measurements' information that is worth a refined estimate, as a factor.
+/// Minimum factor by which the measurements' information must grow to be worth a refined estimate. Information is the
+/// number of measured positions, divided by the variance of a single position's error.
 const LEARNED: f64 = 1.1;
-/// Maximum number of refined estimates of a stationary interferer. The chain has then settled, and gets no new
-/// estimate without a change.
+/// Number of refined estimates of a stationary interferer after which the chain counts as settled. It then gets no
+/// new estimate unless the interference changes.
 const REFINED: u8 = 4;
 
-/// Time that drones need to fly a few metres to new positions. A moving interferer is predicted that far ahead.
+/// Time that drones need to fly a few metres to new positions. The position of a moving interferer is predicted this
+/// far ahead, plus half the interval between two collections of measurements.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Mean square relative error of measurements above which they contradict an estimated source.
+/// Mean square relative error of measurements that contradicts an estimated source. The relays then treat the
+/// interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Mean square error of measurements that contradicts the mission's interference. It is relative to the variance of
-/// one measurement.
+/// Mean square error of measurements that contradicts the mission's interference, over their variance. The relays
+/// then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
-/// Quality of the current estimate at the time of its adoption, and the track of the interferer.
+/// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information (certainty) of the measurements: number of positions over the variance of one.
+    /// Information (certainty) of the measurements: number of positions over the variance of a single one.
     information: f64,
-    /// Mean square relative error that the estimate is expected to have.
+    /// Mean square relative error that the current estimate is expected to have.
     chance: f64,
     /// Number of times that the estimate was refined for the same stationary interferer. A settled chain has the
     /// maximum; a moving interferer counts only refinements by more information.
@@ -172,8 +176,8 @@ pub(crate) struct Review {
 
 /// Decides if the measurements give a new estimate that replaces the current `estimate`.
 ///
-/// `mission` is based on the current one. `sums` has the relays' measurements, and `levels` those of transmitter and
-/// receiver. `before` is the quality of the current estimate when it was adopted.
+/// `mission` is based on the current estimate. `sums` has the relays' measurements, and `levels` those of transmitter
+/// and receiver. `before` is the quality of the current estimate when it was adopted.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -297,8 +301,8 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer at its predicted position once the drones have moved. `None` if it does not move.
-/// `heard` is the mean time of the measurements.
+/// Returns a moving interferer at its predicted position at the time when the drones have moved. `None` if it does
+/// not move. `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -321,8 +325,9 @@ fn followed(
     None
 }
 
-/// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added if it agrees with the fit. If it does not, the
-/// real path loss over the ground differs from the mission's, and `fit` is returned.
+/// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added to the relays' measurements. If the level does
+/// not agree with them, the real path loss over the ground differs from the mission's, and `fit` is returned
+/// unchanged.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -354,9 +359,9 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it. It is the mean, weighted
-/// by the variances, of the measured level and of the source's power over the ground. If the two differ too much, it
-/// is the measured level.
+/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it. It is the mean of two
+/// powers, weighted by their variances: the power measured at Rx, and the power computed for Rx from `source` and the
+/// path loss. If the two differ too much, the measured power is returned.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -453,7 +458,7 @@ impl Axis {
         }
     }
 
-    /// Predicts position and velocity `seconds` later. The variance of the velocity grows by `walk` per second, in
+    /// Advances position and velocity by `seconds`. The variance of the velocity grows by `walk` per second, in
     /// m^2/s^3.
     fn later(&mut self, seconds: f32, walk: f32) {
         self.at += seconds * self.speed;
@@ -463,8 +468,7 @@ impl Axis {
         *speed += walk * seconds;
     }
 
-    /// Updates the state with the measured position `found`, m, of variance `variance`, m^2. The state is position
-    /// and velocity.
+    /// Updates position and velocity with the measured position `found`, m, of variance `variance`, m^2.
     fn take(&mut self, found: f32, variance: f32) {
         let [at, both, speed] = self.variance;
         let sum = at + variance;
@@ -537,8 +541,8 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the last position of the interferer, and the predicted one at `then`: (x, y), m. `None` if it does not
-    /// move.
+    /// Returns the last position of the interferer, and the one predicted for `then`: (x, y), m, of each. `None` if
+    /// the interferer does not move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;

@@ -18,7 +18,7 @@ use crate::mission::{Interferer, Mission};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Unfit {
-    /// Measured positions too few or too close together to extrapolate from them.
+    /// The measured positions are too few, or too close together, to determine a source.
     Places,
     /// The measurements fit no single source on the ground.
     NoSource,
@@ -28,21 +28,23 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error in the estimated variance, as a number of positions.
+/// Weight of the operator's expected error when the variance is estimated. It counts as much as four measured
+/// positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of the positions' 2 y / D to tell the two sides of the line Tx to Rx apart.
+/// Minimum variance of 2 y / D over the measured positions. With less, they do not show on which side of the line Tx
+/// to Rx the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FoundSource {
-    /// Position and power of the source.
+    /// Estimated position and power of the source.
     pub source: Interferer,
-    /// Variance of the source's x and y, m^2.
+    /// Variances of the source's estimated x and y, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source; otherwise `source` is the closest one. `variance_m2` is 0 then.
+    /// True if the measurements fit a single source. If false, `source` is the closest one, and `variance_m2` is 0.
     pub is_one: bool,
 }
 
@@ -51,17 +53,18 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit has all four unknowns; false if the last one, the side of the line, is omitted.
+    /// True if the fit has all four unknowns. False without the last one, which tells on which side of the line the
+    /// source is.
     full_rank: bool,
 }
 
 /// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
-/// separate the unknowns. The seven digits of an f32 suffice for sums of some hundred positions.
+/// separate the unknowns. An f32 has enough digits for sums of some hundred positions.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
-    /// Factorises the fit's symmetric matrix, given by ten `products` of [`Sums`]. `None` if it cannot separate the
-    /// first three unknowns. The last unknown is omitted if its pivot is not above `least`.
+    /// Factorises the fit's symmetric matrix, given by ten `products` of [`Sums`]. `None` if the measured positions
+    /// cannot separate the first three unknowns. The last unknown is omitted if its pivot is not above `least`.
     fn new(products: [f64; 10], least: f64) -> Option<Self> {
         let [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd] = products;
         if !(aa > 0.0) {
@@ -110,14 +113,14 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the last unknown: the inverse of its variance, in units of one position's variance.
+    /// Pivot of the last unknown: one over the unknown's variance, for measurements of variance 1.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last
     }
 
-    /// Returns the variance of the fit at a position, in units of one measurement's variance. It is r^T G^-1 r, with
-    /// r the position's `terms`, and G the matrix of the fit.
+    /// Returns the variance of the fit at a position with these `terms`, for measurements of variance 1. It is r^T
+    /// G^-1 r, with r the terms, and G the matrix of the fit.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -126,7 +129,7 @@ impl Factor {
     }
 }
 
-/// Least-squares fit of the four coefficients that describe a source to the measurements.
+/// Least-squares fit of a source to the measurements: the four coefficients that describe the source.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     coefficients: [f64; 4],
@@ -139,7 +142,7 @@ pub struct Fit {
     expected: f64,
     /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
-    /// Number of measured positions beyond the number of unknowns; 0 if there are none.
+    /// Number of measured positions less the number of unknowns; 0 if that is negative.
     beyond: f64,
     count: f64,
 }
@@ -150,7 +153,7 @@ impl Fit {
     /// About 6 000 instructions on a Cortex-M4F, in software f64.
     ///
     /// # Errors
-    /// [`Unfit::Places`] if the three unknowns of the line cannot be separated.
+    /// [`Unfit::Places`] if the measured positions cannot separate the first three unknowns.
     pub fn of(sums: &Sums, relative_error: f32) -> Result<Self, Unfit> {
         let [
             aa,
@@ -244,7 +247,7 @@ impl Fit {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Information (certainty) of the measurements: number of positions over the variance of one.
+    /// Information (certainty) of the measurements: number of positions over the variance of a single one.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }
@@ -263,15 +266,15 @@ impl Fit {
         self.mean_square_difference(&self.coefficients, others)
     }
 
-    /// Returns the expected mean square relative error of the fitted interference.
+    /// Returns the mean square relative error that the fitted interference is expected to have.
     pub(crate) fn chance(&self) -> f64 {
         let unknowns = if self.factor.full_rank { 4.0 } else { 3.0 };
         unknowns * self.variance / self.count
     }
 
-    /// Returns the source of interference that fits the measurements, or the closest one.
+    /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// `side_m` selects its side of the line if the positions do not determine it.
+    /// `side_m`, a y, selects the source's side of the line Tx to Rx if the positions do not determine it.
     ///
     /// # Errors
     /// [`Unfit::NoSource`] if no source on the ground fits.
@@ -334,8 +337,8 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative error of measurements for a source with these `coefficients`. `sums` are those of
-/// the measurements.
+/// Returns the mean square relative error of measurements if a source had these `coefficients`. `sums` are the sums
+/// of the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [
         aa,
@@ -380,24 +383,24 @@ pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     move |terms| expected_v(value(&known?, terms))
 }
 
-/// Half width of the area searched for a source, in units of D / 2. It reaches D before Tx and beyond Rx, and 1.5 D
-/// to each side.
+/// Half width of the square searched for a source, in units of D / 2. The square reaches from D before Tx to D beyond
+/// Rx, and 1.5 D to each side.
 const FARTHEST: f32 = 3.0;
 
-/// Grid steps from the middle to the edge of the first grid of the search for a source.
+/// Number of grid steps from the middle to the edge of the first grid of the search for a source.
 const COARSE: i8 = 8;
 
-/// Grid steps from the middle to the edge of each finer grid of the search for a source.
+/// Number of grid steps from the middle to the edge of each finer grid of the search for a source.
 const FINE: i8 = 2;
 
 /// Number of finer grids in the search for a source. The steps of each are 0.4 times those of the previous grid.
 const FINER: u8 = 5;
 
-/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. It is searched on grids.
-/// Positions are in units of D / 2.
+/// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. They are searched on
+/// grids. Positions are in units of D / 2.
 ///
-/// The search covers the side of the line of measured positions that `sign` selects, 1 or -1; `side` is the Y' of
-/// that line. 414 positions, some 16 000 instructions on a Cortex-M4F.
+/// The search covers one side of the line of measured positions, whose Y' is `side`: larger Y' if `sign` is 1,
+/// smaller Y' if -1. 414 positions, some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

@@ -21,11 +21,11 @@ pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 pub struct Level {
     /// Mean interference, W; 0 without a measurement.
     pub power_w: f32,
-    /// Number of measurements in the mean; older ones count less.
+    /// Number of measurements in the mean; the older they are, the less they count.
     pub count: f32,
 }
 
-/// Flags of the chain's ends, Tx and Rx: true if an end's measurements do not fit those of the relays.
+/// Check of the levels measured at Tx and Rx: true for each that does not fit the relays' measurements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
@@ -42,7 +42,8 @@ impl EndsOff {
     };
 }
 
-/// Interference levels measured at Tx and Rx, and which of them did not fit the relays' before.
+/// Interference levels measured at Tx and Rx, with the result of their last check. The check compares them with the
+/// relays' measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
     pub(crate) transmitter: Level,
@@ -130,8 +131,8 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Number of sums in [`Sums`]. They are products of terms, terms times v, v squared, number of positions, number of
-/// measurements, and age.
+/// Number of sums that a pass along the chain collects. They are products of terms, terms times v, v squared, number
+/// of positions, number of measurements, and age.
 pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.
@@ -146,7 +147,7 @@ pub struct Sums {
     pub(crate) numbers: [f32; SUMS],
 }
 
-/// Limit of each sum, so that it stays finite. No measurement within 2 D of the line comes near it.
+/// Limit of each sum, which keeps it finite. Measurements within 2 D of the line Tx to Rx do not reach it.
 const MOST: f32 = 1e38;
 
 fn within(sum: f32) -> f32 {
@@ -154,13 +155,13 @@ fn within(sum: f32) -> f32 {
 }
 
 impl Sums {
-    /// Sums without any position.
+    /// Sums without any measured position.
     pub const NONE: Self = Self {
         numbers: [0.0; SUMS],
     };
 
     /// Adds a measured position with its `terms`, the measured `v` and the `expected` v, both above 0. v is 1e-12 W /
-    /// I. The position's weight is multiplied by `share`, and it stands for `measured` measurements. At most 60
+    /// I. The position's weight is multiplied by `share`. `measured` is the number of measurements there. At most 60
     /// instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
@@ -257,7 +258,7 @@ pub(crate) struct Listener {
     half_life: Duration,
     past: Sums,
     faded: Instant,
-    /// Current position of the relay, the mean of those at which it measured.
+    /// Mean of the positions at which the relay measured since it last moved.
     at: Placement,
     /// Mean interference measured at the relay's current position, in units of `UNIT_W`.
     heard: Average,
@@ -285,8 +286,8 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measured power `heard`, in units of [`UNIT_W`], above 0, at the position `at`. `expected` returns the
-    /// inverse power by the current estimate for the terms of a position.
+    /// Adds a measurement `heard` at the position `at`: a power above 0, in units of [`UNIT_W`]. `expected` returns v
+    /// = 1e-12 W / I by the current estimate for the terms of a position.
     pub(crate) fn add(
         &mut self,
         now: Instant,
@@ -318,8 +319,8 @@ impl Listener {
         })
     }
 
-    /// Returns the sums of all measurements, with weights and ages as of `now`. `expected` returns the inverse power
-    /// by the current estimate for the terms of a position.
+    /// Returns the sums of all measurements, with weights and ages as of `now`. `expected` returns v = 1e-12 W / I by
+    /// the current estimate for the terms of a position.
     pub(crate) fn sums(
         &self,
         now: Instant,
@@ -362,7 +363,7 @@ pub(crate) struct Average {
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,
-    /// Weighted mean age of the measurements at the time `last`, s.
+    /// Mean age of the measurements at the time `last`, with their weights, s.
     pub(crate) behind_s: f32,
 }
 

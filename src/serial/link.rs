@@ -9,18 +9,18 @@ use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use heapless::Deque;
 
-/// Largest number of bytes, or of failed reads, that one poll takes from one port.
+/// Maximum number of bytes, and of failed reads, that one poll takes from one port.
 #[doc(hidden)] // public because the documentation of public functions links to it
 pub const READ_LIMIT: usize = 64;
 
-/// Capacity of the transmit queue, bytes: one frame in transmission, and the next one.
+/// Capacity of the transmit queue, bytes: the frame that the port is sending, and the next one.
 const QUEUE: usize = 2 * MAX_FRAME;
 
-/// Maximum pause, in byte times, between two attempts at a port that accepts nothing.
+/// Maximum pause, in byte times, before the next attempt to write to a port that accepts nothing.
 const LONGEST_PAUSE: u32 = 128;
 
-/// Type of the driver-enable pin of a link without one. Such a link is full duplex, or a radio that switches by
-/// itself.
+/// Placeholder type of the driver-enable pin for a link without such a pin. The link is full duplex, or a radio that
+/// switches between sending and receiving by itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NoPin {}
 
@@ -38,7 +38,8 @@ impl OutputPin for NoPin {
     }
 }
 
-/// Minimum time of a byte at `baud` bit/s, rounded up to a microsecond. A byte has a start bit, 8 data bits and a stop bit.
+/// Returns the duration of a byte at `baud` bit/s, rounded up to a microsecond. A byte has a start bit, 8 data bits
+/// and a stop bit.
 ///
 /// `baud` is at least 1; 0 counts as 1.
 pub(crate) const fn byte_time(baud: u32) -> Duration {
@@ -55,14 +56,15 @@ pub(crate) const fn byte_time(baud: u32) -> Duration {
 pub struct SerialLink<P, D = NoPin> {
     port: P,
     pin: Option<D>,
-    /// Last level set at the driver-enable pin; `None` before the first and after an error.
+    /// Level at which the driver-enable pin was last set; `None` before the first time and after an error.
     level: Option<bool>,
     byte_time: Duration,
     waiting: Deque<u8, QUEUE>,
     clock: MonotonicClock,
-    /// Time at which the port last accepted a byte, or the first byte was queued.
+    /// Time at which the port last accepted a byte, or at which a byte was queued in the empty queue.
     moved_at: Instant,
-    /// Number of bytes written by the last poll. They count from the next poll, because their exact time is unknown.
+    /// Number of bytes that the last poll has written. Their transmission time is counted from the next poll on,
+    /// because the exact time of writing is unknown.
     uncounted: u32,
     /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
@@ -105,7 +107,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
-    /// Sets the driver-enable pin high, if there is one. Returns true if bytes may then be sent.
+    /// Sets the driver-enable pin high, if there is one. Returns false if that fails: bytes must then not be sent.
     fn raise(&mut self) -> bool {
         if let Some(pin) = &mut self.pin
             && self.level != Some(true)
@@ -148,7 +150,7 @@ impl<P, D> SerialLink<P, D> {
         &self.stats
     }
 
-    /// Returns the port, for functions outside of this crate such as another baud rate or an interrupt.
+    /// Returns the port, for functions of its driver, for example to set another baud rate.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
@@ -160,13 +162,13 @@ impl<P, D> SerialLink<P, D> {
 }
 
 pub(super) trait FrameLink {
-    /// Passes at most [`READ_LIMIT`] received bytes to `relay`, as bytes of `port`.
+    /// Passes at most [`READ_LIMIT`] received bytes to `relay`, which takes them as bytes from `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
     /// Returns true if one more frame of any length fits into the transmit queue.
     fn has_room(&self) -> bool;
-    /// Queues a frame for sending, or counts that it does not fit.
+    /// Queues a frame for sending. If the frame does not fit, it is dropped and counted.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame of the relay for a port that does not exist.
+    /// Counts a frame that the relay addresses to a port which this driver does not have.
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);
@@ -273,16 +275,15 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads that failed for another reason.
     pub other: u32,
-    /// Number of failed writes, and of failed queries whether the last byte has been sent. Failed writes are
-    /// repeated.
+    /// Number of failed writes, and of failed queries for the end of a transmission. Failed writes are repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,
-    /// Number of frames that did not fit into the transmit queue, because the port accepts nothing. The relay repeats
-    /// what matters.
+    /// Number of frames dropped because the transmit queue was full: the port accepts nothing. The relay retransmits
+    /// those that matter.
     pub dropped: u32,
-    /// Number of frames for a port that does not exist. The relay's [`Wiring`](crate::Wiring) does not match this
-    /// driver.
+    /// Number of frames for a port that this driver does not have. The relay's [`Wiring`](crate::Wiring) then does
+    /// not match the driver.
     pub unrouted: u32,
 }
 

@@ -162,8 +162,8 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
     }
 }
 
-/// Defines the method `poll` for the ports of one kind of wiring. A trait's method would have to be imported beside
-/// the ports.
+/// Defines the method `poll` for the ports of one kind of wiring. It is no trait method, because a firmware would
+/// have to import the trait as well.
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {

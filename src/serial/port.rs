@@ -3,7 +3,7 @@
 use embedded_hal_nb::nb;
 use embedded_hal_nb::serial::{Error as _, ErrorKind};
 
-/// Error of this relay's own serial port.
+/// Error that this relay's serial port reports, in most cases for a received byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -44,20 +44,21 @@ pub trait SerialPort {
     /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault>;
 
-    /// Accepts bytes from the front of `bytes` (never empty), and returns their number; 0 if it is full.
+    /// Takes bytes to send from the front of `bytes` (never empty), and returns their number; 0 if full.
     ///
     /// # Errors
     /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault>;
 
-    /// Returns true if the last bit of all accepted bytes has been sent; `None` if the port does not know.
+    /// Returns true if the last bit of all accepted bytes has left the port; `None` if that is unknown.
     ///
     /// # Errors
     /// [`Fault`] if the query fails; it is treated as `None`.
     fn has_left(&mut self) -> Result<Option<bool>, Fault>;
 }
 
-/// Port with [`embedded_hal_nb`] traits: one byte per call, and it reports when the last byte has left.
+/// Port for a HAL with [`embedded_hal_nb`] traits. It moves one byte per call, and can report that the last byte has
+/// left.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Nb<S>(pub S);
 

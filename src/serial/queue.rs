@@ -50,10 +50,10 @@ use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicUsize, Ordering};
 use crate::serial::port::{Fault, SerialPort};
 use crate::time::Duration;
 
-/// Returns the depth of the receive queue at `baud` bit/s, 10 bits a byte. The main loop reads at least every `longest`.
+/// Returns the necessary depth of the receive queue at `baud` bit/s, with 10 bits per byte.
 ///
-/// It is the number of bytes received meanwhile plus three: one byte more, a marker of lost bytes, and a slot that a queue never
-/// uses.
+/// It is the number of bytes received in `longest`, the maximum time between two reads of the main loop, plus three. Three are
+/// for one byte more, a marker of lost bytes, and a slot that a queue never uses.
 ///
 /// | baud | 3 ms | 10 ms | 50 ms |
 /// | --- | --- | --- | --- |
@@ -84,7 +84,8 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
     bits.div_ceil(10_000_000).saturating_add(3) as usize
 }
 
-/// Trigger of a UART's interrupt. It is a closure, or a type of the firmware if the port's type has to be named.
+/// Trigger of a UART's interrupt, so that the interrupt handler starts to send. It is a closure, or a type of the
+/// firmware if the port's type has to be named.
 pub trait Pend {
     /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);
@@ -97,10 +98,10 @@ impl<F: FnMut()> Pend for F {
 }
 
 /// Byte queues between an interrupt and the main loop, one for each direction. They hold up to `IN` - 1 received
-/// bytes, and up to `OUT` - 1 to send.
+/// bytes, and up to `OUT` - 1 bytes to send.
 ///
-/// `OUT` should hold a frame of [`MAX_FRAME`](crate::wire::frame::MAX_FRAME), so that the main loop can sleep
-/// meanwhile.
+/// `OUT` should exceed the longest frame, [`MAX_FRAME`](crate::wire::frame::MAX_FRAME), so that the main loop can
+/// sleep while the frame is sent.
 #[derive(Debug)]
 pub struct ByteQueues<const IN: usize, const OUT: usize> {
     /// Queue of received bytes or faults, encoded by [`encode`].
@@ -149,7 +150,7 @@ impl<const IN: usize, const OUT: usize> ByteQueues<IN, OUT> {
     }
 }
 
-/// Interrupt's end of the queues. Every call takes constant work per byte.
+/// Side of the queues for the interrupt handler. Every call takes constant work per byte.
 pub struct InterruptEnd<'q> {
     received: Producer<'q, AtomicU16>,
     outgoing: Consumer<'q, AtomicU8>,
@@ -167,7 +168,7 @@ impl fmt::Debug for InterruptEnd<'_> {
 }
 
 impl InterruptEnd<'_> {
-    /// Queues a received byte or a fault for the main loop.
+    /// Queues a received byte or a fault of the UART for the main loop.
     ///
     /// If the queue is full, the byte is lost and counted, and the main loop reads one [`Fault::Overrun`] in its
     /// place.
@@ -183,7 +184,7 @@ impl InterruptEnd<'_> {
         }
     }
 
-    /// Passes queued bytes to `take` until it rejects one or none is left; returns true if some are left.
+    /// Passes queued bytes to `take` until it returns false or none is left; returns true if some are left.
     ///
     /// If some are left, the interrupt for an empty data register must stay enabled; otherwise it must be disabled.
     pub fn send(&mut self, mut take: impl FnMut(u8) -> bool) -> bool {
@@ -197,7 +198,7 @@ impl InterruptEnd<'_> {
     }
 }
 
-/// Main loop's end of the queues: a [`SerialPort`] that never waits for the UART.
+/// Side of the queues for the main loop: a [`SerialPort`] that never waits for the UART.
 pub struct QueuedPort<'q, K> {
     received: Consumer<'q, AtomicU16>,
     outgoing: Producer<'q, AtomicU8>,
@@ -220,8 +221,8 @@ impl<K> QueuedPort<'_, K> {
         self.outgoing.room()
     }
 
-    /// Returns the number of received bytes that were lost because the queue was full. The main loop then has not
-    /// read for too long.
+    /// Returns the number of received bytes lost because the queue was full. The main loop then has not read the
+    /// queue often enough.
     pub fn lost(&self) -> u32 {
         self.lost.load(Ordering::Relaxed)
     }
@@ -284,8 +285,8 @@ const fn decode(code: u16) -> Result<u8, Fault> {
     }
 }
 
-/// Atomic cell of a ring, for one item. The indices of the ring synchronise access, so the cell's own ordering is
-/// relaxed.
+/// Atomic cell of a ring buffer, for one item. Its own memory ordering is relaxed, because the indices of the ring
+/// synchronise the access.
 pub(super) trait AtomicSlot {
     type Item: Copy;
 
@@ -317,8 +318,8 @@ impl AtomicSlot for AtomicU16 {
     }
 }
 
-/// Indices of a ring: its first item, and the end behind its last item. The ring is empty if they are equal, so one
-/// cell is never used.
+/// Indices of a ring buffer: its first item, and the end behind its last item. The ring is empty if they are equal,
+/// so one cell is never used.
 #[derive(Debug)]
 pub(super) struct RingIndices {
     first: AtomicUsize,
@@ -340,16 +341,16 @@ struct RingEnd<'q, P> {
     indices: &'q RingIndices,
 }
 
-/// Producer's side of a ring, which appends items.
+/// Producer's side of a ring buffer, which appends items.
 #[derive(Debug)]
 pub(super) struct Producer<'q, P>(RingEnd<'q, P>);
 
-/// Consumer's side of a ring, which takes items.
+/// Consumer's side of a ring buffer, which takes items.
 #[derive(Debug)]
 pub(super) struct Consumer<'q, P>(RingEnd<'q, P>);
 
-/// Returns the producer's and the consumer's side of a ring. The exclusive borrow of `indices` makes them the only
-/// ones.
+/// Returns the producer's and the consumer's side of a ring buffer. No other sides exist, because `indices` is
+/// borrowed exclusively.
 pub(super) fn ring_ends<'q, P>(
     slots: &'q [P],
     indices: &'q mut RingIndices,

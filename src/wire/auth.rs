@@ -9,7 +9,7 @@ use super::blake2s::mac;
 /// Length of a frame's authentication tag, bytes.
 pub const TAG: usize = 8;
 
-/// True with the feature `auth`, authentication of frames; without it no frame has a tag.
+/// True if the crate is built with the feature `auth`. Without it no frame carries an authentication tag.
 pub(crate) const AUTH: bool = cfg!(feature = "auth");
 
 /// Number of bytes reserved in a frame for an authentication tag; 0 without the feature `auth`.
@@ -91,8 +91,8 @@ impl Auth {
     }
 }
 
-/// Nonces of the sender and the receiver of a frame. The upper half is the node's epoch (start counter); the lower
-/// half counts up from a random number that the node draws at its start.
+/// Nonces of the sender and the receiver of a frame. The upper half of a nonce is the node's epoch (start counter);
+/// the lower half counts up from a random number that the node draws at its start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
@@ -128,7 +128,7 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Window of accepted frame counters of one sender, against replays: the newest and the 63 below it.
+/// Replay window of one sender: its newest accepted frame counter, and the state of the 63 below it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
@@ -139,8 +139,8 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Accepts a frame's `counter` once; false if it was accepted before or is too old to know. `u32::MAX` is never
-    /// accepted.
+    /// Accepts a frame's `counter` once. Returns false if the counter was accepted before, is below the window, or is
+    /// `u32::MAX`.
     pub(crate) const fn accept(&mut self, counter: u32) -> bool {
         let Some(next) = counter.checked_add(1) else {
             return false;

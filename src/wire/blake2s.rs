@@ -20,7 +20,8 @@ const START: [u32; 8] = [
     0x5BE0_CD19,
 ];
 
-/// Order of the message words in each round of BLAKE2s: for columns, then for diagonals, two for each.
+/// Indices of the 16 message words that each of the ten rounds of BLAKE2s uses (RFC 7693). The first eight are for
+/// the columns, the others for the diagonals.
 const ORDER: [[[u8; 8]; 2]; 10] = [
     [[0, 1, 2, 3, 4, 5, 6, 7], [8, 9, 10, 11, 12, 13, 14, 15]],
     [[14, 10, 4, 8, 9, 15, 13, 6], [1, 12, 0, 2, 11, 7, 5, 3]],
@@ -34,8 +35,8 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
     [[10, 2, 8, 4, 7, 6, 1, 5], [15, 11, 9, 14, 3, 12, 13, 0]],
 ];
 
-/// Returns the eight-byte keyed BLAKE2s digest of `first` followed by `second`, fewer than 2^32 bytes. Work: one
-/// block for the key, and one per 64 bytes.
+/// Returns the eight-byte keyed BLAKE2s digest of `first` followed by `second`. Together they have fewer than 2^32
+/// bytes. Work: one block for the key, and one per 64 bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;
@@ -138,7 +139,8 @@ mod tests {
     use blake2::digest::consts::U8;
     use blake2::digest::{FixedOutput, Mac};
 
-    /// Compares the digests with those of the crate `blake2`, for lengths up to 299 bytes and any split.
+    /// Checks that this implementation and the crate `blake2` return the same digests. The inputs have up to 299
+    /// bytes, split at any point.
     #[test]
     fn the_hash_equals_the_published_one() {
         let mut state = 1_u32;

@@ -77,9 +77,9 @@ impl Deframer {
         None
     }
 
-    /// Decodes bytes up to the end of the current COBS block or a delimiter; returns the remaining ones.
+    /// Decodes bytes up to the end of the current COBS block or a delimiter; returns the remaining bytes.
     ///
-    /// Equivalent to [`push`](Self::push) for each of them, in a quarter of the instructions.
+    /// Same effect as [`push`](Self::push) for each decoded byte, in a quarter of the instructions.
     pub fn push_run<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
         let free = self.plain.get_mut(self.len..).unwrap_or_default();
         let mut stored: u8 = 0;

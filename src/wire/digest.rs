@@ -74,8 +74,8 @@ fn add(crc: &mut Digest<'_, u32, Table<1>>, bytes: &[u8]) {
     crc.update(bytes);
 }
 
-/// Returns `digest` combined with the `sites` of an uploaded mission, or `digest` itself without sites. Missions with
-/// other sites thus have other digests.
+/// Returns `digest` combined with `sites`, the Tx and Rx positions of an uploaded mission. Missions that differ only
+/// in these positions thus have different digests. Returns `digest` itself for `None`.
 pub(crate) fn between(digest: u16, sites: Option<Sites>) -> u16 {
     let Some(sites) = sites else { return digest };
     let mut crc = CRC_32C.digest();
@@ -97,7 +97,7 @@ const fn low_half(crc: u32) -> u16 {
 pub struct MissionId {
     /// Version that the operator gave to an upload, from 1; 0 for the mission loaded before flight.
     pub version: u16,
-    /// Digest of the mission with all its relays, not only those in the current view.
+    /// Digest of the mission with all relays that it configures, not only those in the current view.
     pub digest: u16,
 }
 

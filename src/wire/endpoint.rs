@@ -19,7 +19,7 @@ pub(crate) struct Sent {
     pub(crate) len: usize,
 }
 
-/// Link end of one node: its identity, its frame counter, and its authentication sessions.
+/// Frame sender and receiver of one node: node number, frame counter, and authentication sessions.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
     network: u16,
@@ -31,7 +31,7 @@ pub(crate) struct Endpoint {
 }
 
 impl Endpoint {
-    /// Creates the link end of node `node` in the network `network`, which does not sign.
+    /// Creates the endpoint of node `node` in the network `network`. It does not sign frames.
     pub(crate) fn new(network: u16, node: u16) -> Self {
         Self {
             network,
@@ -41,8 +41,8 @@ impl Endpoint {
         }
     }
 
-    /// Authenticates all frames from now on with `auth`. Nonces count up from the claim number `claim`, drawn at
-    /// start. The session of a node that is silent for `gone_after` ends.
+    /// Signs all frames from now on with the key and epoch in `auth`. This node's nonces count up from `claim`, a
+    /// random number drawn at start. The session of a node that is silent for `gone_after` may be replaced.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
@@ -69,8 +69,8 @@ impl Endpoint {
         None
     }
 
-    /// Checks the authentication tag of `frame`; counts every result but a new valid message. `None` if this node
-    /// does not sign.
+    /// Checks the authentication tag of `frame`. Counts every result but a valid new message in `stats`. `None` if
+    /// this node does not sign.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -89,8 +89,8 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once no more frames can be sent. A signed frame counter is used once, and after four billion
-    /// frames a new epoch is due.
+    /// Returns true once a signing node has used all frame counters. It must not send any more frames until it
+    /// restarts with a new epoch, because no counter may be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }
@@ -169,7 +169,8 @@ impl Endpoint {
         }
     }
 
-    /// Returns true if node `to` can check this node's authentication tags, as far as is known.
+    /// Returns true if node `to` can check this node's authentication tags. Without authentication it always returns
+    /// false.
     pub(crate) fn knows(&self, to: u16) -> bool {
         self.session().is_some_and(|session| session.knows(to))
     }

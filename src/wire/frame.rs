@@ -47,7 +47,7 @@ pub struct Header {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FrameError {
-    /// The frame is shorter than a header and a CRC.
+    /// The frame is too short for a header and a CRC.
     Short,
     /// The CRC at the end of the frame does not match.
     Crc,
@@ -102,7 +102,8 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of the buffer for a frame's body. The first byte and the last are for COBS and the delimiter.
+/// Returns the bytes of the buffer `out` into which a frame's body is written. The first and the last byte of the
+/// buffer are kept free for the COBS code byte and the delimiter.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
@@ -164,7 +165,7 @@ pub struct Opened<'a> {
     pub handshake: bool,
 }
 
-/// Parses `plain`, a frame without COBS and delimiter.
+/// Parses `plain`, a frame without COBS and delimiter. It checks the CRC, but neither the tag nor the body.
 ///
 /// The receiver checks the addresses before it decodes the body.
 ///

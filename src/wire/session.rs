@@ -35,8 +35,8 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the lower halves of two nonces of one node in an epoch. A larger difference shows that
-/// two nodes use the same node number.
+/// Maximum difference between the lower halves of two nonces that one node uses in one epoch. A larger difference
+/// shows that two nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
 /// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. Fewer can be
@@ -46,15 +46,18 @@ const WENT_BACK: u8 = 5;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// True if a handshake to the table entry's node is to be sent.
+    /// True if a handshake to this node is due.
     handshake: bool,
-    /// True if the next handshake to the node requests a reply although the node is proven to be present.
+    /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only while
+    /// the node is unproven.
     requests_reply: bool,
-    /// True if the node has repeated this relay's nonce: it is present, and both know each other's nonce.
+    /// True if the node has repeated this relay's nonce. That proves that the node is present, and that both nodes
+    /// know each other's nonce.
     proven: bool,
-    /// Time of the entry's last use, counted in uses of the table (`Session::clock`).
+    /// Value of `Session::clock` when this entry was used last.
     used: u32,
-    /// Time of the last frame that proved the node's presence, or of its first frame with a larger nonce.
+    /// Time of the last frame that proved the node present. A handshake with a larger nonce than all before counts,
+    /// too.
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
@@ -64,8 +67,8 @@ struct Peer {
     older: OlderHandshakes,
 }
 
-/// Counter of handshakes that a node sent with an outdated nonce. It is of an older epoch, or the node restarted in
-/// the same one.
+/// Counter of consecutive handshakes that a node sent with an outdated nonce. It detects that the node's epoch went
+/// back, or that the node restarted in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,
@@ -76,8 +79,8 @@ struct OlderHandshakes {
 }
 
 impl OlderHandshakes {
-    /// Counts a handshake of an older epoch; returns true if it is the fifth (`WENT_BACK`). A replay of the same
-    /// frame does not count.
+    /// Counts a handshake with an outdated nonce. Returns true if it is the fifth in a row (`WENT_BACK`) with rising
+    /// frame counters; replays do not count.
     const fn count(&mut self, epoch: u32, counter: u32) -> bool {
         if epoch != self.epoch || self.times == 0 {
             *self = Self {
@@ -109,17 +112,18 @@ impl Peer {
 pub(crate) struct Session {
     key: Key,
     epoch: u32,
-    /// Silence of the known node after which another node with the same number is accepted.
+    /// Silence of a node after which another node with the same node number is accepted in its place.
     gone_after: Duration,
-    /// Claim number of this relay, drawn at its start. The lower halves of this relay's nonces are above it.
+    /// Random number that this relay draws at its start, which claims its node number. The lower halves of this
+    /// relay's nonces count up from it.
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
     last_number: u32,
-    /// Claim of another node that uses this relay's number, from the last handshake with such a claim.
+    /// Claim of another node to this relay's node number, as shown by a handshake; `None` once it is read.
     rival: Option<Rival>,
-    /// Counter of all uses of the table's entries, wrapping. It tells which entry was used least recently.
+    /// Number of uses of table entries so far, wrapping. It finds the least recently used entry.
     clock: u32,
-    /// Nodes whose entries are never replaced: the current neighbours.
+    /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
     peers: heapless::Vec<Peer, PEERS>,
 }
@@ -127,25 +131,25 @@ pub(crate) struct Session {
 /// Result of the authentication of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// Valid new message of a member; `first` if it is the first proof that the node is present.
+    /// Valid new message of the node. `first` is true if it is the first proof that the node is present.
     Fresh { first: bool },
-    /// New handshake that proves that the node is present; `first` if it is the first proof.
+    /// New handshake that proves that the node is present. `first` is true if it is the first such proof.
     Handshake { first: bool },
-    /// Handshake with the right tag but without proof: it may have been recorded.
+    /// Handshake with the right tag but no proof that the node is present: it may have been recorded.
     Unproven,
     /// Received frame without an authentication tag.
     Unsigned,
-    /// Frame with a wrong tag, at least for the nonces of the current session.
+    /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Frame of a member that was received before or is too old to check.
+    /// Authentic frame that was received before, or that is too old to tell.
     Replayed,
-    /// Replayed handshake that completes the proof that the node itself uses an older epoch.
+    /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,
 }
 
 impl Session {
-    /// Creates a table without sessions for a node with claim number `claim`, drawn at its start. A node that is
-    /// silent for `gone_after` is replaced by another one with its number.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. A node that is
+    /// silent for `gone_after` may be replaced by another node with its number.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -161,7 +165,8 @@ impl Session {
         }
     }
 
-    /// Protects the entries of `nodes`, the current neighbours. Schedules handshakes to those without an entry.
+    /// Protects the table entries of `nodes`, the current neighbours, from replacement. Schedules a handshake to each
+    /// neighbour without an entry.
     pub(crate) fn pin(&mut self, nodes: [Option<u16>; 2]) {
         self.pinned = nodes;
         for node in nodes.into_iter().flatten() {
@@ -171,7 +176,7 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to node `to`, which is unproven until it replies.
+    /// Schedules a handshake to node `to`. The node counts as unproven until it replies.
     pub(crate) fn greet(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -180,8 +185,8 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes, as after a restart. New nonces count up from `claim`, if that is above all nonces of this
-    /// epoch so far.
+    /// Forgets all nodes, as after a restart. New nonces count up from `claim`, or from the last nonce if that is
+    /// larger.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.last_number {
             self.claim = claim;
@@ -190,15 +195,15 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`. Another node with this relay's number that receives it learns of
-    /// this relay.
+    /// Schedules a handshake to the known node `to`. It shows this relay's nonce, by which another node with this
+    /// relay's number can detect the duplicate.
     pub(crate) fn show(&mut self, to: u16) {
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             peer.handshake = true;
         }
     }
 
-    /// Schedules a handshake to node `to` that requests a reply, so that each learns the other's nonce.
+    /// Schedules a handshake to node `to` that requests a reply. Each node then knows the other one's nonce.
     pub(crate) fn request_reply(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -209,8 +214,8 @@ impl Session {
 
     /// Schedules a handshake that requests a reply from the silent node `to`.
     ///
-    /// There is none if the node has restarted with an outdated nonce of the same epoch: a handshake contains its
-    /// known nonce, with which it could continue its earlier start, and use nonces and counters twice.
+    /// Does nothing if the node has restarted in the same epoch. The handshake would tell the node its former nonce;
+    /// with it the node could continue its former session and use frame counters twice.
     pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;
@@ -219,8 +224,8 @@ impl Session {
         }
     }
 
-    /// Returns the claim of another node to this relay's number, if a handshake contained one. It returns each claim
-    /// once; `None` otherwise.
+    /// Returns the claim of another node to this relay's node number, if a handshake has shown one. Returns each
+    /// claim once.
     pub(crate) const fn poll_rival(&mut self) -> Option<Rival> {
         self.rival.take()
     }
@@ -358,7 +363,8 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns the node that sent `frame`, which bears this relay's own number. Work: the computation of one tag.
+    /// Returns the sender of `frame`, which bears this relay's own number: this relay or another node. Work: the
+    /// computation of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
         let own = || Some(self.find(frame.header.destination)?.nonces(epoch));
@@ -376,8 +382,8 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns the node that uses `nonce` and this relay's number: this relay or another one. It is unknown for 0 or
-    /// an older epoch.
+    /// Returns the owner of `nonce` among the nodes with this relay's number: this relay or another node. Unknown if
+    /// the epoch of the nonce is older than this relay's.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {
@@ -399,7 +405,7 @@ impl Session {
         self.peers.iter().find(|peer| peer.node == node)
     }
 
-    /// Returns the table's entry of `node`, and updates its time of use; `None` if it has none.
+    /// Returns the table entry of `node` and marks it as just used; `None` if there is no entry.
     fn touch(&mut self, node: u16) -> Option<&mut Peer> {
         self.clock = self.clock.wrapping_add(1);
         let peer = self.peers.iter_mut().find(|peer| peer.node == node)?;
@@ -407,9 +413,9 @@ impl Session {
         Some(peer)
     }
 
-    /// Creates a table entry for `node` if it has none. A full table replaces an entry that is not pinned, preferably
-    /// an unproven one, and of those the least recently used. After four billion entries no more are created: a nonce
-    /// is never used twice.
+    /// Creates a table entry for `node` if there is none. If the table is full, it replaces an entry that is not
+    /// pinned: an unproven one if possible, else the least recently used one. After four billion entries it creates
+    /// no more, because a nonce must not be used twice.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;
@@ -444,7 +450,7 @@ impl Session {
     }
 }
 
-/// Returns the lower half of a nonce, a number, and its upper half, the epoch.
+/// Splits a nonce into its lower half, a number, and its upper half, the epoch.
 const fn halves(nonce: u64) -> [u32; 2] {
     let [a, b, c, d, e, f, g, h] = nonce.to_le_bytes();
     [
@@ -453,14 +459,14 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch belong to two nodes with one number. Their lower halves differ by more
-/// than [`NEAR`]. The bit [`RAISED`] of these is ignored.
+/// Returns true if two nonces of one epoch belong to two nodes with the same node number. Their lower halves then
+/// differ by more than [`MAX_GAP`]; the bit [`RAISED`] is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > MAX_GAP
 }
 
-/// Returns the nonces in a handshake, of its sender and its receiver. `None` if `frame` is no handshake.
+/// Returns the nonces in a handshake's body: of its sender, and of its receiver. `None` if `frame` is no handshake.
 fn nonces_of(frame: &Opened<'_>) -> Option<Nonces> {
     let (other, rest) = frame.body.split_first_chunk::<8>()?;
     let (known, &[0 | 1]) = rest.split_first_chunk::<8>()? else {

@@ -12,20 +12,20 @@ use crate::geodetic::{LineError, Sites};
 use crate::mission::{Interference, Mission};
 use crate::mission::{MissionConfig, MissionError};
 
-/// True with the feature `upload`; without it no mission can be uploaded.
+/// True if the crate is built with the feature `upload`: new missions can be uploaded in flight.
 pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
 
-/// Mission uploaded by the operator, with a version. It replaces the one loaded before flight.
+/// Mission that the operator uploads in flight, with a version. It replaces the mission loaded before flight.
 #[cfg(feature = "upload")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Upload {
     version: u16,
     base: u16,
-    /// Checked parameters of the uploaded mission, which has one interferer.
+    /// Valid parameters of the uploaded mission, whose interference is not a field.
     config: MissionConfig,
-    /// Positions of Tx and Rx, the ends of the mission's line; `None` for the configured ones. They are valid
-    /// positions; every relay checks that they fit the mission.
+    /// Positions of Tx and Rx of this mission; `None` if relays must use those of their configuration. The positions
+    /// are valid, but each relay still checks that they fit the mission.
     sites: Option<Sites>,
 }
 
@@ -38,13 +38,15 @@ pub enum UploadError {
     Version,
     /// The number of relays differs from that of the mission loaded before flight.
     Relays,
-    /// The mission loaded before flight, or the new one, has an interference field.
+    /// The mission loaded before flight, or the uploaded one, has an interference field. A field is a known
+    /// distribution of the interference along x.
     Field,
     /// A parameter of the new mission is outside its range.
     Mission(MissionError),
-    /// The upload is for relays that loaded another mission before flight.
+    /// The upload replaces another mission than the one that the relay loaded before flight.
     Base,
-    /// The mission does not fit its line from Tx to Rx on earth, or the geofence.
+    /// The mission does not fit the positions of Tx and Rx on earth, or the geofence. The positions may be invalid,
+    /// or have another distance than the mission.
     Line(LineError),
     /// The relay already has the uploaded mission or a newer one.
     Old,
@@ -80,7 +82,8 @@ impl core::error::Error for UploadError {}
 impl Upload {
     /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
-    /// If rounding has put eta of its channel outside of the other two factors, it is clamped to the nearer one.
+    /// The path-loss factor eta of the channel is clamped between mu_los and mu_nlos, because rounding can have put
+    /// it outside.
     ///
     /// # Errors
     /// [`UploadError`] names the problem.
@@ -96,13 +99,14 @@ impl Upload {
         Self::checked(version, digest(base), config, None)
     }
 
-    /// Adds the positions of Tx and Rx between which the mission is flown. Relays then use the line between them for
-    /// latitudes and longitudes.
+    /// Adds the positions of Tx and Rx to the uploaded mission. Relays then compute latitudes and longitudes from the
+    /// line between these positions.
     ///
-    /// An upload without sites is flown between the configured ones, wherever the relays flew since.
+    /// Without this call, relays use the Tx and Rx positions of their configuration, even if an earlier upload had
+    /// others.
     ///
     /// # Errors
-    /// [`UploadError::Line`] if they define no line, or one of another length than the mission's distance.
+    /// [`UploadError::Line`] if the positions define no line, or one of another length than the mission's distance.
     pub fn with_sites(self, sites: Sites) -> Result<Self, UploadError> {
         let valid = sites.are_valid().then_some(sites);
         let sites = valid.ok_or(UploadError::Line(LineError::Sites))?;
@@ -149,7 +153,7 @@ impl Upload {
         &self.config
     }
 
-    /// Positions of Tx and Rx, the ends of the mission's line; `None` for the configured ones.
+    /// Positions of Tx and Rx in the upload; `None` if relays must use those of their configuration.
     pub const fn sites(&self) -> Option<Sites> {
         self.sites
     }
@@ -189,8 +193,8 @@ impl Upload {
     }
 }
 
-/// Checks that the mission's distance, `distance_m`, is that between `sites`, Tx and Rx. A relay without the feature
-/// `flight` has no line on earth, and accepts every mission with valid sites.
+/// Checks that the distance between `sites`, the positions of Tx and Rx, is `distance_m`. Without the feature
+/// `flight` the distance cannot be computed, and all valid positions are accepted.
 pub(crate) fn check_line(sites: Sites, distance_m: f32) -> Result<(), LineError> {
     #[cfg(feature = "flight")]
     let fits = crate::flight::axis::Axis::between(sites)

@@ -9,7 +9,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, Unaligned};
 
 use super::{ConfigError, FieldStorage, MAX_POINTS, Sites};
 
-/// Configuration block as a structure: the fields of the table in `lib.rs`, byte for byte.
+/// Bytes of a configuration block as a structure. Its fields are those of the table in `lib.rs`, in the same order.
 #[derive(FromBytes, IntoBytes, Immutable, Unaligned)]
 #[repr(C)]
 pub(super) struct Layout {
@@ -24,10 +24,11 @@ pub(super) struct Layout {
     pub(super) distance_m: F32,
     pub(super) min_separation_m: F32,
     pub(super) tx_power_w: F32,
-    /// Altitude (m) and transmit power (W) of every relay that has no values of its own.
+    /// Altitude (m) and transmit power (W) of the relays without own values.
     pub(super) common: [F32; 2],
     pub(super) own: [F32; 2],
-    /// Interferer's power (W), x and y (m). All are 0 if the block has an interference field, or no known interferer.
+    /// Interferer's power (W), x and y (m). All are 0 if the interferer is unknown, or if the block gives the
+    /// interference as a distribution along x.
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
     /// Carrier frequency (Hz), excess losses with and without line of sight, line-of-sight weight (0 to 1).
@@ -73,7 +74,7 @@ fn is_zero(numbers: &[F32]) -> bool {
 }
 
 impl Layout {
-    /// Returns the placement method. The parameters of `Adjust` must be 0 with any other method.
+    /// Returns the placement method. The parameters of the method `Adjust` must be 0 with any other method.
     pub(super) fn method(&self) -> Result<Method, ConfigError> {
         let (explore_m, rounds) = (self.explore_m.get(), self.rounds.get());
         let unused = explore_m.to_bits() == 0 && rounds == 0;
@@ -101,7 +102,7 @@ impl Layout {
         }
     }
 
-    /// Returns the settings for estimating an unknown interferer; `None` if all are 0.
+    /// Returns the settings for estimating an unknown interferer; `None` if these settings are all 0.
     pub(super) fn listen(&self) -> Result<Option<Listen>, ConfigError> {
         let [every, half_life] = self.listen_us;
         let listen = Listen {
@@ -116,7 +117,8 @@ impl Layout {
         }
     }
 
-    /// Returns the sites of transmitter and receiver, and the speed limit. `None` if all are 0: no autopilot.
+    /// Returns the surveyed positions of Tx and Rx, and the speed limit of the drone. `None` if all are 0: then there
+    /// is no autopilot.
     pub(super) fn sites(&self) -> Result<Option<Sites>, ConfigError> {
         let ends = self.ends.map(|site| site.map(I32::get));
         let speed_m_s = self.speed_m_s.get();
@@ -131,8 +133,9 @@ impl Layout {
         }
     }
 
-    /// Returns the block's interference: its field, or its interferer if it has no field points. The field's points
-    /// are stored in `storage`. An interferer of zeros is unknown, if `listens` is true: the relays then measure.
+    /// Returns the interference that the block gives. It is a distribution along x if the block has points of one;
+    /// these are stored in `storage`. Otherwise it is the block's interferer. If all numbers of the interferer are 0
+    /// and `listens` is true, the interferer is unknown, and the relays estimate it.
     pub(super) fn interference(
         &self,
         listens: bool,

@@ -101,13 +101,13 @@ pub const VERSION: u16 = 10;
 /// Length of a configuration block, bytes.
 pub const LEN: usize = 388;
 
-/// Maximum number of points of an interference field in a configuration block.
+/// Maximum number of points of a configuration block for the distribution of the interference along x.
 pub const MAX_POINTS: usize = 16;
 
 /// Number of bytes covered by the block's CRC: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
-/// Maximum configurable silence of a neighbour until a heartbeat is requested from it, ms.
+/// Maximum value of `probe_after_ms` in a block: silence of a neighbour before a heartbeat request, ms.
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
@@ -116,16 +116,17 @@ const LEN_FIELD: u16 = 388;
 /// Configuration block as stored in flash.
 pub type Block = [u8; LEN];
 
-/// Storage for the points of a mission's interference field.
+/// Storage for the points of a mission's distribution of the interference along x.
 pub type FieldStorage = [FieldPoint; MAX_POINTS];
 
-/// Initial content of the storage for field points, before a block is read.
+/// Initial content of the storage for the points of a mission's distribution of interference along x.
 pub const EMPTY: FieldStorage = [FieldPoint {
     x_m: 0.0,
     upsilon_per_w: 0.0,
 }; MAX_POINTS];
 
-/// Reads and checks a configuration block of arbitrary bytes. The points of its field are stored in `storage`.
+/// Reads and checks a configuration block of arbitrary bytes. If it gives the interference as a distribution along x,
+/// its points are stored in `storage`.
 ///
 /// A relay accepts every returned configuration if its build has the features for it. It rejects the joint method for
 /// more than 100 relays.

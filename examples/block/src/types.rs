@@ -26,20 +26,21 @@ pub struct Config {
     pub hold_altitude: bool,
     /// Placement method that the leader runs.
     pub method: Method,
-    /// Settings for measuring an interference field at the relay's position; `None` for no measurement.
+    /// Settings for measuring the interference at the relay, if the block gives its distribution along x. `None` for
+    /// no measurement.
     pub measure: Option<Measure>,
     /// Settings for estimating an unknown interferer from measurements; `None` if it is not estimated.
     pub listen: Option<Listen>,
-    /// Geodetic positions of transmitter and receiver, and speed limit; `None` without an autopilot.
+    /// Surveyed positions of Tx and Rx, and speed limit of the drone; `None` without an autopilot.
     /// `uav_relay::flight::course` checks that the positions form a valid line.
     pub sites: Option<Sites>,
-    /// Silence of a neighbour until it is probed, ms; 0 for the default, 5 s.
+    /// Silence of a neighbour after which a heartbeat is requested from it, ms; 0 for the default, 5 s.
     pub probe_after_ms: u32,
 }
 
 impl Config {
-    /// Returns the relay's settings by this configuration. The caller adds the signing key and the guard (collision
-    /// avoidance).
+    /// Returns the relay's settings for this configuration. The caller has to add the signing key and the guard
+    /// (collision avoidance).
     pub fn settings(&self, wiring: Wiring) -> Settings {
         let common = self.mission.config().common;
         let preset = match wiring {
@@ -63,17 +64,17 @@ impl Config {
     }
 }
 
-/// Sites of transmitter and receiver on earth, and speed limit of a drone with an autopilot.
+/// Surveyed positions of transmitter and receiver, and speed limit of a drone with an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sites {
-    /// Sites of transmitter and receiver: latitude and longitude, 1e-7 degrees, and ground height, mm.
+    /// Positions of transmitter and receiver: latitude and longitude, 1e-7 degrees, and ground height, mm.
     pub ends: [[i32; 3]; 2],
     /// Maximum speed of the drone, m/s: 0.1 to 20, or 0 for the default, 5 m/s.
     pub speed_m_s: f32,
 }
 
 impl Sites {
-    /// Returns the sites of transmitter and receiver as geodetic positions.
+    /// Returns the positions of transmitter and receiver in the library's type.
     pub fn on_earth(&self) -> uav_relay::Sites {
         let [tx, rx] = self.ends.map(|[lat_e7, lon_e7, amsl_mm]| Geodetic {
             lat_e7,
@@ -84,12 +85,12 @@ impl Sites {
     }
 }
 
-/// Signing key of the network, and smallest epoch to sign frames with.
+/// Signing key of the network, and the smallest epoch that the relay may sign with.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Secret {
     /// Signing key of the network, not all 0.
     pub key: [u8; 32],
-    /// Smallest epoch to sign frames with, 1 to 4294967294. The epoch is a number that rises at every start.
+    /// Smallest epoch that the relay may sign with, 1 to 4294967294. The epoch is a number that rises at every start.
     pub epoch: u32,
 }
 
@@ -146,31 +147,33 @@ pub enum ConfigError {
     Profile,
     /// Flag for keeping this relay's altitude is neither 0 nor 1.
     Hold,
-    /// Unknown placement method, or a method other than align together with an interference field.
+    /// Unknown placement method. Or a method other than align although the block gives the interference as a
+    /// distribution along x.
     Method,
     /// Parameters of the method adjust out of range, or not 0 with another method.
     Adjust,
-    /// Settings of the field measurement out of range, or a maximum power without a number of samples.
+    /// Settings for measuring the interference out of range, or a maximum power but no number of samples.
     Measure,
-    /// Settings for estimating an unknown interferer out of range, or together with an interference field.
+    /// Settings for estimating an unknown interferer out of range. Or the block has these settings, and gives the
+    /// interference as a distribution along x.
     Listen,
-    /// Traffic from receiver to transmitter together with the joint method.
+    /// Traffic from receiver to transmitter, which the joint method does not support.
     Reverse,
-    /// Interferer given in a block that has an interference field.
+    /// Interferer in a block that also gives the interference as a distribution along x.
     Interferer,
-    /// Number of field points exceeds the capacity of a block.
+    /// Number of points of the interference's distribution along x exceeds the capacity of a block.
     Points,
-    /// Non-zero bytes of the block behind its last field point.
+    /// Non-zero bytes behind the last point of the interference's distribution along x.
     Unused,
     /// Signing key without an epoch, epoch without a key, or an epoch of 4294967295.
     Secret,
-    /// Maximum speed out of range, or given without the sites of transmitter and receiver.
+    /// Maximum speed out of range, or given without the positions of transmitter and receiver.
     Speed,
-    /// Signing key of the autopilot without the sites of transmitter and receiver.
+    /// Signing key of the autopilot, although there is no autopilot: the block has no Tx and Rx positions.
     AutopilotKey,
-    /// Silence of a neighbour until it is probed exceeds the maximum.
+    /// Silence of a neighbour after which a heartbeat is requested exceeds the maximum.
     Silence,
-    /// Parameter of the interference field out of range.
+    /// Parameter of the interference's distribution along x out of range.
     Field(FieldError),
     /// Parameter of the channel out of range.
     Channel(ChannelError),

@@ -10,8 +10,8 @@ use super::{Block, CHECKED, ChannelNumbers, Config, LEN_FIELD, MAGIC, Secret, VE
 /// Returns the configuration block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of the
 /// mission's channel.
 ///
-/// Two things are lost in a block. The grid search of the method adjust is read back as the fine search. A field of
-/// more than `MAX_POINTS` points is rejected when it is read back.
+/// Two things differ when the block is read back. The grid search of the method adjust becomes the fine search. A
+/// block with more than `MAX_POINTS` points of the interference's distribution along x is rejected.
 pub fn write(
     config: &Config,
     numbers: &ChannelNumbers,

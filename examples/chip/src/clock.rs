@@ -86,11 +86,11 @@ impl Clocks {
 
 const PLL_INPUT_HZ: u32 = 2_000_000;
 
-/// PLL settings for a core frequency.
+/// PLL settings for one frequency of the core.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Pll {
     over_drive: bool,
-    /// Multiplier of the PLL, PLLN. The core gets half the PLL's input of 2 MHz times this number.
+    /// Multiplier PLLN of the PLL. The core's frequency is this number times 1 MHz; the PLL's input has 2 MHz.
     plln: u32,
     /// Divisor PLLQ for the PLL's USB clock, which may be 48 MHz or less.
     pllq: u32,
@@ -198,8 +198,8 @@ pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     Clocks::HSI
 }
 
-/// Returns the frequencies that [`start`] reaches, and switches back to the internal oscillator. For a HAL whose own
-/// clock set-up has unbounded waits: it gets only clocks that work.
+/// Returns the frequencies that [`start`] reaches, and leaves the core on the oscillator HSI. Intended for a HAL that
+/// sets up the clocks itself but waits for them without a limit: it is then given only clocks that work.
 pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     let clocks = start(chip, hardware);
     if clocks.pll.is_some() && back_to_hsi(chip) {
@@ -303,7 +303,7 @@ mod tests {
             .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
     }
 
-    /// Returns the clocks that a chip with these faults can reach.
+    /// Returns the clock frequencies that [`start`] should reach on this hardware with these faults.
     fn expected(hardware: &ClockHardware, faults: Faults) -> Clocks {
         let is_crystal =
             !faults.crystal_dead && !faults.timer_dead && faults.crystal_hz == 8_000_000;

@@ -27,7 +27,7 @@ const HSE_BYPASS: u32 = 1 << 18;
 /// 2 ms.
 const START_POLLS: u32 = 200_000;
 
-/// Divisor of the crystal's frequency (HSE) before it is measured: field RTCPRE of RCC_CFGR.
+/// Divisor of the crystal's clock (HSE) for the measurement of its period: field RTCPRE of RCC_CFGR.
 const DIVISOR: u32 = 31;
 const DIVIDED: u32 = DIVISOR << 16;
 
@@ -61,7 +61,8 @@ pub fn stop(chip: &mut impl Registers) {
     chip.modify(Register::ClockControl, HSE_ON, 0);
 }
 
-/// Returns the time between two captures of timer 11, in periods of the HSI; `None` without edges.
+/// Returns the period of the divided crystal clock, measured by timer 11 in periods of the HSI. `None` if no edges
+/// come.
 fn period(chip: &mut impl Registers) -> Option<u32> {
     chip.modify(Register::ClockConfig, 0x1F << 16, DIVIDED);
     chip.modify(Register::Apb2Enable, 0, TIMER_ON);

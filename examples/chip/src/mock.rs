@@ -11,7 +11,7 @@ use crate::registers::{Register, Registers};
 #[expect(clippy::struct_excessive_bools, reason = "each fails by itself")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Faults {
-    /// True if all registers read 0, as in the emulator.
+    /// True if all registers read 0, as in the emulator QEMU. The internal oscillator (HSI) then never seems ready.
     pub(crate) hsi_hidden: bool,
     pub(crate) crystal_dead: bool,
     pub(crate) timer_dead: bool,
@@ -235,7 +235,8 @@ impl Registers for MockRegisters {
         }
     }
 
-    /// Simulates all reads of a wait by one, because only the timer's status changes between reads.
+    /// Simulates a wait by a single read, since the result of further reads is the same. Only the timer's status
+    /// changes from read to read.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

@@ -50,7 +50,7 @@ pub enum Register {
     DebugFreeze = 0xE004_2008,
 }
 
-/// Access to registers: of a chip, or of a mock in RAM.
+/// Access to the chip's registers, or to a mock of them in RAM.
 pub trait Registers {
     /// Returns the value of `register`.
     fn read(&mut self, register: Register) -> u32;

@@ -9,18 +9,19 @@ use crate::registers::{Register, Registers};
 const PRESCALER: u32 = 0b100;
 const RELOAD: u32 = 2_999;
 
-/// Time from the last feeding of the watchdog to the reset, ms: typical, shortest and longest. Its oscillator LSI
-/// then has 32, 47 and 17 kHz. An erase of a flash sector of 128 KiB, which stops the core for at most 2 s, fits in.
+/// Time from the last feeding of the watchdog to the reset, ms: typical, shortest and longest. The watchdog's
+/// oscillator LSI then has 32, 47 and 17 kHz. The time is enough for an erase of a flash sector of 128 KiB, which
+/// stops the core for at most 2 s.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
-/// Longest sleep of the relay's main loop, which feeds the watchdog once a turn, ms.
+/// Maximum time for which the relay's main loop sleeps, ms. The loop feeds the watchdog before it sleeps.
 pub const TURN_MS: u64 = 500;
 
-/// Lateness of the relay's timer from which the main loop no longer feeds the watchdog, ms.
+/// Lateness of the relay's timer, ms, from which on the main loop must not feed the watchdog any more.
 pub const LATE_MS: u64 = 1_000;
 
-/// Returns true if the main loop may feed the watchdog at `now_us`. The relay's timer, due at `due_us`, must be less
-/// than [`LATE_MS`] late; `None` means that no timer runs.
+/// Returns true if the main loop may feed the watchdog at `now_us`. The relay's next timer is due at `due_us`, and
+/// must be less than [`LATE_MS`] late. `None` means that no timer is set.
 pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
     match due_us {
         Some(due_us) => now_us < due_us.saturating_add(1_000 * LATE_MS),

@@ -14,7 +14,7 @@ use crate::journal::{Flash, Journal, WhenFull};
 /// Addresses of the two flash sectors that store epochs: sectors 9 and 10 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
 
-/// Payload of a journal record that stores an epoch, words.
+/// Payload length of a journal record that stores an epoch, words.
 pub const WORDS: usize = 1;
 
 /// Key of the journal of epochs, numbers that rise at every start. It is the same for every configuration block,

@@ -17,10 +17,10 @@ use uav_relay::CRC_32C;
 /// Value of an erased word.
 pub const BLANK: u32 = u32::MAX;
 
-/// Number of words of a record besides its payload: its number and its CRC.
+/// Number of words of a record in addition to its payload: its number and its CRC.
 pub const OVERHEAD: usize = 2;
 
-/// Number of positions tried for one record, because flash cells may be worn.
+/// Maximum number of attempts to write one record, each at another place. Flash cells may be worn.
 const TRIES: usize = 4;
 
 /// Access to two flash sectors, numbered 0 and 1, possibly of different lengths.
@@ -28,7 +28,7 @@ pub trait Flash {
     /// Returns the number of words in a sector; 0 if there is none.
     fn words(&self, sector: usize) -> usize;
 
-    /// Returns the number of used words in a sector: up to the last that is not [`BLANK`].
+    /// Returns the number of words in use in a sector: up to the last word that is not [`BLANK`].
     fn used(&mut self, sector: usize) -> usize;
 
     /// Returns the word number `word` of a sector; [`BLANK`] behind the sector's end.
@@ -37,7 +37,7 @@ pub trait Flash {
     /// Erases a sector.
     fn erase(&mut self, sector: usize);
 
-    /// Writes words of a sector from `first` on; returns true if they are read back correctly.
+    /// Writes `words` to a sector, from its word `first` on. Returns true if they are read back correctly.
     fn write(&mut self, sector: usize, first: usize, words: &[u32]) -> bool;
 }
 
@@ -68,11 +68,11 @@ impl<F: Flash> Flash for &mut F {
 pub enum WhenFull {
     /// Refuse to store the record.
     Refuse,
-    /// Erase the sector without the newest record, and store the record there.
+    /// Erase the sector that does not have the newest record, and store the record there.
     Erase,
 }
 
-/// Journal of records in two flash sectors. Only the newest valid record counts.
+/// Journal of records in two flash sectors. Only the newest record with a valid CRC is used.
 #[derive(Debug)]
 pub struct Journal<F> {
     flash: F,
@@ -83,12 +83,12 @@ pub struct Journal<F> {
 #[derive(Clone, Copy)]
 struct Found {
     newest: Option<Newest>,
-    /// Number of records in the sector, up to the last that is not blank.
+    /// Number of records in the sector, valid or not, up to the last one that is not blank.
     used: usize,
     room: usize,
 }
 
-/// Newest record of a sector. The record with the higher number is the newer one.
+/// Newest valid record of a sector. Ordered by the record's number, which rises with every record.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Newest {
     number: u32,
@@ -105,7 +105,7 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Returns the payload of the newest record, if any. `WORDS` must be the journal's payload length, words.
+    /// Returns the payload of the newest record, if any. `WORDS` must be the payload's length, words.
     ///
     /// Work: linear in the words of the sectors, and a CRC for the newest record and each one behind it.
     pub fn newest<const WORDS: usize>(&mut self) -> Option<[u32; WORDS]> {
@@ -125,8 +125,8 @@ impl<F: Flash> Journal<F> {
         Some(())
     }
 
-    /// Erases each used sector without the newest record. Called at a start: a full sector of records then fits
-    /// before the next erase.
+    /// Erases each used sector without the newest record, at a start. In flight, a full sector of records can then be
+    /// stored before the next erase.
     pub fn tidy(&mut self) {
         let found = self.found();
         let any = found.iter().any(|found| found.newest.is_some());
@@ -182,7 +182,7 @@ impl<F: Flash> Journal<F> {
         })
     }
 
-    /// Returns the number stored in a record; `None` if the record's CRC is wrong.
+    /// Returns the number of the record at index `record`; `None` if the record's CRC is wrong.
     fn number(&mut self, sector: usize, record: usize) -> Option<u32> {
         let first = record * self.words;
         let sum = self.sum(sector, first);
@@ -190,7 +190,8 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// Computes the CRC of the record at word `first`. It covers all words but the last, and then the journal's key.
+    /// Returns the CRC of the record that begins at word `first`. It covers all words but the last, and then the
+    /// journal's key.
     #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();
@@ -207,7 +208,7 @@ impl<F: Flash> Journal<F> {
     }
 }
 
-/// Returns the number of the sector with the newest record, 0 if there is no record.
+/// Returns the index of the sector with the newest record; 0 if there is no record.
 #[inline(never)] // called from several places
 fn current(found: [Found; 2]) -> usize {
     let [first, second] = found.map(|found| found.newest);

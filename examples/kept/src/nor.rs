@@ -23,7 +23,7 @@ pub struct Nor<F> {
 }
 
 impl<F: NorFlash> Nor<F> {
-    /// Creates the sectors of `flash`, which may be a `&mut` reference.
+    /// Creates the access to two sectors of `flash`, which may be a `&mut` reference.
     pub const fn new(flash: F, sectors: [Range<u32>; 2]) -> Self {
         const {
             assert!(WORD.is_multiple_of(F::READ_SIZE) && WORD.is_multiple_of(F::WRITE_SIZE));
@@ -35,7 +35,8 @@ impl<F: NorFlash> Nor<F> {
         }
     }
 
-    /// Returns the flash offset of the word `first` of a sector; `None` if `words` words exceed the sector.
+    /// Returns the flash offset of a sector's word `first`. `None` if `words` words from there exceed the
+    /// sector.
     fn place(&self, sector: usize, first: usize, words: usize) -> Option<u32> {
         let start = self.sectors.get(sector)?.start;
         let end = first.checked_add(words)?;

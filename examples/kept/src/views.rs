@@ -16,25 +16,26 @@ use crate::journal::{Flash, Journal, WhenFull, pack, unpack};
 /// Addresses of the two flash sectors that store votes: sectors 1 and 2 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0800_4000, 0x0800_8000];
 
-/// Payload of a journal record that stores the relay's votes, words.
+/// Payload length of a journal record that stores the relay's votes, words.
 pub const WORDS: usize = ViewRecord::LENGTH.div_ceil(4);
 
-/// Packs a view record, which holds the relay's votes, into words.
+/// Packs a record of the relay's votes on the chain's membership into words.
 pub fn pack_record(record: &ViewRecord) -> [u32; WORDS] {
     pack(&record.to_bytes())
 }
 
-/// Unpacks a stored view record; `None` if the words do not have its format.
+/// Unpacks a stored record of the relay's votes; `None` if the words do not have its format.
 pub fn unpack_record(kept: &[u32]) -> Option<ViewRecord> {
     ViewRecord::from_bytes(&unpack::<{ ViewRecord::LENGTH }>(kept))
 }
 
-/// Creates the journal of the relay's votes. `block` is the CRC of the drone's configuration block.
+/// Creates the journal of the relay's votes. `block` is the CRC of the configuration block: votes stored under
+/// another block are ignored.
 pub const fn log<F: Flash>(flash: F, block: u32) -> Journal<F> {
     Journal::new(flash, WORDS, block)
 }
 
-/// Storage state of the relay's votes: stored or not.
+/// State of the storage of the relay's votes: working, or failing.
 #[derive(Debug)]
 pub struct Views {
     /// True if the newest record of votes is in the flash.
@@ -42,8 +43,8 @@ pub struct Views {
 }
 
 impl Views {
-    /// Restores the votes from before the reboot into a new `relay`. Only a stored upload may have been restored
-    /// before.
+    /// Restores the votes from before the reboot into a new `relay`. Call it before any other use of the relay, but
+    /// after a stored upload was restored.
     ///
     /// If a record exists, `votes_restored` gets true if the relay accepts it; a record of another firmware may be
     /// refused.

@@ -15,7 +15,7 @@ pub(crate) fn block() -> &'static Block {
     unsafe { &*(config::ADDRESS as *const Block) }
 }
 
-/// Enables an interrupt, once the driver that it serves is in place.
+/// Enables an interrupt. The driver that serves the interrupt must be in place.
 pub(crate) fn unmask(interrupt: Interrupt) {
     // SAFETY: no critical section of this program relies on a single interrupt being masked.
     unsafe { NVIC::unmask(interrupt) };
@@ -40,8 +40,8 @@ pub(crate) fn seed() -> u32 {
     seed
 }
 
-/// Feeds the watchdog and sleeps for ever, for a drone that can not join the chain. Without a clock that wakes the
-/// chip, the watchdog restarts it.
+/// Feeds the watchdog and sleeps for ever, for a drone that can not join the chain. If no clock wakes the chip, the
+/// watchdog restarts it.
 pub(crate) fn stop() -> ! {
     loop {
         chip::feed();
@@ -69,7 +69,7 @@ use panic_halt as _;
 #[link(name = "defmt.x", kind = "dylib", modifiers = "+verbatim")]
 unsafe extern "C" {}
 
-/// Logger of this program for defmt frames over a UART, without the debug probe (RTT).
+/// Logger of this program that sends defmt frames over a UART, not through the debug probe (RTT).
 #[cfg(all(feature = "defmt", not(feature = "rtt")))]
 mod defmt_frames {
     use core::sync::atomic::{AtomicBool, Ordering};
@@ -82,7 +82,7 @@ mod defmt_frames {
     #[defmt::global_logger]
     struct Logger;
 
-    /// True if interrupts were enabled before the log frame, and must be enabled again at its end.
+    /// True if interrupts were enabled before the log frame. They are enabled again at its end.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
     // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame, which no

@@ -45,7 +45,7 @@ pub(crate) fn end_turn(relay: &Relay, now: Instant) {
     }
 }
 
-/// Returns the time until which the main loop may sleep: `wake`, but at most [`TURN`] from `now`.
+/// Returns the time until which the main loop may sleep: `wake`, but at most [`TURN`] after `now`.
 pub(crate) fn latest(now: Instant, wake: Option<Instant>) -> Instant {
     let turn = now + TURN;
     wake.map_or(turn, |wake| wake.min(turn))

@@ -10,7 +10,7 @@ use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::exception;
 use uav_relay::Instant;
 
-/// Number of `SysTick` cycles in a microsecond. The period of `SysTick` is a thousand times as long.
+/// Number of `SysTick` cycles in a microsecond. `SysTick` counts a thousand times as many until its interrupt.
 static MICRO: AtomicU32 = AtomicU32::new(1);
 
 /// Milliseconds since the start, in 64 bits, which do not overflow.
@@ -23,7 +23,8 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Starts the clock: a millisecond interrupt of a core that runs at `core_hz`, a multiple of 1 MHz.
+    /// Starts the clock, which counts the `SysTick` interrupts of each millisecond. The core runs at `core_hz`, a
+    /// multiple of 1 MHz.
     pub(crate) fn start(mut tick: SYST, core_hz: u32) -> Self {
         let micro = core_hz / 1_000_000;
         MICRO.store(micro, Ordering::Relaxed);

@@ -13,14 +13,14 @@ use super::flash;
 use super::{board, config, log, persistent};
 use crate::autopilot::{Autopilot, Uart};
 
-/// Relay with its stored votes and, if the drone flies with one, its autopilot. In static RAM, to save stack.
+/// Relay with its stored votes, and the autopilot link if the drone has one. They are in static RAM, to save stack.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut persistent::Views,
     pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
-/// Creates the drone of the configuration block; `None` if it can not fly.
+/// Creates the drone that the configuration block describes; `None` if it can not fly.
 ///
 /// [`switch_on`] and this function are not inlined, so that their stack frames are released.
 #[inline(never)]
@@ -85,7 +85,7 @@ struct CannotSign;
 /// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 ///
 /// If the flash can not be written, as in an emulator, the epoch is still larger than all stored ones, and at least
-/// that of the block, but it may not increase from this start to the next.
+/// that of the block; but the next start may then have the same epoch.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {

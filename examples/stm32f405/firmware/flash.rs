@@ -96,7 +96,7 @@ impl Sector {
         number.to_le_bytes()[0]
     }
 
-    /// Erases the flash sector. The CPU stops meanwhile, for a time that the modules of the journals state.
+    /// Erases the flash sector. The CPU stops for up to 2 s meanwhile, depending on the sector's size.
     #[inline(never)]
     fn erase(self) {
         let flash = unlocked();
@@ -145,7 +145,8 @@ impl Sector {
     }
 }
 
-/// Value of the flash's write width (PSIZE) for 32 bits, which the board's 3.3 V permit.
+/// Value of the field PSIZE of the flash's control register: 32 bits are written at once. The board's supply of 3.3 V
+/// permits this.
 const BY_WORD: u8 = 2;
 
 /// Unlocks the flash registers for writing.

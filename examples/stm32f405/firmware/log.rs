@@ -38,7 +38,7 @@ pub(crate) const fn counters_requested() -> bool {
     false
 }
 
-/// Returns 0, the number of dropped log frames, which only a log over the UART counts.
+/// Returns 0 as the number of dropped log frames, because only a log over the UART counts them.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 const fn lost() -> u32 {
     0
@@ -47,7 +47,7 @@ const fn lost() -> u32 {
 #[cfg(feature = "defmt")]
 defmt::timestamp!("{=u64:us}", super::clock::micros());
 
-/// Logs a line at a level of defmt. The macro does nothing without `--features defmt`.
+/// Logs a line at one of defmt's levels, such as `info`. Without `--features defmt` the macro does nothing.
 macro_rules! line {
     ($level:ident, $text:literal $(, $value:expr)* $(,)?) => {{
         #[cfg(feature = "defmt")]
@@ -107,7 +107,7 @@ pub(crate) fn unguarded() {
     );
 }
 
-/// Logs the length of the line between the sites, and the drone's speed limit.
+/// Logs the length of the line from Tx to Rx, and the drone's speed limit.
 #[cfg(feature = "flight")]
 pub(crate) fn flies(course: &Course) {
     info!(
@@ -249,7 +249,7 @@ pub(crate) fn refused(error: ConfigError) {
     }
 }
 
-/// Logs the signing epoch, a number that rises at every start; `is_stored` is true if it was stored.
+/// Logs the signing epoch, a number that rises at every start. `is_stored` is true if the flash has stored it.
 #[cfg(feature = "auth")]
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
@@ -281,7 +281,7 @@ pub(crate) fn resumes(version: u16) {
     );
 }
 
-/// Logs an uploaded mission; `is_stored` is true if it was stored.
+/// Logs that a mission was uploaded in flight; `is_stored` is true if the flash has stored it.
 #[cfg(feature = "upload")]
 pub(crate) fn uploaded(version: u16, is_stored: bool) {
     if is_stored {
@@ -294,7 +294,7 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
     }
 }
 
-/// Logs the votes restored after a reboot; `accepted` is true if the relay accepts them.
+/// Logs that votes on the chain's membership were found after a reboot. `accepted` is true if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's membership restored from flash");

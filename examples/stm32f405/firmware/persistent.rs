@@ -41,15 +41,16 @@ fn uploads() -> Journal<Sectors> {
 pub(crate) struct Views(views::Views);
 
 impl Views {
-    /// Restores the votes from before the reboot into a new `relay`. Only an uploaded mission may have been restored
-    /// before.
+    /// Restores the votes from before the reboot into a new `relay`. Call it before any other use of the relay, but
+    /// after a stored upload was restored.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());
         Self(views::Views::resume(relay, now, log, log::votes_restored))
     }
 
-    /// Stores the relay's changed votes. Returns true even if the write fails, so that the relay flies on.
+    /// Stores the relay's changed votes on the chain's membership. Returns true even if the write fails, so that the
+    /// relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
         if let Some(stored) = self.0.store(record, views::log(flash::VIEWS, block())) {
             log::votes(stored);

@@ -23,7 +23,7 @@ use crate::autopilot::{self, Uart};
 
 static FIRST: Slot<USART2> = Mutex::new(RefCell::new(None));
 
-/// Board with its clocks running, and peripherals that only some wirings of the relay need.
+/// Board with its clocks running. It has the ports and peripherals that the firmware may use.
 pub(crate) struct Pins {
     pub(crate) clock: Clock,
     /// Port at USART2, to the neighbour toward the transmitter or to the radio.
@@ -36,7 +36,7 @@ pub(crate) struct Pins {
     pub(crate) second: Second,
 }
 
-/// Peripherals of the second neighbour's port, at USART3.
+/// Peripherals for a port to a second neighbour, at USART3.
 #[allow(dead_code, reason = "the second neighbour's port")]
 pub(crate) struct Second {
     pub(crate) usart: USART3,

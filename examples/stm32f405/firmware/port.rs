@@ -16,10 +16,11 @@ use super::{board, clock};
 /// Bit rate of every port, bit/s, 8N1.
 pub(crate) use uav_relay_block::BAUD;
 
-/// Capacity of the receive queue, bytes: 11 ms at full speed.
+/// Capacity of the receive queue, bytes. At full speed it fills in 11 ms.
 pub(crate) const RECEIVED: usize = 128;
 
-/// Capacity of the send queue, bytes. It exceeds the longest frame, so that the main loop can sleep meanwhile.
+/// Capacity of the send queue, bytes. It exceeds the longest frame, so that the main loop can sleep while a frame is
+/// sent.
 pub(crate) const OUTGOING: usize = 256;
 
 pub(crate) type Queues<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> =
@@ -62,13 +63,13 @@ impl<U: Instance> Served<U> {
     }
 }
 
-/// Returns the settings of a UART whose clock is `apb_hz`. They correct the error of the HAL, which assumes the clock
-/// after a reset.
+/// Returns the settings of a UART whose clock is `apb_hz`. The baud rate in them is corrected, because the HAL
+/// assumes the clock after a reset.
 pub(crate) fn config(apb_hz: u32) -> Config {
     Config::default().baudrate(compensated_baud(BAUD, apb_hz).bps())
 }
 
-/// Hands the UART to its interrupt handler. Returns the main loop's port, which accesses the queues.
+/// Passes the UART to its interrupt handler. Returns the main loop's port, which accesses the handler's queues.
 pub(crate) fn open<U: Instance, const OUT: usize, const IN: usize>(
     mut uart: Serial<U>,
     interrupt: Interrupt,

@@ -13,10 +13,10 @@ use uav_relay::serial::SerialPort;
 
 use super::port::{self, Port, Queues, RECEIVED, Slot};
 
-/// Buffer of a log frame; the longest frame has the relay's counters.
+/// Buffer of a log frame. Its size is that of the longest frame, which has the relay's counters.
 type Frame = Vec<u8, 160>;
 
-/// Capacity of the log's send queue, bytes: 89 ms.
+/// Capacity of the log's send queue, bytes. At full speed it is sent in 89 ms.
 const ROOM: usize = 1024;
 
 struct Log {
@@ -45,7 +45,7 @@ pub(crate) fn start(uart: Serial<UART4>) {
     with(|log| log.port = Some(port));
 }
 
-/// Returns true if somebody requests the counters: an `s` was received on the log's UART.
+/// Returns true if the counters were requested, by the byte `s` on the log's UART.
 pub(crate) fn counters_requested() -> bool {
     let mut counters_requested = false;
     with(|log| {
@@ -65,7 +65,7 @@ pub(crate) fn lost() -> u32 {
     lost
 }
 
-/// Begins a log frame; interrupts are off until its end.
+/// Begins a log frame. Interrupts are off until its end.
 pub(crate) fn begin() {
     with(|log| {
         log.frame.clear();

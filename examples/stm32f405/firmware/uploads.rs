@@ -10,10 +10,10 @@ use uav_relay::Upload;
 
 use uav_relay_kept::journal::{pack, unpack};
 
-/// Addresses of the two flash sectors that store uploads: sectors 7 and 8 of an STM32F405.
+/// Addresses of the two flash sectors that store uploaded missions: sectors 7 and 8 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x0806_0000, 0x0808_0000];
 
-/// Payload of a journal record that stores an upload, words.
+/// Payload length of a journal record that stores an uploaded mission, words.
 pub const WORDS: usize = Upload::LENGTH.div_ceil(4);
 
 /// Packs an uploaded mission into words.
@@ -24,7 +24,7 @@ pub fn pack_upload(upload: &Upload) -> [u32; WORDS] {
     pack(&bytes)
 }
 
-/// Unpacks a stored upload; `None` if the words do not have its format.
+/// Unpacks a stored mission upload; `None` if the words do not have its format.
 pub fn unpack_upload(words: &[u32]) -> Option<Upload> {
     Upload::decode(&unpack::<{ Upload::LENGTH }>(words))
 }

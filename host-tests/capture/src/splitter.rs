@@ -1,15 +1,15 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Maximum number of bytes stored of a piece. The longest frame has 145 bytes; a longer piece is noise, and only its
-/// start is kept.
+/// Largest number of bytes that the splitter stores between two frame delimiters. The longest frame has 145 bytes, so
+/// more bytes are noise, of which only the start is kept.
 pub const MOST: usize = 1_024;
 
-/// Piece of a byte stream between two frame delimiters, including the final one.
+/// Bytes of a stream from one frame delimiter to the next: usually a frame. The delimiter at the end is included.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Piece<'a> {
-    /// Bytes of the piece with its delimiter; only the first [`MOST`] bytes of a longer piece.
+    /// Bytes of the piece with its delimiter. A piece longer than [`MOST`] is cut after [`MOST`] bytes.
     pub bytes: &'a [u8],
-    /// Length of the piece before truncation.
+    /// Length of the whole piece, bytes, even if `bytes` is cut.
     pub len: usize,
 }
 

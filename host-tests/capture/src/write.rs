@@ -19,7 +19,7 @@ const INTERFACE_DESCRIPTION_TEXT: u16 = 3;
 const INTERFACE_RESOLUTION: u16 = 9;
 const PACKET_FLAGS: u16 = 2;
 
-/// Resolution of the timestamps in a capture: the exponent n of 10^-n s.
+/// Resolution of the timestamps in a capture, as pcapng states it: the exponent n of 10^-n s.
 const NANOSECONDS: u8 = 9;
 
 /// Direction of a frame, relative to the node that writes the capture.
@@ -55,7 +55,7 @@ pub struct Frame<'a> {
     pub at: Duration,
     /// Bytes of the frame on the wire: COBS, with the final delimiter.
     pub bytes: &'a [u8],
-    /// Length of the frame, bytes; larger than that of `bytes` if these are truncated.
+    /// Length of the whole frame, bytes. It is larger than that of `bytes` if `bytes` is cut.
     pub len: usize,
     /// Direction of the frame, relative to the node that writes the capture.
     pub direction: Direction,

@@ -10,8 +10,8 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, MOST};
 
-/// Returns the pieces of a stream, which arrives in `reads`, with their lengths. The last number is the length of the
-/// incomplete end.
+/// Splits a byte stream at the frame delimiters. `reads` are the portions in which the stream arrives. Returns each
+/// piece with its length, and the length of the incomplete piece at the end.
 fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
     let (mut cut, mut all) = (FrameSplitter::default(), Vec::new());
     for read in reads {

@@ -100,7 +100,7 @@ pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// Returns a given option with its value, as the user typed it. `None` if the option is not given.
+/// Formats a command-line option with its value, as in `--option value`. `None` if the option is not given.
 pub fn given_option(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
     value.map(|value| format!("{option} {value}"))
 }

@@ -61,10 +61,10 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     Ok(runs)
 }
 
-/// Computes the positions of all relays from the mission alone, as the leader predicts them.
+/// Computes the positions of all relays from the mission alone, as the leader of a chain predicts them.
 ///
-/// The search for the target SIR evaluates a chain of N hops at most about fifty times. The positions then cost N^2 /
-/// 2 evaluations of a hop.
+/// The cost for N relays: the search for the target SIR evaluates whole chains, at most about fifty. The positions
+/// then cost N^2 / 2 evaluations of one hop.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     let none = || "no target SIR can be met".to_owned();
     let common = |_| mission.config().common;
@@ -74,8 +74,8 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
         .collect()
 }
 
-/// Computes the relays' positions from the mission alone by the joint method, as every relay does. All of its starts
-/// are tried.
+/// Computes the relays' positions from the mission alone by the joint method, as every relay does. The search runs
+/// from every starting point of the method.
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));

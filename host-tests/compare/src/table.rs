@@ -205,7 +205,9 @@ fn plain(why: &str) -> String {
     why.replace(['|', '\n'], " ")
 }
 
-/// Formats a relative difference from the optimum, which is known to nine digits.
+/// Formats the relative difference of an SIR from the optimum for a table cell.
+///
+/// Differences below 1e-8 are not resolved, because the optimum is known to nine digits.
 fn short(by: f64) -> String {
     if by.abs() < 1e-8 {
         "less than 1e-8".to_owned()

@@ -184,7 +184,7 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws the name of a proposed view (membership of the chain): number 1 or more, by a node of a chain.
+    /// Draws the name of a proposed view (membership of the chain): its number, 1 or more, and proposer.
     fn view(&mut self) -> u32 {
         let most = 0x003F_FFFF;
         let number = match self.byte() % 8 {
@@ -355,10 +355,10 @@ fn list<'f>(fields: &mut Fields<'f>, name: &str, change: impl FnOnce(&mut Vec<Va
     }
 }
 
-/// Reorders the views of a Proposal so that they ascend, as the format requires.
+/// Sorts the four views (memberships of the chain) in a Proposal message, as the format requires.
 ///
-/// The ascending order is: the view agreed on, the view accepted since, the proposal that was accepted, the proposed
-/// view.
+/// They ascend in this order: the view that was agreed on, the view that the relay accepted after it, the proposal
+/// that led to the accepted view, and the proposed view.
 fn proposal(fields: &mut Fields<'_>) {
     let view = |fields: &Fields<'_>, name| Numbers(fields).get(name) as u32;
     let mut order = vec![view(fields, "agreed_view"), view(fields, "proposed_view")];

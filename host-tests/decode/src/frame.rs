@@ -31,9 +31,10 @@ pub struct Frame<'f> {
     pub refusal: Option<Refusal>,
 }
 
-/// Decodes a frame. `wire` are its bytes with the final delimiter, or the first bytes of a frame of `len` bytes.
+/// Decodes a frame. `wire` has its bytes with the final delimiter, or only the first bytes of a longer frame.
 ///
-/// The library decides whether it is rejected; the tables provide its fields and the reason.
+/// `len` is the length of the whole frame on the wire. The library decides whether a receiver rejects the frame; the
+/// tables of `FORMAT.md` provide its fields and the reason for a rejection.
 pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
     let mut frame = Frame {
         len,

@@ -17,7 +17,10 @@ pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
     wrong.or_else(|| check_rules(&layout.name, &Numbers(fields)))
 }
 
-/// Returns true if the value is within the field's range. Rules behind a semicolon, between fields, are not checked.
+/// Returns true if the value is within the field's range in `FORMAT.md`.
+///
+/// The text of a range may also state, behind a semicolon, a rule between several fields. Such rules are not checked
+/// here.
 fn is_within(field: &Field, value: &Value<'_>) -> bool {
     let all = |values: &[Value<'_>]| values.iter().all(|value| is_within(field, value));
     match value {

@@ -42,7 +42,9 @@ impl TagCheck {
     }
 }
 
-/// Number of a node's latest nonces that are tried. Frames before a new handshake may still be in flight.
+/// Number of a node's latest nonces with which a tag is verified.
+///
+/// Several are tried, because frames that were signed before a new handshake may arrive after it.
 const TRIED: usize = 4;
 
 /// Network number, sender and destination of frames.

@@ -14,7 +14,7 @@ pub enum Value<'f> {
     Unsigned(u64),
     /// Signed integer.
     Signed(i64),
-    /// Digest of a mission, view or line.
+    /// Digest of a mission, of a view, or of the line between the surveyed positions of Tx and Rx.
     Digest(u16),
     /// Name of a view (membership of the chain): its number and its proposer.
     View(u32),

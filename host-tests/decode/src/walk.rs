@@ -46,10 +46,12 @@ impl Rest<'_> {
     }
 }
 
-/// Decodes the body of a message, by the tables alone. Returns the message's layout and the values of its fields.
+/// Decodes the body of a message, with the tables of `FORMAT.md` instead of the crate's code.
+///
+/// Returns the layout of the message and the values of its fields.
 ///
 /// # Errors
-/// The reason for which a receiver rejects it, by the tables alone.
+/// The reason for which a receiver has to reject the body according to the tables.
 pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Fields<'f>), Refusal> {
     let (&tag, body) = body
         .split_first()
@@ -63,7 +65,7 @@ pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Field
     }
 }
 
-/// Decodes these fields from `body`. Also returns an error text if bytes are missing or left over.
+/// Decodes the message fields `fields` from `body`. Also returns an error text if bytes are missing or left over.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();

@@ -23,14 +23,14 @@ const MAX_IN_TRANSIT: usize = 24;
 /// Maximum number of rounds in one operation. A round delivers a frame to each relay.
 const MAX_ROUNDS: u8 = 128;
 
-/// Rounding error of a position, as a fraction of the distance from Tx to Rx: one step of its f32.
+/// Rounding error of a position, as a fraction of the distance from Tx to Rx: one step of an f32.
 const ROUNDING: f64 = 1.3e-7;
 
 /// Fuzz target. Reads `data` as a mission, settings of each relay, and operations on the frames between them.
 ///
 /// # Panics
-/// A relay breaks a promise that `watch` checks, two neighbours that got their positions by one pass (a round of messages
-/// along the chain) are too close, or the chain does not agree after faults have ended.
+/// A relay breaks a rule that the module `watch` checks, two neighbours that got their positions by one pass (a round
+/// of messages along the chain) are too close, or the chain does not agree after faults have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }
@@ -324,7 +324,9 @@ impl Chain {
         }
     }
 
-    /// Checks that a relay's view has no more relays on either side of it than the mission has.
+    /// Checks the view (membership of the chain) of a relay against the mission.
+    ///
+    /// On either side of the relay, the view must not have more relays than the mission.
     fn check_place(&self, at: usize) {
         if let Some(member) = self.members.get(at) {
             let relay = member.watched.relay();

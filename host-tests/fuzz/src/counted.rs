@@ -4,7 +4,8 @@ use uav_relay::Stats;
 
 /// Returns the number of received frames with a valid CRC. Each such frame is in exactly one of the summed counters.
 ///
-/// Unsigned frames count only with a `key`: without one they are messages, counted as received.
+/// `key` is true if the relay has a signing key. It then rejects unsigned frames, and their counter is added. Without
+/// a key it accepts them, and they are in the counters of accepted frames.
 pub const fn intact(stats: &Stats, key: bool) -> u32 {
     let unsigned = if key { stats.unsigned } else { 0 };
     stats.received

@@ -202,7 +202,7 @@ fn check_round_trip(plain: &[u8], wire: &[u8]) {
     }
 }
 
-/// Checks that a flipped bit in a frame is detected. The CRC chooses the bit.
+/// Checks that a flipped bit in a frame is detected. The bytes of the CRC determine which bit is flipped.
 fn check_flipped_bit(plain: &[u8]) {
     let mut plain = plain.to_vec();
     let bits = plain.len() * 8;

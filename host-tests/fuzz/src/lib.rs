@@ -41,7 +41,7 @@ pub use scenario::scenario;
 /// Fuzz target: its name, which is also that of its corpus, and its function.
 pub type Target = (&'static str, fn(&[u8]));
 
-/// Targets of all fuzz harnesses.
+/// List of all fuzz targets.
 pub const TARGETS: [Target; 6] = [
     ("deframe", deframe),
     ("frame", frame),

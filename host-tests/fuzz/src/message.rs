@@ -52,9 +52,9 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     body.bytes
 }
 
-/// Field that a sweep message has between the sender's power and the list of positions.
+/// Field that a sweep message has between the sender's power and its list of positions.
 ///
-/// A list entry is the farthest position at which the next relay meets one target SIR.
+/// The list has one position for each target SIR: the farthest one at which the next relay meets the target.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,

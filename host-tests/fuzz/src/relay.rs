@@ -27,7 +27,7 @@ const MAX_WAKES: u8 = 64;
 /// Fuzz target. Reads `data` as a mission, a relay, its settings, and operations on it.
 ///
 /// # Panics
-/// The relay breaks a promise that `watch` checks, or an intact frame is not counted exactly once.
+/// The relay breaks a rule that the module `watch` checks, or an intact frame is not counted exactly once.
 pub fn relay(data: &[u8]) {
     _ = flown(data);
 }
@@ -179,8 +179,8 @@ impl Bench {
         }
     }
 
-    /// Delivers arbitrary bytes. A recorded handshake among them changes the relay's nonces, so the fuzzer then
-    /// forgets its simulated neighbours.
+    /// Delivers arbitrary bytes. If they contain a recorded handshake, it changes the relay's nonces, so the fuzzer
+    /// then forgets its simulated neighbours.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);

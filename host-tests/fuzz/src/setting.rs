@@ -10,18 +10,18 @@ use uav_relay::{Auth, Key};
 
 use super::input::Input;
 
-/// Interference field of fuzzed missions: equally strong along the whole line.
+/// Interference along Tx-Rx in some fuzzed missions: equally strong everywhere.
 ///
-/// It is a constant, like the next ones, because a field is borrowed until the program ends.
+/// It is a constant, like the next ones, because a `Field` borrows its points until the program ends.
 const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
-/// Interference field of fuzzed missions: slightly uneven along the line.
+/// Interference along Tx-Rx in some fuzzed missions: slightly uneven.
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
-/// Interference field of fuzzed missions: changes by a factor of 10 000 within 10 m.
+/// Interference along Tx-Rx in some fuzzed missions: changes by a factor of 10 000 within 10 m.
 const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
-/// Interference field of fuzzed missions: from the weakest to the strongest that is permitted.
+/// Interference along Tx-Rx in some fuzzed missions: weakest permitted at Tx, strongest at 1 km.
 const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
-/// Interferer of the fuzzed mission that has lateral positions.
+/// Interferer in the fuzzed missions in which relays may leave the line Tx-Rx sideways.
 const BESIDE: Interference = Interference::Source(Interferer {
     power_w: 80.0,
     x_m: 500.0,

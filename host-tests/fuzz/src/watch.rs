@@ -54,14 +54,16 @@ pub struct Watched {
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Sites of the mission that the relay flies.
+    /// Surveyed positions of Tx and Rx in the mission that the relay uses now; `None` if it has none.
     sites: Option<Sites>,
-    /// Distance from Tx to Rx in the mission that the relay was loaded with, m.
+    /// Distance from Tx to Rx in the mission that was loaded into the relay before flight, m.
     loaded_m: f32,
     frames: Frames,
     /// Number of bytes received since the last frame delimiter, for each port.
     begun: [usize; 3],
-    /// View and number of the pass (round of messages) that gave the relay its position, if known.
+    /// Pass (round of messages along the chain) that gave the relay its position: view and number.
+    ///
+    /// `None` if unknown.
     held: Option<(ViewId, u16)>,
     flown: MissionConfig,
 }
@@ -114,12 +116,12 @@ impl Watched {
         self.frames.number
     }
 
-    /// Returns the association number in the relay's last fence message, 0 for none.
+    /// Returns the session number in the relay's last message of its collision guard (a fence), 0 for none.
     pub const fn association(&self) -> u16 {
         self.frames.association
     }
 
-    /// Returns the offer number in the relay's last hello, 0 for none.
+    /// Returns the number in the relay's last hello that an offer of a mission has to repeat, 0 for none.
     pub const fn offer_number(&self) -> u16 {
         self.frames.asked
     }
@@ -191,10 +193,10 @@ impl Watched {
         heap::without_allocation(|| self.relay.restart(now));
     }
 
-    /// Handles the relay's timeouts, returns its frames and events, and checks its promises.
+    /// Handles the relay's timeouts, returns its frames and events, and checks the rules that it must keep.
     ///
     /// # Panics
-    /// A promise is broken.
+    /// The relay breaks a rule.
     pub fn settle(&mut self, now: Instant) -> (Vec<Sent>, Vec<Event>) {
         heap::without_allocation(|| self.relay.handle_timeout(now));
         let mut sent = Vec::with_capacity(MOST_FRAMES);
@@ -232,8 +234,9 @@ impl Watched {
         (sent, events)
     }
 
-    /// Checks the relay's view: views increase, and each is reported and counted. The relay has an index in its view,
-    /// between its neighbours.
+    /// Checks the relay's view (membership of the chain): views increase, and each is reported and counted.
+    ///
+    /// The relay must have an index in its view, and the neighbours must be before and after it.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -261,8 +264,10 @@ impl Watched {
         self.stats = stats;
     }
 
-    /// Checks the relay's setpoint. Each change is reported. The setpoint is the agreed position, or inside the
-    /// guard's geofence.
+    /// Checks the relay's setpoint, and that each of its changes is reported.
+    ///
+    /// Without a collision guard the setpoint must be the agreed position. With a guard it must be inside the
+    /// geofence, or at least no farther outside than before.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
@@ -305,8 +310,9 @@ impl Watched {
         }
     }
 
-    /// Checks the relay's agreed position. It is between Tx and Rx and in the lateral range, at an altitude that this
-    /// relay may have.
+    /// Checks the relay's agreed position.
+    ///
+    /// It must be between Tx and Rx, in the permitted lateral range, and at an altitude permitted to this relay.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.agreed_place();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {

@@ -52,8 +52,9 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
     Some((Mission::try_new(config).ok()?, own.collect()))
 }
 
-/// Converts a reference link to a planner's scene, with a fixed altitude, that of the first relay. `None` without
-/// relays.
+/// Converts a reference link to the planner's description of a chain. `None` without relays.
+///
+/// The range of altitudes that the planner may choose from is the altitude of the first relay only.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
     let relay = |station: &Relay| scene::Relay {
@@ -81,8 +82,9 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
     })
 }
 
-/// Converts a link in an interference field, with identical relays, to a mission. `None` if a relay would reject a
-/// number.
+/// Converts a link with identical relays, and interference known only along the line, to a mission.
+///
+/// `None` if a relay would reject a number.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link

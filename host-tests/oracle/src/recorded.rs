@@ -26,7 +26,7 @@ static ALL: LazyLock<std::result::Result<Vec<Record>, String>> = LazyLock::new(|
     rows.collect()
 });
 
-/// Best known chain of a scene.
+/// Best known chain of a recorded placement problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Optimum {
     /// SIR (linear) of the chain's worst hop.
@@ -35,12 +35,12 @@ pub struct Optimum {
     pub places: Vec<Place>,
 }
 
-/// Recorded scene with its best known chain.
+/// Recorded placement problem with its best known chain.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Name of the test, and of its random stream, that draws this scene.
+    /// Name of the test that draws this problem, and of the test's random stream.
     pub set: String,
-    /// Link and corridor. The link's relays are at the corridor's lowest altitude.
+    /// Link, and the corridor in which its relays choose positions. In the link they are at the lowest altitude.
     pub scene: Scenario,
     /// Best known chain; `None` if no chain has a positive SIR and keeps the minimum separation.
     pub best: Option<Optimum>,
@@ -65,9 +65,9 @@ struct Row {
     eta: f64,
     #[serde(default)]
     noise_w: f64,
-    /// Lowest and highest altitude, smallest and largest y that a relay may choose, m.
+    /// Limits of a relay's position, m: lowest and highest altitude, smallest and largest lateral y.
     corridor: [f64; 4],
-    /// Index (from 0), y and altitude of each relay with a fixed y and altitude.
+    /// Relays with a fixed y and altitude: index (from 0), y and altitude of each, m.
     #[serde(default)]
     held: Vec<(usize, f64, f64)>,
     sir: f64,
@@ -138,8 +138,9 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a scene in f32, to find it among the recorded ones. The altitudes of `link` are left
-/// out, because the joint problem ignores them.
+/// Returns all parameters of a placement problem in f32, by which it is found in the recorded file.
+///
+/// The altitudes of `link` are left out, because relays choose their altitudes in these problems.
 fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {
     let common = [
         link.distance_m,
@@ -170,10 +171,10 @@ fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> 
         .collect()
 }
 
-/// Returns every recorded scene.
+/// Returns every recorded placement problem.
 ///
 /// # Errors
-/// If a line of the file is not a scene.
+/// If a line of the file is not such a problem.
 pub fn all() -> Result<&'static [Record]> {
     let all = ALL.as_ref().map(Vec::as_slice);
     all.map_err(|error| Error::other(error.clone()))
@@ -184,7 +185,7 @@ pub fn all() -> Result<&'static [Record]> {
 /// `None` if no chain has a positive SIR and keeps the minimum separation.
 ///
 /// # Errors
-/// If the scene is not recorded: `SEED` and `COUNT` of a test can select recorded scenes only.
+/// If the problem is not recorded: `SEED` and `COUNT` of a test can select recorded problems only.
 pub fn optimum(
     link: &Link,
     corridor: Corridor,

@@ -11,7 +11,8 @@ use uav_relay_sim::cli::Prepared;
 use uav_relay_sim::report::seconds;
 use uav_relay_sim::simulator::outcome::{Outcome, Shot, Transmission};
 
-/// Largest number of pictures of the chain in a recording. If there are more, those close in time are merged.
+/// Largest number of pictures of the chain in a recording. If there are more, pictures that are close in time are
+/// merged.
 const STANDS: usize = 600;
 
 /// Largest number of frames in a recording; later frames are left out.
@@ -19,7 +20,7 @@ const FRAMES: usize = 20_000;
 
 #[derive(Serialize)]
 pub(crate) struct FilmTold {
-    /// States of the chain at the times at which the picture changes, in order.
+    /// Pictures of the chain in order of time, one for each time at which something changed.
     stands: Vec<StandTold>,
     /// Frames that were sent, each with its time in s, sender's index, and direction.
     ///
@@ -34,9 +35,8 @@ struct StandTold {
     ///
     /// The position is `None` before the relay has agreed on one.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
-    /// SIR of every hop from Tx to Rx at that time, linear; empty if no relay counts.
-    ///
-    /// A relay counts if it is switched on and has a position.
+    /// Linear SIR of every hop from Tx to Rx, over the relays that are on and have a position. Empty if there are no
+    /// such relays.
     sirs: Vec<f32>,
     /// SIR of every hop in the direction from Rx to Tx, linear; empty for data in one direction.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -81,9 +81,9 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
     thinned(changes)
 }
 
-/// Merges changes of the picture that are close in time, until at most [`STANDS`] remain.
+/// Merges changes that are close in time, so that a recording has at most [`STANDS`] pictures.
 ///
-/// The merged change has the time of the later one.
+/// A merged change has the time of the later of its changes.
 fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
     let mut all = all;
     let mut apart_us = 1_000;

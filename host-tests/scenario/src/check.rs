@@ -205,7 +205,7 @@ fn as_number(value: &Value) -> Option<f64> {
 
 /// Creates the error for a table that [`table`] accepts but serde cannot convert.
 ///
-/// This is a fault of the program: the table of allowed keys and the Rust types differ.
+/// It is a bug of this crate: the table of allowed keys and the Rust types differ.
 pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),

@@ -126,7 +126,7 @@ pub(super) fn split(mut table: Table) -> (Table, Table) {
 
 /// Converts the `[network]`, `[companion]` and `[ground]` tables of a file to their types.
 ///
-/// [`check::table`] must have accepted the tables.
+/// [`check::table`] must have accepted the tables before.
 pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, ScenarioError> {
     let sections = sections.clone();
     sections

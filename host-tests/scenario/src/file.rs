@@ -17,9 +17,9 @@ use super::spec::{
     PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source,
 };
 
-/// Scenario file as serde reads it, before the keys are checked against each other.
+/// Contents of a scenario file as serde reads them, before the keys are checked against each other.
 ///
-/// `deny_unknown_fields` finds a key that the table of allowed keys has and this type lacks: parsing then fails.
+/// With `deny_unknown_fields`, parsing fails if the table of allowed keys has a key that this type lacks.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFile {
@@ -96,7 +96,7 @@ struct RawDataLink {
 }
 
 impl RawDataLink {
-    /// Returns true if `[link]` describes a radio. A table with only the key `reverse` does not.
+    /// Returns true if `[link]` describes a data link. A `[link]` with only the key `reverse` does not.
     const fn has_radio(&self) -> bool {
         self.access.is_some()
             || self.bandwidth_hz.is_some()
@@ -459,7 +459,7 @@ fn relays(
     Ok(relays)
 }
 
-/// Builds the `[plan]` of a file. It is an error unless the plan has exactly one position for every relay.
+/// Converts the `[plan]` table of a file. Returns an error unless it has one position for each of its relays.
 fn planned(file: &str, raw: RawPlan) -> Result<Planned, ScenarioError> {
     if raw.places.len() != usize::from(raw.uavs) {
         return Err(mistake(
@@ -495,10 +495,10 @@ struct RawSite {
     amsl_m: f64,
 }
 
-/// Returns the geographic line from Tx to Rx, if the file has `[site]`, and its length, m.
+/// Returns the geographic line from Tx to Rx (`None` if the file has no `[site]`), and its length, m.
 ///
-/// Without `[site]` the distance is the given `distance_m`, otherwise that between the sites. It is an error if both
-/// are given and differ.
+/// With `[site]` the length is computed from the positions of Tx and Rx, and a `distance_m` that differs is an error.
+/// Without `[site]` the length is `distance_m`.
 pub(super) fn line(
     file: &str,
     sites: Option<RawSites>,
@@ -682,9 +682,10 @@ pub(super) fn powers(file: &str, raw: &RawPower) -> Result<Powers, ScenarioError
     })
 }
 
-/// Largest error, dB, from treating an interferer above or below the ground as on the ground.
+/// Largest accepted error of the interference, dB, by assuming that an interferer is on the ground.
 ///
-/// An interferer with a larger error is rejected. The error is checked at every position that relays or Rx may have.
+/// An interferer so far above or below the ground that the error is larger is rejected. The error is checked at every
+/// position that relays or Rx may have.
 const MAX_HEIGHT_ERROR_DB: f64 = 1.0;
 
 #[derive(Deserialize)]
@@ -800,9 +801,9 @@ fn on_earth(
 }
 
 impl RelayArea<'_> {
-    /// Returns the largest error of the interference, dB, from treating an interferer as on the ground.
+    /// Returns the largest error of the interference, dB, by assuming that an interferer is on the ground.
     ///
-    /// The interferer is at (`x_m`, `y_m`), `above_m` over the ground, m. The error is checked at Rx and, for 65
+    /// In truth it is at (`x_m`, `y_m`), `above_m` over the ground, m. The error is checked at Rx and, for 65
     /// altitudes, at the relay position nearest to the interferer, where it is largest.
     fn height_error_db(&self, x_m: f64, y_m: f64, above_m: f64) -> f64 {
         const STEPS: u32 = 64;

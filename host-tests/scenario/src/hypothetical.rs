@@ -11,30 +11,33 @@
 use super::Source;
 use super::scene::{Place, Scene};
 
-/// Approximate number of quadrature points for the error during the grid search, which needs speed.
+/// Approximate number of points at which the grid search evaluates the error of a fitted interferer. They are few,
+/// because the search evaluates the error at many positions.
 const COARSE: usize = 400;
 
-/// Approximate number of quadrature points for the error in the final refinement of the position.
+/// Approximate number of points at which the final search evaluates the error of a fitted interferer.
 const FINE: usize = 4_000;
 
-/// Number of grid steps along the line, in the search for the interferer's side of the line.
+/// Number of steps from Tx to Rx in a grid of relay positions. [`Hypothetical::sided`] compares an interferer on both
+/// sides of the line at these positions.
 const ALONG: u32 = 64;
-/// Number of lateral grid steps, in the search for the interferer's side of the line.
+/// Number of lateral steps in the grid of relay positions that [`Hypothetical::sided`] uses.
 const ASIDE: u32 = 8;
 
-/// Approximate number of quadrature points for the error that is reported with the result.
+/// Approximate number of points at which the reported error of the fitted interferer is evaluated.
 const REPORTED: usize = 60_000;
 
-/// Largest lateral distance y_H of the hypothetical interferer, relative to the extent of the scene.
+/// Largest lateral distance y_H at which the search places the interferer, in sizes of the scene.
 ///
-/// At 30 times the extent, the interference is uniform to a thousandth.
+/// At this distance the interference is already the same at all relay positions to a thousandth, so a larger one
+/// would change nothing.
 const FAR: f64 = 30.0;
 
-/// Grid step of the search for the lateral distance y_H, in u = asinh(y_H / lowest altitude). For y_H well above the
-/// lowest altitude, a step multiplies y_H by about 1.4.
+/// Grid step of the search for the lateral distance y_H of the interferer. The grid is even in u = asinh(y_H / lowest
+/// altitude), so its steps in y_H grow: far from the line each multiplies y_H by about 1.4.
 const RISE: f64 = 0.35;
 
-/// Largest number of the grid's local minima, and of true interferers, from which searches start.
+/// Largest number of local searches that start at grid points, and that start at true interferers.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
@@ -48,9 +51,11 @@ pub struct Hypothetical {
     pub x_m: f64,
     /// Lateral position of the hypothetical interferer (y_H), m; positive to the right of the line.
     pub y_m: f64,
-    /// Mean absolute error of the interference power over the possible relay positions above the line, W.
+    /// Mean absolute error of the interference power, W, over the possible relay positions. These are in the vertical
+    /// plane from Tx to Rx.
     pub mean_abs_error_w: f64,
-    /// Integral of the absolute error divided by the integral of the true interference; 0 is a perfect fit.
+    /// Relative error: integral of the absolute error / integral of the true interference. Both integrals are over
+    /// the possible relay positions. 0 is a perfect fit.
     pub relative_error: f64,
 }
 
@@ -162,9 +167,9 @@ pub fn fit(scene: &Scene, raster: &Raster) -> Option<Fit> {
     })
 }
 
-/// Returns the starting points of the local searches, as (x, u) in `space`.
+/// Returns the points (x, u) of the search space from which the local searches start.
 ///
-/// They are the deepest local minima of a grid, and the true sources with the smallest errors.
+/// They are the deepest local minima of a grid, and the positions of the true interferers with the smallest errors.
 fn starts(scene: &Scene, space: &Space, raster: &Raster) -> Vec<(f64, f64)> {
     let rows = space.rows();
     let columns: Vec<Vec<Corner>> = space
@@ -260,8 +265,8 @@ impl Space {
         raster.best_power(x, y).error
     }
 
-    /// Returns the grid of the search along x, m. The spacing is D / 16 in the middle between Tx and Rx, and wider
-    /// further out.
+    /// Returns the grid of x, m, for the search. The spacing is D / 16 halfway between Tx and Rx and grows with the
+    /// distance from there, where D is the distance from Tx to Rx.
     fn columns(&self) -> Vec<f64> {
         let half = 0.5 * self.distance_m;
         let middle = Centre {
@@ -303,7 +308,7 @@ impl Space {
     }
 }
 
-/// Largest width of a quadrature cell, relative to the distance to the nearest source.
+/// Largest width of a quadrature cell, relative to the distance to the nearest interferer.
 const WIDEST_STEP: f64 = 0.9;
 
 const TRIES: u32 = 6;
@@ -313,7 +318,7 @@ struct Node {
     x: f64,
     h_squared: f64,
     weight: f64,
-    /// Sum of p / distance^2 over the true sources of power p, at this quadrature point, W/m^2.
+    /// Sum of p / distance^2 at this quadrature point over the true interferers, each of power p, W/m^2.
     truth: f64,
 }
 
@@ -343,7 +348,7 @@ pub struct BestPower {
 type WeightedCoordinate = (f64, f64);
 
 impl Raster {
-    /// Creates quadrature points at the centres of `columns` x `rows` equal cells.
+    /// Creates the quadrature points of a midpoint rule: the centres of `columns` x `rows` equal cells.
     ///
     /// There is one row if the lowest and the highest altitude are equal.
     pub fn even(scene: &Scene, columns: u32, rows: u32) -> Self {
@@ -362,10 +367,10 @@ impl Raster {
         Self::of(scene, &rows, |_| midpoints(0.0, scene.distance_m, columns))
     }
 
-    /// Creates quadrature points in cells that are smaller near the sources and near `also`, (x, y) in m.
+    /// Creates quadrature points in cells that are smaller near the interferers and the position `also`.
     ///
-    /// Each cell has two Gauss points per direction. The number of points is at most about `most`, > 100, unless the
-    /// number of sources alone requires more.
+    /// `also` is (x, y) in m. Each cell has two Gauss points per direction. The number of points is at most about
+    /// `most`, > 100, unless the number of interferers alone requires more.
     pub fn graded(scene: &Scene, also: Option<(f64, f64)>, most: usize) -> Self {
         let sharp: Vec<(f64, f64)> = scene
             .sources
@@ -448,22 +453,23 @@ impl Raster {
         self.nodes.is_empty()
     }
 
-    /// Returns the area over which the points integrate, m^2, or the length, m, if they are on a line.
+    /// Returns the area that the quadrature points cover, m^2, or the length, m, if they are on a line.
     pub fn area(&self) -> f64 {
         self.area
     }
 
-    /// Returns the integral of the sum of p / distance^2 over the true sources. The unit is that of
-    /// [`BestPower::error`].
+    /// Returns the integral of S, the sum of p / distance^2 over the true interferers of power p.
+    ///
+    /// The unit is the same as in [`BestPower::error`].
     pub fn total(&self) -> f64 {
         self.total
     }
 
     /// Returns the best power of a hypothetical interferer at (`x`, `y`), m, and the error that remains.
     ///
-    /// The error is the integral of |p g - S|, where g = 1 / distance^2 is the effect of the interferer per watt, p
-    /// its power, and S the same from the true sources. The best p is the median of S / g, weighted by g. The time is
-    /// linear in the number of points.
+    /// The error is the integral of |p g - S|. p is the interferer's power, and g = 1 / distance^2 its effect per
+    /// watt. S is the sum of p g over the true interferers. The best p is the median of S / g, weighted by g. The
+    /// time is linear in the number of points.
     pub fn best_power(&self, x: f64, y: f64) -> BestPower {
         let shape = |node: &Node| {
             let dx = node.x - x;
@@ -662,7 +668,8 @@ mod tests {
         close(median(&[]), 0.0);
     }
 
-    /// Checks that the simplex method finds the minimum of a narrow pit. It has to shrink the simplex to reach it.
+    /// Checks that the simplex method finds a narrow minimum even if the first simplex is much wider. The method then
+    /// has to shrink the simplex.
     #[test]
     fn a_simplex_that_is_too_large_shrinks() {
         let pit = |(x, y): (f64, f64)| {

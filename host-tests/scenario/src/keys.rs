@@ -30,7 +30,7 @@ pub(super) enum Rule {
     /// Text that names a serial port or the UDP address of an autopilot.
     TtyOrUdp,
     Table(Keys),
-    /// An array of tables with at least this number of entries.
+    /// List of tables, each with these keys; at least the given number of tables.
     Tables(Keys, usize),
 }
 
@@ -259,7 +259,7 @@ const BETA: Keys = &[
 ];
 
 impl Key {
-    /// Returns true if `table`, which does not have this key, is required to have it.
+    /// Returns true if this key is missing in `table`: `table`, which does not have the key, must have it.
     pub(super) fn is_missed(&self, table: &Table) -> bool {
         match self.need {
             Need::Always => true,

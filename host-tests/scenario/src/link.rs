@@ -36,7 +36,7 @@ pub enum Access {
     Slots,
     /// A separate frequency for each hop, so that all hops send at the same time.
     Channels,
-    /// A single frequency. Each hop has a time slot as long as it needs for the same amount of data.
+    /// A single frequency. The length of each hop's time slot is such that all hops carry the same amount of data.
     Fitted,
 }
 
@@ -53,7 +53,8 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots in which each hop of `relays` relays sends once per direction.
+    /// Returns the number of time slots after which every hop has sent once in each direction. It is 1 per direction
+    /// if every hop has its own frequency.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
@@ -123,8 +124,8 @@ impl RateModel {
     }
 }
 
-/// Returns the data rate of the worse direction, bit/s: the rate to Tx counts divided by `reverse`. If `reverse` is
-/// 0, returns the rate to Rx.
+/// Returns the data rate of the worse direction, bit/s, for comparing plans. It is the smaller one of the rate to Rx
+/// and the rate to Tx divided by `reverse`. If `reverse` is 0, only the rate to Rx counts.
 pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
     if reverse > 0.0 {
         there_bps.min(back_bps / reverse)
@@ -223,10 +224,11 @@ impl Radio {
         }
     }
 
-    /// Returns the data rates to Rx and back, bit/s, of a chain that uses both directions.
+    /// Returns the data rates to Rx and back to Tx, bit/s, of a chain that sends in both directions.
     ///
-    /// `there` and `back` are the SIRs (linear) of its hops. `reverse` is r of a chain that is planned for both directions, and 0
-    /// otherwise: then each direction has half of the time.
+    /// `there` and `back` are the linear SIRs of the hops in these directions. `reverse` above 0 is the planned ratio
+    /// of both rates; with fitted slots the slots then have this ratio. In all other cases each direction has half of
+    /// the time.
     pub fn both_bps(&self, there: &[f64], back: &[f64], reverse: f64) -> [f64; 2] {
         if reverse > 0.0 && self.link.access == Access::Fitted {
             let time = |sirs| match self.chain_bps(sirs) {

@@ -22,7 +22,7 @@ pub enum Refusal {
     ///
     /// Plans for several interferers are for the direction from Tx to Rx only.
     ReverseSources,
-    /// The distance from Tx to Rx is too short for the relays with their least separation.
+    /// The distance from Tx to Rx is too short for that number of relays at their least separation.
     NoRoom {
         /// Number of relays.
         relays: u16,
@@ -67,9 +67,10 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// Converts a scenario to a mission of `uavs` relays, and lists relays with an own altitude or power.
+/// Converts a scenario to a mission of `uavs` relays. Also returns the relays that differ from the others.
 ///
-/// Several interferers are replaced by one. Each listed profile comes with the index of its relay, from 1.
+/// They are the relays with an altitude or a power of their own, as index (from 1) and profile. Several interferers
+/// are replaced by a single one.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -179,10 +180,10 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission as relays know it before they measure: equal interference everywhere.
+/// Returns the mission as known before the first measurements: equal interference everywhere.
 ///
-/// In a random field, the mean of the inverse interference (Upsilon) is set to that at Rx. Other missions are
-/// returned unchanged.
+/// In a random field, the mean of the inverse interference has its value at Rx everywhere. A mission without a random
+/// field is returned unchanged.
 #[must_use]
 pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();
@@ -206,10 +207,10 @@ pub fn with_uniform_field(mission: &Mission) -> Mission {
         .unwrap_or(*mission)
 }
 
-/// Returns the Beta distribution's alpha and beta, for the interference at `x_m` relative to `i_max_w`.
+/// Returns alpha and beta of the Beta distribution of I / `i_max_w` at `x_m`. I is the interference.
 ///
-/// Between two points of the field, alpha and Upsilon (the mean of `i_max_w` / I) are interpolated, and beta follows
-/// from them.
+/// Between two points of the field, alpha and the mean of `i_max_w` / I are interpolated. Beta follows from these
+/// two.
 pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     let of = |point: &crate::BetaPoint| {
         let upsilon = (point.alpha + point.beta - 1.0) / (point.alpha - 1.0);
@@ -232,9 +233,9 @@ pub fn shapes(spec: &crate::Field, x_m: f64) -> (f64, f64) {
     (alpha, (upsilon - 1.0) * (alpha - 1.0))
 }
 
-/// Converts the scenario's field of interference to that of a mission.
+/// Converts the scenario's random field of interference to the field of a mission.
 ///
-/// A mission borrows its points for the program's lifetime, as from a firmware's image, so they are never freed.
+/// The memory of its points is never freed, because a mission borrows them for the lifetime of the program.
 fn field(spec: &crate::Field) -> Result<Field, FieldError> {
     let points: Option<Vec<FieldPoint>> = spec
         .beta

@@ -52,7 +52,8 @@ pub struct Scene {
     pub tx_w: f64,
     /// Transmit power of Rx when it sends toward Tx, W, > 0.
     pub rx_w: f64,
-    /// Ratio of the SIR needed from Rx to Tx to that from Tx to Rx; 0 if only the way to Rx counts.
+    /// SIR that hops need from Rx to Tx, as a fraction of the SIR needed from Tx to Rx. It is 0 if only the direction
+    /// to Rx counts.
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
@@ -98,8 +99,8 @@ impl From<Placement> for Place {
 impl Scene {
     /// Creates the scene of a chain of `relays` relays in `scenario`.
     ///
-    /// `None` if the interference is a random field, or if the channel or the list of interferers is invalid. A
-    /// scenario from a file has neither an invalid channel nor, unless relays locate the interferer, an empty list.
+    /// `None` if the interference is a random field, if there is no interferer, or if the channel is invalid. A
+    /// scenario from a file has a valid channel, and lacks an interferer only if relays have to locate it.
     pub fn new(scenario: &Scenario, relays: u16) -> Option<Self> {
         let Interference::Sources(sources) = &scenario.interference else {
             return None;
@@ -184,8 +185,9 @@ impl Scene {
 
     /// Returns the linear SIRs of the N + 1 hops from Rx to Tx, with relay k at `places[k - 1]`.
     ///
-    /// Entry k - 1 is the hop from node k to node k - 1, where node 0 is Tx and node N + 1 is Rx. The interference is
-    /// that at node k - 1. The list is empty, and a SIR infinite, under the conditions of [`Scene::hop_sirs`].
+    /// Entry k - 1 is the hop from node k to node k - 1, where node 0 is Tx and node N + 1 is Rx. It has the
+    /// interference at the receiver, node k - 1. The list is empty, and a SIR infinite, under the conditions of
+    /// [`Scene::hop_sirs`].
     pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
             return Vec::new();

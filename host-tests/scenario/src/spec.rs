@@ -59,7 +59,7 @@ pub struct Scenario {
     pub plan: Option<Planned>,
 }
 
-/// Line from Tx to Rx in geographic coordinates, and the sites of its ends.
+/// Line from Tx to Rx in geographic coordinates, and the geographic positions of its ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     /// Coordinate system of the line from Tx to Rx. It converts between geographic and local positions.
@@ -70,23 +70,24 @@ pub struct Line {
     pub geoid_m: Option<f64>,
 }
 
-/// Radio channel: the carrier frequency, and the losses in addition to that of free space.
+/// Radio channel: the carrier frequency, and the losses in addition to the free-space loss.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelSpec {
     /// Carrier frequency of the radio channel, Hz, 1e6 to 1e12.
     pub carrier_hz: f64,
-    /// Loss of a line-of-sight link in addition to that of free space, dB, 0 to 200.
+    /// Loss of a line-of-sight link in addition to the free-space loss, dB, 0 to 200.
     pub excess_loss_los_db: f64,
-    /// Loss of an obstructed link in addition to that of free space, dB, `excess_loss_los_db` to 200.
+    /// Loss of an obstructed link in addition to the free-space loss, dB, `excess_loss_los_db` to 200.
     pub excess_loss_nlos_db: f64,
     /// Kind of the links between ground and air: line of sight, obstructed, or a mixture.
     pub air_ground: AirGround,
 }
 
-/// Settings for relays that locate the interferer. For a missing value, `None`, that of [`Listen`] applies.
+/// Settings for relays that locate the interferer by measurements. A missing value, `None`, means the default of
+/// [`Listen`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ListenSpec {
-    /// True if the interferer moves. The defaults of the other settings are then those of [`Listen::following`].
+    /// True if the interferer moves. Missing settings then have the defaults of [`Listen::following`].
     pub following: bool,
     /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
@@ -125,9 +126,9 @@ pub struct Noise {
     pub bandwidth_hz: f64,
     /// Noise figure of the receivers, dB, 0 to 60; 6 by default.
     pub figure_db: f64,
-    /// Noise power, dBm, -200 to 0. If given, it replaces the one from bandwidth and noise figure.
+    /// Noise power, dBm, -200 to 0. If given, it is used instead of the one computed from bandwidth and noise figure.
     pub power_dbm: Option<f64>,
-    /// Antenna gains, dBi, -30 to 60: first that of the relays, then that of Rx. The default is 0.
+    /// Antenna gains, dBi, -30 to 60: of the relays, then of Rx. The default is 0.
     pub gains_dbi: [f64; 2],
 }
 
@@ -169,10 +170,9 @@ impl Noise {
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the mission's noise power is too high for some receivers.
+    /// Returns true if the mission's noise power is too high for the receivers with more antenna gain.
     ///
-    /// A mission has one noise power. It is that of the lowest antenna gain, so it is too high where the gain is
-    /// higher.
+    /// A mission has a single noise power for all receivers, which is right for the lowest antenna gain.
     pub fn is_uneven(&self) -> bool {
         let [relays, rx] = self.gains_dbi;
         self.receiver_w() > 0.0 && relays.total_cmp(&rx).is_ne()
@@ -232,7 +232,7 @@ pub struct BetaPoint {
     pub beta: f64,
 }
 
-/// Altitude and power of one relay that differ from those of the others. At least one is set if read from a file.
+/// Altitude and power of one relay, if they differ from the common values. At least one is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
     /// Fixed altitude of this relay, m, 0.1 to 1e4. It may be outside `altitude_min_m` to `altitude_max_m`.
@@ -242,9 +242,9 @@ pub struct RelayOverride {
 }
 
 impl Default for ChannelSpec {
-    /// Returns the paper's channel: 2 GHz, excess losses of 0.1 and 21 dB, line of sight to the ground.
+    /// Returns the paper's channel: 2 GHz, and line of sight between relays and the ground.
     ///
-    /// 0.1 dB is the excess loss with line of sight, 21 dB that of an obstructed link.
+    /// The excess loss is 0.1 dB with line of sight and 21 dB for an obstructed link.
     fn default() -> Self {
         Self {
             carrier_hz: 2e9,
@@ -289,9 +289,8 @@ impl Default for Scenario {
 }
 
 impl Scenario {
-    /// Returns the bandwidth of the data link, Hz, as the scenario gives it.
-    ///
-    /// It is that of `[link]`, or else that of `[noise]`; `None` without either.
+    /// Returns the bandwidth of the data link, Hz, from the scenario: `[link]`, or else `[noise]`. `None` if neither
+    /// has a bandwidth.
     pub fn bandwidth_hz(&self) -> Option<f64> {
         let own = self.link.as_ref().and_then(|link| link.bandwidth_hz);
         own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))

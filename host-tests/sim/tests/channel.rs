@@ -92,14 +92,16 @@ fn a_hundred_agree_at_the_least_baud_with_30_percent_loss() {
     agree_and_hold(100, 0.3, 2);
 }
 
-/// Returns the largest number of index claims, and of echoes of them, that a relay sends until `ended`.
+/// Returns the largest number of claims and echoes of claims that a relay may send until `ended`.
+///
+/// A claim is a message to find out if two relays use one number; its receiver sends it back as an echo.
 fn most_claims(ended: Instant) -> u64 {
     let ms = ended.as_micros() / 1_000;
     let first = (1..=6).filter(|k| 250 * ((1 << k) - 1) <= ms);
     2 * (first.count() as u64 + ms / 15_000)
 }
 
-/// Checks that without faults any number of relays agree with one message to the end and back.
+/// Checks that without faults one message along the chain and back is enough for an agreement.
 #[test]
 fn without_faults_one_sweep_is_enough() {
     for relays in [2, 8, 50, 100, 200, 300, 600, 1_000] {
@@ -117,7 +119,7 @@ fn without_faults_one_sweep_is_enough() {
     }
 }
 
-/// Largest allowed growth of a median divided by N log N, for N relays, compared with 25 relays.
+/// Largest accepted growth of a median time or count from 25 to N relays, relative to N log N.
 const MOST: f64 = 1.5;
 
 /// Checks that the time and the messages until an agreement of N relays grow like N log N on bad links.

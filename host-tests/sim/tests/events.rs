@@ -32,7 +32,9 @@ fn of(outcome: &Outcome, what: fn(TimelineEvent) -> bool) -> Vec<(u16, Option<u1
         .collect()
 }
 
-/// Checks that relays report a lost neighbour by its number, and the next neighbour by its own number.
+/// Checks the numbers in the reports of a lost neighbour and of the new neighbour beyond it.
+///
+/// Relay 3 of five is switched off, so that relays 2 and 4 report the loss of 3, and then find each other.
 #[test]
 fn lost_and_found_relays_are_reported_by_index() {
     let mut setup = Setup::on_shared_channel(mission(5)).soaked(at(200));
@@ -73,7 +75,7 @@ fn a_relay_that_is_not_received_is_reported() {
 
 /// Checks that lost and corrupted frames cause no false reports about other nodes.
 ///
-/// Such reports would be of nodes that do not receive, of wrong keys, or of old epochs.
+/// A false report says that a node does not receive this relay, has another key, or uses an old epoch.
 #[test]
 fn a_bad_channel_causes_no_false_reports() {
     for seed in 1..=3 {
@@ -259,9 +261,9 @@ pub(crate) fn mission(relays: u16) -> Mission {
 
 const TAKEN: Event = Event::DuplicateIndex { node: 3 };
 
-/// Returns a chain of five relays with positions, in which a second relay 3 was switched on.
+/// Returns a chain of five relays with positions to which a second relay with the number 3 was added.
 ///
-/// The second value is the index (from 0) of that relay.
+/// The second value is the index (from 0) of the added relay.
 fn joined(loss: f64, seed: u64) -> (Air, usize) {
     let mission = mission(5);
     let begun = Instant::ZERO;
@@ -326,9 +328,8 @@ fn a_duplicate_joins_when_the_other_one_is_gone() {
     }
 }
 
-/// Checks that of two relays with one number that start together, one flies in the end.
-///
-/// The other one is passive.
+/// Checks that of two relays with one number that start together, only one flies in the end. The other relay becomes
+/// passive, which means that it gets no setpoint.
 #[test]
 fn one_of_two_simultaneous_duplicates_flies() {
     for seed in 0..6 {
@@ -346,9 +347,9 @@ fn one_of_two_simultaneous_duplicates_flies() {
     }
 }
 
-/// Checks that of two relays with one number that sign, the one with the larger epoch stays active.
+/// Checks that of two relays with the key and one number, the relay with the larger epoch stays active.
 ///
-/// The other relay becomes passive and reports the duplicate.
+/// The other relay becomes passive: it gets no setpoint, and reports the duplicate.
 #[test]
 fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {
@@ -369,7 +370,8 @@ fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     }
 }
 
-/// Checks that an attacker without the key can cause a report of a duplicate, but no passive relay.
+/// Checks that an attacker without the key can make relays report a duplicate, but makes none passive. A passive
+/// relay gets no setpoint.
 #[test]
 fn forged_frames_make_no_relay_passive() {
     let mission = mission(3);
@@ -447,10 +449,11 @@ fn an_epoch_that_went_back_is_reported_with_the_node() {
     }
 }
 
-/// Checks a relay 2 that restarts with the same epoch. Its neighbours take it for a second relay 2.
+/// Checks a relay that restarts with its old epoch. Its neighbours take it for a second relay 2.
 ///
-/// With the larger random claim it takes part at once. With the smaller one it reports that its number is taken, and
-/// gets no setpoint until its neighbours have received nothing of the larger claim for `dead_after`.
+/// At each start a relay draws a random claim number. If the new number is the larger one, the relay takes part at
+/// once. Otherwise it reports a duplicate, and gets no setpoint until its neighbours have received nothing of the old
+/// claim number for `dead_after`.
 #[test]
 fn with_a_reused_epoch_a_relay_joins_or_reports_and_waits() {
     let mut waited = 0;

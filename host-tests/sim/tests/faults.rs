@@ -79,9 +79,9 @@ fn median_and_worst(mut all: Vec<f64>) -> (f64, f64) {
 /// Time at which relay 4 of eight is switched off, s.
 const DIES_S: u64 = 20;
 
-/// Returns the time, s, for which the chain was not as good as possible after relay 4 was switched off.
+/// Returns the time, s, from the loss of relay 4 in which the chain was not at its best positions.
 ///
-/// `None` unless the seven remaining relays are in one view at the end.
+/// `None` if the relays never agreed, or unless the seven remaining relays are in one view at the end.
 fn recovery(outcome: &Outcome) -> Option<f64> {
     let left = || outcome.relays.iter().filter(|relay| relay.killed.is_none());
     // The remaining relays may be forming another view when the run ends.
@@ -209,7 +209,7 @@ fn after_two_cuts_all_relays_return_to_one_view() {
 
 /// Duration of a run with a one-way link, s.
 const ONE_WAY_S: u64 = 400;
-/// Time at the end of a run with a one-way link in which nothing may change, s.
+/// Period at the end of a run with a one-way link, s, in which the chain may not change any more.
 const STILL_S: u64 = 120;
 
 /// Returns the setups of runs with each possible one-way link in chains of 4 and 8 relays.
@@ -238,7 +238,7 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
 
 /// Describes what is wrong at the end of a run with a one-way link; `None` if nothing is.
 ///
-/// All relays except one of the two at the link have to hold positions in one view, without recent changes.
+/// All relays except one at the failed link must have positions in one view, without changes in the last [`STILL_S`].
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {
     let seen: Vec<_> = outcome.relays.iter().map(|relay| relay.observed).collect();
     let agreements = groups(&seen);
@@ -444,10 +444,10 @@ fn random_faults_let_at_most_one_group_fly() {
     fly(number("SEED", 1), number("COUNT", 300));
 }
 
-/// Checks that only one group flies, in a run in which two groups flew at once before a fix.
+/// Checks a run in which, before a fix, two groups of relays flew by separate agreements.
 ///
-/// A view that only the last relay had accepted was followed by one without the relays that had voted for it and held
-/// its lease.
+/// Only the last relay had accepted a view. The next view was then formed without the relays that had voted for that
+/// view and relied on its lease.
 #[test]
 fn an_unheard_decision_ends_no_lease() {
     let mut sequence = sequence(6_450);

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::*;
 
-/// Number of senders to one listener: large enough that none has two frames at once.
+/// Number of senders that one listener receives. They are so many that no sender has two frames to send at once.
 const NODES: usize = 400;
 
 /// Length of a frame in bytes, chosen so that its air time is a whole number of microseconds.

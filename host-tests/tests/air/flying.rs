@@ -3,7 +3,8 @@
 use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::watch::{ObservedState, groups, has_agreed};
 
-/// Returns the state of a flying relay: relay `index` of `relays` relays in membership view `view`.
+/// Returns the observed state of a relay with a valid position, in membership view `view`. It is relay `index` of
+/// `relays`.
 fn seen(view: u32, relays: u16, index: u16) -> ObservedState {
     ObservedState {
         is_on: true,
@@ -32,7 +33,7 @@ fn relays_of_one_view_are_one_group_and_of_two_views_two() {
     assert_eq!(groups(&halves), 2);
 }
 
-/// Function that changes one field of a relay's observed state, so that the relay counts as not flying.
+/// Function that changes one field of a relay's observed state, so that its position becomes invalid.
 type Change = fn(&mut ObservedState);
 
 #[test]

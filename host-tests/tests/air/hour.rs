@@ -15,8 +15,8 @@ const DIES_S: u64 = 60;
 /// Time at which a run with a failing relay ends, s.
 const ENDS_S: u64 = 900;
 
-/// Returns eight relays on a CSMA channel of 57 600 baud that loses the fraction `share` of the frames. The losses
-/// come in runs of `burst` frames. The frames are signed.
+/// Returns the setup of eight relays on a CSMA channel of 57 600 baud that loses frames. It loses the fraction
+/// `share` of the frames, in runs of `burst` frames. The frames are signed.
 fn losing(share: f64, burst: f64) -> Setup {
     let mut setup = Setup::on_air(mission(8), Access::Csma);
     setup.link.baud = 57_600;
@@ -99,9 +99,10 @@ fn availability_in_an_hour_on_a_bad_channel() {
 
 /// Random seeds of simulated hours in which one relay repeatedly loses the links to both neighbours.
 ///
-/// Half of the frames are lost, in runs of 20. If each silence between the relay's own rare requests counted as one
-/// more loss, its links would be held down for good, and the chain would be complete for only 4, 2, 11 and 28 % of
-/// the hour. The environment variable `SEEDS` (as `201-800`) overrides the seeds.
+/// They test that the relay gets its links back. Half of the frames are lost, in runs of 20. If each silence between
+/// the relay's own rare requests counted as one more loss, its links would never be used again, and the chain would
+/// be complete for only 4, 2, 11 and 28 % of the hour. The environment variable `SEEDS` (as `201-800`) overrides the
+/// seeds.
 const LONG_SEARCHES: [u64; 4] = [519, 625, 777, 1_030];
 
 #[test]

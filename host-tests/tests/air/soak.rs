@@ -69,8 +69,8 @@ fn the_optimum_is_that_of_the_remaining_relays() {
     assert_eq!(places.len(), 7);
 }
 
-/// Returns eight relays whose link between relays 4 and 5 fails for good after 30 s. `quorum` requires a majority of
-/// the relays for an agreement.
+/// Returns the setup of eight relays whose link between relays 4 and 5 fails for good after 30 s. If `quorum` is
+/// true, an agreement needs a majority of the relays.
 fn split(quorum: bool) -> Setup {
     let mut setup = Setup::on_shared_channel(mission(8));
     setup.settings.quorum = quorum;

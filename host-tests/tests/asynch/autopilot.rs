@@ -84,7 +84,7 @@ impl Write for Uart {
     }
 }
 
-/// Simulated PX4 that reaches targets at once. Until `given_at` its pilot flies it, then the companion.
+/// Simulated PX4 that reaches targets at once. Its pilot flies it until `given_at`, and the companion from then on.
 struct Vehicle {
     mute: Cell<bool>,
     given_at: Cell<Instant>,
@@ -199,7 +199,7 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// Creates relay 1 of `relays` relays between two sites on earth, with a motion guard.
+/// Creates relay 1 of `relays` relays with a motion guard, between surveyed positions of Tx and Rx.
 fn relay(relays: u16) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -233,13 +233,14 @@ struct Scene {
 }
 
 impl Scene {
-    /// Creates a scene with a single relay. With `tells`, the firmware passes the relay's events to the autopilot
-    /// link.
+    /// Creates a test scene with a single relay. If `tells` is true, the firmware passes the relay's events to the
+    /// autopilot link.
     fn new(tells: bool) -> Self {
         Self::of(1, tells)
     }
 
-    /// Creates a scene with relay 1 of `relays`. With `tells`, the firmware passes its events to the autopilot link.
+    /// Creates a test scene with relay 1 of `relays`. If `tells` is true, the firmware passes its events to the
+    /// autopilot link.
     fn of(relays: u16, tells: bool) -> Self {
         let time = Time::default();
         let pool = LocalPool::new();
@@ -341,7 +342,8 @@ fn the_drone_is_engaged_and_led_to_its_position() {
     }
 }
 
-/// Checks that a silent autopilot makes the relay and the firmware treat the drone as not flown.
+/// Checks that setpoint control ends if the autopilot falls silent. Setpoint control returns only if the pilot
+/// chooses it again.
 #[test]
 fn a_silent_autopilot_is_found_again() {
     let mut scene = Scene::new(true);
@@ -396,9 +398,10 @@ fn a_stuck_writer_does_not_stop_the_readers() {
     );
 }
 
-/// Checks that an operator's command clears a lost neighbour, which means that its drone is gone.
+/// Checks that a relay forgets its lost neighbour on an operator's command.
 ///
-/// The firmware passes the relay's events to the autopilot link.
+/// The operator sends the command because the neighbour's drone is gone. The firmware passes the relay's events to
+/// the autopilot link.
 #[test]
 fn an_operator_clears_a_lost_relay() {
     let mut scene = Scene::of(2, true);

@@ -30,7 +30,7 @@ fn five_async_relays_settle_like_bare_relays() {
     }
 }
 
-/// Checks that each code block of the guide with a file's name is a part of that file. `cargo ci` builds these files.
+/// Checks that each code block of the guide that names a file is a part of that file. `cargo ci` builds these files.
 #[test]
 fn the_guide_has_the_code_of_this_test() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -120,8 +120,9 @@ fn deframed(bytes: &[u8]) -> [usize; 2] {
     counted
 }
 
-/// Checks that dropping the port runner during a write truncates at most one frame. The runner is run again, and ends
-/// the truncated frame before it sends the next.
+/// Checks that dropping the port runner during a write truncates at most one frame.
+///
+/// When the runner runs again, it ends the truncated frame before it sends the next one.
 #[test]
 fn a_frame_that_is_cut_short_is_ended_before_the_next() {
     for cut in 1..12 {
@@ -234,8 +235,9 @@ impl OutputPin for Pin {
     }
 }
 
-/// Checks that the transmit-enable pin is high while bytes leave, and at most two byte times longer. The writer's
-/// `flush` ignores a FIFO of 4 bytes.
+/// Checks that the transmit-enable pin is high while bytes leave, and at most two byte times longer.
+///
+/// This must hold although the writer's `flush` returns while up to 4 bytes are still in a FIFO.
 #[test]
 fn the_pin_is_high_while_bytes_leave_and_little_longer() {
     for capacity in [1, 4, 16, 1_000] {

@@ -158,8 +158,10 @@ fn a_silent_neighbour_is_lost_despite_replays() {
     assert!((15_000..15_100).contains(&lost_after), "{lost_after}");
 }
 
-/// Returns the time until relay 1 declares its silent neighbour lost, and the accepted handshakes. The time is in ms;
-/// meanwhile the `recorded` handshakes are replayed to the relay.
+/// Returns the time in ms until relay 1 declares its silent neighbour lost, during replays.
+///
+/// An attacker replays the handshakes of `recorded` to relay 1. The second value is the number of handshakes that
+/// relay 1 accepts.
 fn lost_after(recorded: &mut dyn Iterator<Item = Vec<u8>>) -> (u64, u32) {
     let mut lonely = relay(2, 1, Wiring::Pair, (2, Instant::ZERO));
     let mut lost_after = None;

@@ -149,7 +149,7 @@ fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
 /// Random generator of attacks.
 pub(crate) struct Attacker {
     pub(crate) rng: ChaCha8Rng,
-    /// Bodies of valid messages of every kind.
+    /// Valid messages of every kind, each without a frame's header and CRC.
     pub(crate) messages: Vec<Plain>,
 }
 
@@ -346,7 +346,8 @@ impl Attacker {
         frame
     }
 
-    /// Draws an attack with random bytes in a COBS frame. Its length determines the counter that it must increment.
+    /// Draws an attack with random bytes in a COBS frame. The frame's length determines the counter that it must
+    /// increment.
     fn noise(&mut self, to: u16, port: Port) -> Attack {
         let len = self.rng.random_range(1..300);
         let bytes: Vec<u8> = (0..len).map(|_| self.rng.random()).collect();

@@ -67,11 +67,11 @@ pub(crate) struct Net {
     pub(crate) handshakes: Vec<usize>,
     /// Number of genuine messages that each relay has received since its start.
     pub(crate) genuine: Vec<u32>,
-    /// Start counts of both ends of each link (from, to) when a message was last accepted there.
+    /// Start counts of sender and receiver when a message was last accepted, by link (sender, receiver).
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Start counts of both ends of each link (from, to) when a frame last arrived there.
+    /// Start counts of sender and receiver when a frame last arrived, by link (sender, receiver).
     ///
-    /// The first count is that of the sender when it sent the frame, the second that of the receiver on arrival.
+    /// The sender's count is that of the time when it sent the frame.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
     /// Indices of frames whose sender signed them before it learned of the receiver's last start.
     outdated: BTreeSet<usize>,
@@ -348,7 +348,8 @@ impl Net {
         });
     }
 
-    /// Returns the bits of each relay's setpoint and target SIR, for exact comparison.
+    /// Returns the bits of each relay's setpoint and target SIR, for exact comparison. A relay without these has
+    /// `None`.
     pub(crate) fn bits(&self) -> Vec<Option<([u32; 3], u32)>> {
         self.relays
             .iter()

@@ -37,15 +37,17 @@ impl Attacker {
         Some(to).filter(|to| net.is_relay(*to))
     }
 
-    /// Changes one random byte of the frame behind its addresses.
+    /// Changes one random byte of the frame after its addresses.
     pub(crate) fn altered(&mut self, mut frame: Plain) -> Plain {
         let at = self.rng.random_range(HEADER - 4..frame.0.len());
         frame.0[at] ^= self.rng.random_range(1..=u8::MAX);
         frame
     }
 
-    /// Returns sender, receiver and frame of a forged offer, or of any message in the ground's name. Returns `None`
-    /// if the frame would be an unchanged copy.
+    /// Returns a forged mission offer, or any message that claims to come from the ground station.
+    ///
+    /// The values are sender, receiver and frame. Returns `None` if the frame would be an unchanged copy of a
+    /// recorded one.
     pub(crate) fn pretended(
         &mut self,
         net: &Net,

@@ -28,7 +28,8 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
     })
 }
 
-/// Returns the results and recipients of all answers to the clearance command, `MAV_CMD_USER_1`.
+/// Returns the results and recipients of all answers to `MAV_CMD_USER_1`. By this command an operator reports that
+/// the drone of a lost relay is gone.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.received.iter();
     said.filter_map(|(_, said)| match said {
@@ -98,7 +99,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
     }
 }
 
-/// Checks that of two commands that arrive at once, the second is ignored until it is repeated. A cable or a router
+/// Checks that the second of two commands that arrive at once is ignored until it is repeated. A cable or a router
 /// can deliver two commands together.
 #[test]
 fn simultaneous_commands_are_obeyed_in_sequence() {
@@ -141,7 +142,9 @@ fn simultaneous_commands_are_obeyed_in_sequence() {
     assert_eq!(vehicle.link.poll_cleared(), Some(side));
 }
 
-/// Checks that a link with a key obeys a command to clear a relay only if signed, and only once.
+/// Checks that a link with a key obeys an operator's command only if it is signed, and only once.
+///
+/// The command reports that the drone of a lost relay is gone.
 #[test]
 fn with_a_key_only_a_signed_command_clears_a_relay() {
     let side = Side::Downstream;

@@ -15,12 +15,13 @@ use mavlink::dialects::common::{
 use super::*;
 use crate::vehicle::{Target, axis};
 
-/// Creates the only relay of a chain, with a motion guard, between the two sites of the vehicle.
+/// Creates the only relay of a chain, with a motion guard. Tx and Rx are where the simulated vehicle expects them.
 fn relay(settings: Settings) -> Relay {
     of(1, 1, settings)
 }
 
-/// Creates relay `index` of `relays` relays with a motion guard, between the two sites of the vehicle.
+/// Creates relay `index` of `relays` relays with a motion guard. Tx and Rx are where the simulated vehicle expects
+/// them.
 fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -34,7 +35,8 @@ fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     fixtures::relay(mission, index, settings)
 }
 
-/// Returns a copy of the autopilot link that has received the relay's current outputs once more.
+/// Returns a copy of the autopilot link that received the relay's outputs again. An equal copy shows that the link
+/// had received all of them.
 fn with_repeated_outputs(link: &Autopilot, relay: &Relay, now: Instant) -> Autopilot {
     let mut link = link.clone();
     link.handle_ready(now, relay.is_ready());
@@ -167,8 +169,8 @@ fn the_yaw_points_an_antenna_to_the_neighbour() {
     }
 }
 
-/// Checks that the autopilot link passes the radio's noise sample to the relay. A relay that does not measure
-/// interference counts the sample as rejected.
+/// Checks that the autopilot link passes the radio's noise sample to the relay. The test's relay does not measure
+/// interference, so that it counts the sample as rejected.
 #[test]
 fn exchange_passes_the_radios_noise_to_the_relay() {
     let (mut vehicle, mut relay) = flies(Kind::ArduCopter, Settings::default());
@@ -182,7 +184,10 @@ fn exchange_passes_the_radios_noise_to_the_relay() {
     assert_eq!(relay.stats().samples_rejected, 1);
 }
 
-/// Exchanges frames between two relays, unless the second one is silent. The second one starts at `start_m` and flies to its setpoints at once.
+/// Exchanges frames between two neighbouring relays with motion guards.
+///
+/// If `is_silent` is true, the second relay neither receives nor sends frames. Its drone starts at x = `start_m` and
+/// flies to its setpoints at once.
 fn exchange_fences(
     first: &mut Relay,
     second: &mut Relay,
@@ -297,7 +302,9 @@ fn a_drone_out_of_sequence_cannot_be_engaged() {
     assert_eq!(vehicle.events.last(), Some(&waits));
 }
 
-/// Checks that the autopilot link follows its relay to a mission with other sites, and back.
+/// Checks that the autopilot link uses the new line if its relay adopts a mission that moves Tx.
+///
+/// A second mission then moves Tx back.
 #[test]
 fn the_link_follows_the_relay_to_the_line_of_a_new_mission() {
     let auth = Some(Auth {

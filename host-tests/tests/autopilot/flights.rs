@@ -104,7 +104,7 @@ struct Flight {
     mends_at: Instant,
     gps_until: Instant,
     setpoint: Option<Placement>,
-    /// Time at which the pilot last chose OFFBOARD or GUIDED.
+    /// Time at which the pilot last chose OFFBOARD or GUIDED; `None` before the first time.
     handed_over_at: Option<Instant>,
     /// Last time at which the drone flew in OFFBOARD or GUIDED.
     flown_at: Instant,

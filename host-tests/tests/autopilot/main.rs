@@ -358,9 +358,9 @@ fn a_view_and_a_mission_are_reported_to_the_operator_once() {
     assert_eq!(texts_since(&vehicle, from), ["relay: new mission adopted"]);
 }
 
-/// Checks that the operator gets no report of a reason to wait that lasts 1.8 s at a time.
+/// Checks that a reason for which a drone waits is not reported to the operator if it lasts only 1.8 s.
 ///
-/// Such reasons come and go while an agreement spreads along the chain. One that persists is reported.
+/// Such reasons come and go while an agreement spreads along the chain. A reason that persists is reported.
 #[test]
 fn a_short_hold_reason_is_not_reported() {
     use uav_relay::HoldReason::Close;

@@ -254,9 +254,9 @@ fn a_px4_with_gps_again_does_not_resume_its_flight() {
     assert!(rig.events.iter().any(failsafe), "{:?}", rig.events);
 }
 
-/// Checks that an autopilot clock that is slow or loses time stops valid positions for seconds at most.
+/// Checks that setpoint control survives an autopilot clock that is slow or loses time.
 ///
-/// The clock is 1 % slow, or loses up to 1.5 s.
+/// The clock is 1 % slow, or loses up to 1.5 s. The autopilot's positions may then be invalid for a few seconds.
 #[test]
 fn a_wrong_clock_stops_positions_for_seconds_at_most() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -298,7 +298,7 @@ fn a_wrong_clock_stops_positions_for_seconds_at_most() {
     }
 }
 
-/// Checks that setpoint control continues if the simulator pauses for 1.5 s and loses that time.
+/// Checks that setpoint control survives a pause of the autopilot of 1.5 s, which its clock loses.
 #[test]
 fn a_short_pause_of_the_autopilot_ends_no_flight() {
     for echoes in [true, false] {
@@ -345,9 +345,9 @@ fn requests_of_absent_messages_end() {
     }
 }
 
-/// Checks that the link reports the fence breach and the return of an ArduCopter.
+/// Checks that the link reports an ArduCopter that has breached its fence and returns to launch.
 ///
-/// The drone follows a moving target out of its fence.
+/// The drone breaches the fence because it follows a moving target.
 #[test]
 fn a_fence_breach_by_a_moving_target_is_named() {
     let mut rig = Rig::new(Kind::ArduCopter);

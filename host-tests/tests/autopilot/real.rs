@@ -60,8 +60,8 @@ const PX4: Gains = Gains {
     most_m_s2: 5.0,
 };
 
-/// Gains of the ArduCopter model, fitted to a recorded flight. Behind a target of 5 m/s and 1 m/s² the drone reached
-/// 6.2 m/s and overshot by 1.1 m.
+/// Gains of the ArduCopter model, fitted to a recorded flight. The recorded drone followed a target with 5 m/s and 1
+/// m/s²; it reached 6.2 m/s and overshot by 1.1 m.
 const ARDUCOPTER: Gains = Gains {
     place: 1.0,
     speed: 0.7,

@@ -132,7 +132,8 @@ fn a_wrong_key_is_reported_once_and_prevents_the_flight() {
     }
 }
 
-/// Checks that two mismatched heartbeats, of another vehicle or by noise, raise no event.
+/// Checks that two heartbeats in a row with a wrong signature raise no event. Another vehicle or noise may cause
+/// them.
 #[test]
 fn a_single_frame_with_a_wrong_signature_is_no_event() {
     let mut vehicle = keyed(Kind::Px4, Some(OURS), Some(OURS));

@@ -481,7 +481,7 @@ impl Vehicle {
         all
     }
 
-    /// Returns the number of requests for a message.
+    /// Returns the number of requests for message `id` that the vehicle has received.
     pub(crate) fn intervals(&self, id: u32) -> usize {
         let asked = self.received.iter();
         asked

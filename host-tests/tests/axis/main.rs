@@ -7,12 +7,12 @@ use serde::Deserialize;
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
 
-/// Length of a line, and the largest permitted error of x and y on it, both in m.
+/// Pairs of the length of a line and the largest permitted error of x and y on the line, both in m.
 const ALLOWED: [(f64, f64); 3] = [(1e3, 1e-3), (1e4, 1e-3), (1e5, 5e-3)];
 
 const LINES: usize = 10_000;
 
-/// Line between two sites, a point near it, and the exact coordinates of that point.
+/// Line between two points on earth, a third point near it, and that point's exact x and y on the line.
 #[derive(Deserialize)]
 struct Beside {
     tx_lat: i32,
@@ -43,7 +43,7 @@ impl Beside {
         Axis::try_new(tx, rx).unwrap()
     }
 
-    /// Returns the geodesic line between the sites, and its length in m.
+    /// Returns the geodesic line from Tx to Rx, and its length in m.
     fn line(&self) -> (Line, f64) {
         let earth = Geodesic::wgs84();
         let [tx_lat, tx_lon, rx_lat, rx_lon] =
@@ -58,7 +58,7 @@ impl Beside {
         (line, length)
     }
 
-    /// Returns the errors of the line's length, of x and of y, less the rounding to f32, in m.
+    /// Returns the crate's errors of the line's length and of the point's x and y, m. Rounding to f32 does not count.
     fn off(&self) -> [f64; 3] {
         let axis = self.axis();
         let place = axis.place(ground(self.lat, self.lon)).unwrap();
@@ -80,14 +80,16 @@ struct Line {
 }
 
 impl Line {
-    /// Returns the point at distance `x` along the line, and the line's azimuth at that point.
+    /// Returns a point of the line and the azimuth there: latitude, longitude and azimuth in degrees.
+    ///
+    /// The point is at distance `x` m along the line.
     fn at(&self, x: f64) -> [f64; 3] {
         let (lat, lon, azimuth): (f64, f64, f64) =
             self.earth.direct(self.tx[0], self.tx[1], self.azimuth, x);
         [lat, lon, azimuth]
     }
 
-    /// Returns a point's distances along the line and to its side, m. `x` is a first guess of the former.
+    /// Returns x and y of a point: its distances along the line and to its side, m. The search for x begins at `x`.
     fn foot(&self, lat: f64, lon: f64, mut x: f64) -> [f64; 2] {
         let mut y = 0.0;
         for _ in 0..20 {
@@ -246,7 +248,7 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Distance of a point from the line's middle, m, and the largest permitted relative error. The error is that of the
+/// Pairs (d, e): points up to d m from the line's middle may have the relative error e. The error is that of a
 /// point's distance from the line.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
@@ -283,7 +285,7 @@ fn distances_agree_with_geodesics() {
     }
 }
 
-/// Checks that a drone too far away for coordinates on the line has a distance from it.
+/// Checks that a drone too far away for x and y on the line still gets a distance from the line.
 ///
 /// Examples are swapped latitude and longitude, and the other side of the earth.
 #[test]

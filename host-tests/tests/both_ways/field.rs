@@ -48,7 +48,8 @@ fn the_best_places_in_a_field_are_found() {
     }
 }
 
-/// Checks that the agreement equals, to the bit, the positions computed without messages.
+/// Checks that a chain in a field of interference agrees on the positions computed without messages. The agreed
+/// positions must be equal to the bit.
 #[test]
 fn a_chain_in_a_field_agrees_on_its_silent_places() {
     let mut rng = generator(3322);

@@ -8,8 +8,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::scenes::{ENDS, adversarial, in_noise, mission, usual};
 
-/// Checks that relays agree on exactly the positions that are computed without messages. The chain carries data in
-/// both directions.
+/// Checks that a two-way chain agrees by messages on exactly the positions computed without messages.
 #[test]
 fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     let mut rng = generator(3306);
@@ -49,7 +48,9 @@ fn a_chain_agrees_on_its_silent_places_in_one_round_trip() {
     assert!(once >= 55, "{once}");
 }
 
-/// Checks that relays whose missions differ in `reverse` or in the power of Rx do not form a chain.
+/// Checks that missions with different requirements for the return direction have different digests.
+///
+/// For this reason relays with such missions do not form a chain. The requirements are `reverse` and the power of Rx.
 #[test]
 fn relays_with_other_ways_back_do_not_form_a_chain() {
     let mut rng = generator(3307);

@@ -13,7 +13,8 @@ pub(crate) struct Chain {
     pub(crate) interferer: [f64; 3],
     /// Further interferers, each with its power in W, and its x and y in m.
     pub(crate) others: Vec<[f64; 3]>,
-    /// Points of a field that replaces the interferer: x in m, and Upsilon in 1/W. Empty for none.
+    /// Points of a field of interference that replaces the interferer: x in m, and Upsilon = E[1/I] in 1/W. I is the
+    /// interference power. The list is empty if there is an interferer.
     pub(crate) field: Vec<[f64; 2]>,
     /// Path-loss factors, 1/m^2: of links with a drone at one or both ends, and of links on the ground.
     pub(crate) loss: [f64; 2],
@@ -97,7 +98,7 @@ impl Chain {
 
     /// Returns the positions with the best two-way SIR, with relay k at a point of `grids[k - 1]`.
     ///
-    /// The points of a grid are in ascending order.
+    /// The two-way SIR counts the worse direction of each hop. The points of a grid are in ascending order.
     fn best_on(&self, grids: &[Vec<f64>]) -> Vec<f64> {
         let first = grids[0].iter().map(|&x| self.hop(1, 0.0, x));
         let mut best: Vec<f64> = first.collect();
@@ -156,7 +157,7 @@ impl Chain {
 
     /// Improves positions by searches in windows around them, which shrink when they no longer help.
     ///
-    /// Returns the two-way SIR of the worst hop, and the positions.
+    /// Returns the two-way SIR of the worst hop, which counts the worse direction of each hop, and the positions.
     pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let mut x = start.to_vec();
         let mut value = self.value(&x);
@@ -185,7 +186,8 @@ impl Chain {
         (value, x)
     }
 
-    /// Returns the best two-way SIR of a worst hop that the search finds, and the positions for it.
+    /// Returns the best two-way SIR of a worst hop that the search finds, and the positions for it. The two-way SIR
+    /// counts the worse direction of each hop.
     pub(crate) fn best(&self) -> (f64, Vec<f64>) {
         let grid = self.grid();
         let start = self.best_on(&vec![grid; self.relays()]);

@@ -24,7 +24,8 @@ type Draw<R> = fn(&mut R, [f64; 2], f64) -> Chain;
 
 /// Checks in random scenes that the relays' agreed positions are as good as the best of a grid search.
 ///
-/// At least 99.5 % of the two-way SIRs are within 1e-4 of the best one, and none is below 0.99 of it.
+/// The SIR of a scene counts the worse direction of each hop. At least 99.5 % of the SIRs are within 1e-4 of the best
+/// one, and none is below 0.99 of it.
 fn as_good_as_the_judge(seed: u64, scenes: usize, noisy: bool, draw: Draw<ChaCha8Rng>) {
     let mut rng = generator(seed);
     for ends in ENDS {
@@ -88,7 +89,8 @@ fn the_best_places_near_an_interferer_in_noise_are_found() {
 
 /// Checks that relays stay at Tx if an interferer lies between them and a weak Rx.
 ///
-/// A chain whose last relay passes the interferer has a two-way SIR of less than 0.3 of theirs.
+/// A chain whose last relay passes the interferer has less than 0.3 of the SIR of a chain with all relays at Tx. The
+/// SIR counts the worse direction of each hop.
 #[test]
 fn relays_stay_at_tx_where_an_interferer_is_between_them_and_a_weak_rx() {
     let chain = Chain {

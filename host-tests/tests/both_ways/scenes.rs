@@ -108,8 +108,8 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
     chain
 }
 
-/// Draws a scene with an interference field of the given `kind`, known by points along the line. 0 is an even field,
-/// 1 random within a factor, and 2 that of some interferers.
+/// Draws a scene with an interference field of the given `kind`, known by points along the line. Kind 0 has the same
+/// interference everywhere, kind 1 has random values within a factor, and kind 2 is caused by some interferers.
 pub(crate) fn in_field(rng: &mut impl Rng, ends: [f64; 2], reverse: f64, kind: usize) -> Chain {
     let mut chain = usual(rng, ends, reverse);
     let points: usize = [1, rng.random_range(2..=9), 41][kind];

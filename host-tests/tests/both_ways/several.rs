@@ -11,8 +11,9 @@ use super::judge::Chain;
 use super::scenes::{ENDS, log_uniform, narrow};
 use super::shares::Shares;
 
-/// Checks chains for both directions if one hypothetical interferer replaces several. The positions chosen for both
-/// directions must have a higher median SIR than those for one direction.
+/// Checks two-way chains that are placed for one hypothetical interferer in place of the real ones.
+///
+/// Positions chosen for both directions must have a higher median SIR than positions chosen for one direction.
 #[test]
 fn places_for_both_directions_beat_one_way_ones_against_several() {
     let mut rng = generator(3325);

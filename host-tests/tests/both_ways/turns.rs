@@ -50,7 +50,8 @@ fn place_of(chain: &Chain, places: &[Place], node: usize) -> Place {
     }
 }
 
-/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`.
+/// Returns the two-way SIR of the worst hop of a chain whose relays are at `places`. It counts the worse direction of
+/// each hop.
 fn value(chain: &Chain, places: &[Place]) -> f64 {
     let hops = (1..=places.len() + 1).map(|node| {
         let [from, to] = [node - 1, node].map(|node| place_of(chain, places, node));
@@ -59,8 +60,9 @@ fn value(chain: &Chain, places: &[Place]) -> f64 {
     hops.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops. It is found
-/// by a grid search with altitudes within `altitudes_m`.
+/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops.
+///
+/// The position is found by a grid search with altitudes within `altitudes_m`.
 fn turn(chain: &Chain, places: &[Place], node: usize, altitudes_m: [f64; 2]) -> (Place, f64) {
     let [from, to] = [node - 1, node + 1].map(|node| place_of(chain, places, node));
     let worse = |at: Place| hop(chain, node, from, at).min(hop(chain, node + 1, at, to));
@@ -189,7 +191,7 @@ fn a_turn_is_as_good_as_a_dense_grid() {
                 break found.unwrap_or(own.place);
             }
         };
-        assert!(steps <= 9, "{steps}");
+        assert!(steps <= 15, "{steps}");
         let at = [f64::from(found.x_m), f64::from(found.altitude_m)];
         let [from, to] = [node - 1, node + 1].map(|node| place_of(&chain, &places, node));
         let ours = hop(&chain, node, from, at).min(hop(&chain, node + 1, at, to));
@@ -214,7 +216,7 @@ fn a_turn_is_as_good_as_a_dense_grid() {
     }
     silent.report("turns without noise");
     noisy.report("turns in noise");
-    assert!(silent.worst() > 0.97 && noisy.worst() > 0.97);
+    assert!(silent.worst() > 0.99 && noisy.worst() > 0.99);
     assert!(silent.percentile(0.5) > 0.9999 && noisy.percentile(0.5) > 0.9999);
 }
 

@@ -7,10 +7,10 @@ use crate::flying::Flight;
 use crate::peer::{Peer, RX, ReceivedMessage, Site, TX, apart_m, between_m, on_earth, text};
 use crate::process::Relay;
 
-/// Question in the log line about a drone far from its line.
+/// Part of the log line about a drone far from its line: the likely cause that the companion suggests.
 const SWAPPED: &str = "are latitude and longitude swapped?";
 
-/// Drone at its position, and a relay that is configured with other sites.
+/// Drone, and its relay, which is configured with positions of Tx and Rx that are far from the drone.
 struct Apart {
     drone: Peer,
     relay: Relay,
@@ -114,7 +114,9 @@ fn an_arducopter_far_from_a_swapped_line_is_reported() {
     is_off_a_swapped_line("arducopter");
 }
 
-/// Checks that the report of a drone in another valley suggests no cause, as no sites are swapped.
+/// Checks that the report of a drone far from its line suggests swapped coordinates only with reason.
+///
+/// Here Tx and Rx are configured 0.1 degrees too far south, so that nothing is swapped.
 #[test]
 fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     let moved = |[lat, lon, amsl]: Site| [lat - 0.1, lon, amsl];
@@ -133,7 +135,7 @@ fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     assert_eq!(apart.position()["sites_look_swapped"], false);
 }
 
-/// Checks that a drone outside the geofence but near the line is reported, and may be controlled.
+/// Checks that a flying drone outside its geofence is reported, even near the line from Tx to Rx.
 #[test]
 fn a_drone_outside_the_geofence_is_reported_in_the_air() {
     // 380 m along a line that starts 500 m farther on.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-/// Returns the path of the companion program, which is built in the profile of the tests.
+/// Returns the path of the companion program, which is built with the tests' cargo profile.
 pub(crate) fn companion() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| build("linux_companion"))

@@ -39,7 +39,8 @@ pub(crate) struct Chain {
     /// Serial wires between the relays, or one shared channel.
     pub(crate) media: Vec<Medium>,
     is_shared: bool,
-    /// Serial wire between relay 1 (tty 1) and the ground station at the transmitter (tty 0).
+    /// Serial wire between relay 1 (tty 1) and the ground station at the transmitter (tty 0). `None` in a chain
+    /// without a ground station.
     pub(crate) tx: Option<Medium>,
     of: usize,
     pub(crate) files: Files,
@@ -59,7 +60,7 @@ impl Chain {
         Self::on(media, of, None)
     }
 
-    /// Creates a chain on serial wires, with one to the transmitter. No relay is started yet.
+    /// Creates a chain on serial wires, with one more wire to the ground station at Tx. No relay is started yet.
     pub(crate) fn with_ground(of: usize, noise: Noise) -> Self {
         Self {
             tx: Some(Medium::new(2, noise)),
@@ -67,7 +68,8 @@ impl Chain {
         }
     }
 
-    /// Creates a chain on a shared channel, whose first `of` ttys are the relays'. No relay is started yet.
+    /// Creates a chain on the shared channel `channel`. Its first `of` ttys are for the relays, none of which is
+    /// started yet.
     pub(crate) fn on_channel(of: usize, channel: Medium) -> Self {
         Self {
             is_shared: true,

@@ -12,7 +12,8 @@ use crate::pty::Pty;
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Chain of two relay processes without drones. Their mission has the distance of the sites in [`SITED`].
+/// Chain of two relay processes without drones. The mission's length equals the distance of Tx and Rx in [`SITED`],
+/// so that the ground station may upload missions with these positions.
 struct Bench(Chain);
 
 impl Bench {
@@ -175,7 +176,7 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
 
 /// Checks that an upload with `--from-loaded` shows every earlier change that it reverts.
 ///
-/// Such an upload consists of the mission with which the relays were loaded, and the given changes.
+/// Such an upload changes the mission that the relays had before flight, and not the one that they fly.
 #[test]
 fn an_upload_based_on_loaded_values_shows_reverted_keys() {
     let mut bench = Bench::new();

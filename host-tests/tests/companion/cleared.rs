@@ -49,7 +49,7 @@ impl Drones {
         self.lines[index - 1].iter().any(|line| line.contains(part))
     }
 
-    /// Moves drones 1 and 2 to their setpoints until the condition holds.
+    /// Moves drones 1 and 2 to their setpoints until `is_so` returns true.
     fn fly_until(&mut self, is_so: impl Fn(&Self) -> bool) {
         let end = Instant::now() + LIMIT;
         while !is_so(self) {
@@ -125,9 +125,9 @@ fn an_incomplete_command_is_answered() {
     assert!(text.contains("\"has_lease\""), "the state: {text}");
 }
 
-/// Checks that a relay clears a lost neighbour on a MAVLink command that its autopilot forwards.
+/// Checks that a relay forgets a lost neighbour on a MAVLink command that its autopilot forwards.
 ///
-/// An operator sends that command with a ground station.
+/// An operator sends that command with a ground station because the neighbour's drone is gone.
 #[test]
 fn an_operator_clears_a_relay_by_a_mavlink_command() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));

@@ -48,8 +48,8 @@ impl Ports {
         bound.iter().all(Result::is_ok)
     }
 
-    /// Starts a drone on the ground at the autopilot's port. It sends to the UDP port `partner` until it receives a
-    /// datagram.
+    /// Starts a drone on the ground at the autopilot's port. The drone sends to the UDP port `partner` until it
+    /// receives a datagram.
     pub(crate) fn drone(self, partner: u16) -> Peer {
         Peer::autopilot("px4", &format!("udp:{}@{partner}", self.port), 380.0, None)
     }

@@ -12,7 +12,7 @@ pub(crate) const ASKED: [(u64, u64); 3] = [(33, 200_000), (245, 500_000), (87, 5
 /// Take-off position along the line, m: about 20 m from the setpoint.
 const START_M: f64 = 380.0;
 
-/// Time in which a companion that streams targets sends several of them.
+/// Time of observation. A companion that streams targets would send several of them in this time.
 const MOMENT: Duration = Duration::from_millis(1_500);
 
 /// Simulated drone in flight and the relay that controls it.
@@ -166,7 +166,8 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
     (flight, place)
 }
 
-/// Reboots the autopilot on the ground. It forgets the message requests, and its clock restarts.
+/// Reboots the autopilot on the ground. The autopilot forgets the companion's message requests, and its clock
+/// restarts.
 fn is_switched_off_and_on(flight: &mut Flight) {
     flight.drone.order("reboot");
     flight.relay.line("autopilot: on the ground, or not armed");

@@ -54,7 +54,7 @@ fn a_relay_locates_the_interferer_by_samples_from_a_fifo() {
 
 /// Checks that a relay in the air uses the noise measurements of its radio.
 ///
-/// It shows this by a log line: the relays will spread, in order to measure at other positions.
+/// The test recognises this by the relay's log line that the relays will spread to measure at other positions.
 #[test]
 fn noise_of_a_radio_on_the_autopilots_link_is_used() {
     let mut flight = Flight::found("arducopter", LISTENING);

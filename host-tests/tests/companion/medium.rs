@@ -61,7 +61,7 @@ pub(crate) struct Medium {
     counts: Arc<Counts>,
     stop: Arc<AtomicBool>,
     pump: Option<JoinHandle<()>>,
-    /// Folder with the names of the ttys that can be unplugged.
+    /// Folder with the names of the ttys that can be unplugged, if the ttys of this medium can.
     _folder: Option<TempDir>,
 }
 

@@ -6,7 +6,9 @@ use crate::chain::{Chain, QUICK};
 use crate::files::until;
 use crate::medium::{Medium, QUIET};
 
-/// Checks that relay 3 keeps its number when relay 2 is lost and relay 3 is the second of two.
+/// Checks that relay 3 keeps its number in logs and status when it becomes the chain's second relay.
+///
+/// This happens when relay 2 is lost.
 #[test]
 fn a_drone_keeps_its_number_when_its_place_changes() {
     let chain = Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK);

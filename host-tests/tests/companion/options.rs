@@ -7,7 +7,7 @@ use crate::process::Relay;
 /// Valid options of a relay. The wrong options in [`WRONG`] that have no `--index` are tried after these.
 const GOOD: &str = "--index 2 --of 3 --upstream a --downstream b ";
 
-/// Options with the sites of transmitter and receiver, and their distance.
+/// Options with the surveyed positions of transmitter and receiver, and their distance.
 const SITES: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795 ";
 
 const WRONG: &[&str] = &[
@@ -69,7 +69,7 @@ const WRONG: &[&str] = &[
     "--nonsense",
 ];
 
-/// Wrong options for a relay with an autopilot and its sites.
+/// Wrong options for a relay that has an autopilot and knows the positions of Tx and Rx.
 const WRONG_AUTOPILOT: &[&str] = &[
     "--autopilot a --positions b",
     "--autopilot udp:localhost",

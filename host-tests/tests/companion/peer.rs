@@ -14,7 +14,7 @@ use uav_relay::flight::axis::Axis;
 
 use crate::process::{LIMIT, Relay, lines_of};
 
-/// Site on earth: latitude and longitude in degrees, ground height above mean sea level in m.
+/// Point on earth: latitude and longitude in degrees, and height above mean sea level in m.
 pub(crate) type Site = [f64; 3];
 
 pub(crate) const TX: Site = [47.40, 8.54, 420.0];
@@ -25,7 +25,7 @@ pub(crate) fn distance_to_m(rx: Site) -> f64 {
     between_m(TX, rx)
 }
 
-/// Returns the distance of two sites as the crate computes it, m.
+/// Returns the distance of two points on earth as the crate computes it, m.
 pub(crate) fn between_m(tx: Site, rx: Site) -> f64 {
     let [tx, rx] = [tx, rx].map(|[lat, lon, amsl]| Geodetic::from_degrees(lat, lon, amsl).unwrap());
     Axis::try_new(tx, rx).unwrap().distance_m()
@@ -58,7 +58,7 @@ pub(crate) fn text(site: Site) -> String {
     site.map(|number| number.to_string()).join(",")
 }
 
-/// Returns the options of a relay between the two sites that is connected to `autopilot`.
+/// Returns the options of a relay between `TX` and `RX` that is connected to `autopilot`.
 pub(crate) fn options(autopilot: &str) -> String {
     let (tx, rx, distance) = (text(TX), text(RX), distance_to_m(RX));
     format!("--distance {distance} --site-tx {tx} --site-rx {rx} --autopilot {autopilot}")
@@ -104,7 +104,7 @@ impl ReceivedMessage {
         self.0["own"].is_object()
     }
 
-    /// Returns the UDP port to which the simulated drone sends.
+    /// Returns the UDP port to which the simulated drone sends, if it uses UDP.
     pub(crate) fn partner(&self) -> Option<u16> {
         let port = self.0["own"]["partner"][1].as_u64()?;
         u16::try_from(port).ok()

@@ -7,9 +7,9 @@ use crate::files::{Files, write};
 use crate::medium::QUIET;
 use crate::process::{LIMIT, Relay, bits};
 
-/// Checks that relays that receive their drones' positions first hold these as setpoints.
+/// Checks that the first setpoint of each relay is its drone's position. A drone must not be moved by a jump.
 ///
-/// Their last setpoints must be those of a chain without motion guards.
+/// The last setpoints must be those of a chain without motion guards.
 #[test]
 fn two_relays_with_positions_keep_apart_by_their_guards() {
     let mut free = Chain::start(2, "");

@@ -19,8 +19,8 @@ fn start(chain: &Chain, index: usize, key: &str) -> Relay {
     chain.relay(index, &format!("{QUICK} {signed}"))
 }
 
-/// Checks that relays with signed frames agree on the simulated chain's positions. The wires are with and without
-/// noise, and a relay reboots.
+/// Checks that relays with signed frames agree on the simulated chain's positions. This must hold on wires with and
+/// without noise, and also after a relay has rebooted.
 #[test]
 fn three_signing_relays_settle_like_the_simulation() {
     for noise in [QUIET, Noise::bad(3)] {

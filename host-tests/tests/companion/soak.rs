@@ -47,7 +47,7 @@ fn watch(socket: &Path, stop: &AtomicBool) -> StatusStatistics {
     seen
 }
 
-/// Returns the options with relay `index`'s own files: its status socket and its view file.
+/// Returns the options with relay `index`'s own files: a status socket and a file of membership votes.
 fn files(chain: &Chain, index: usize) -> String {
     let file = |name: &str| chain.files.text(&format!("{name}{index}"));
     format!(

@@ -234,8 +234,9 @@ fn a_full_disk_is_reported_once_and_ends_no_relay() {
     assert_eq!(first.end().status, Some(0));
 }
 
-/// Checks that a blocked disk delays the frames that a relay sends, but nothing else. The new view file is a FIFO
-/// that is not read.
+/// Checks that a disk that blocks delays the frames that a relay sends, but nothing else.
+///
+/// In place of a blocked disk, the file for the relay's membership votes is a FIFO that is not read.
 #[test]
 fn a_slow_disk_delays_only_its_own_frames() {
     let chain = Chain::on_channel(2, Medium::pluggable(2));

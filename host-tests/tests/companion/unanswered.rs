@@ -35,7 +35,9 @@ impl Unanswered {
         self.files.path("status")
     }
 
-    /// Checks that the report of no answer comes after 3 s, contains `parts`, and is in the status.
+    /// Checks that the companion reports after 3 s that its autopilot does not answer.
+    ///
+    /// The report is a log line that contains `parts`, and a text in the status.
     fn check_report(&mut self, parts: &[&str]) {
         let line = self.relay.line(parts[0]);
         let seconds = seconds(&line);
@@ -50,7 +52,7 @@ impl Unanswered {
         assert_eq!(autopilot["state"], "silent", "{autopilot}");
     }
 
-    /// Checks that the report is not repeated for 7 s, in which the relay is nearly idle.
+    /// Checks that the report of a silent autopilot is not repeated for 7 s. The companion is nearly idle then.
     fn check_no_repetition(&mut self) {
         let before = self.relay.cost();
         std::thread::sleep(Duration::from_secs(7));

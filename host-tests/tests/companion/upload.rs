@@ -41,8 +41,8 @@ fn ground(files: &Files, version: &str, more: &str) -> Relay {
     Relay::ground(&format!("{upload} {more}"))
 }
 
-/// Checks that an upload from the transmitter reaches two relays and survives their restarts. The wires are with and
-/// without noise.
+/// Checks that an upload from the transmitter reaches two relays and survives their restarts. This must hold on wires
+/// with and without noise.
 #[test]
 fn an_upload_reaches_two_relays_and_outlives_their_processes() {
     let (loaded, uploaded) = (simulated(&Scenario::default(), 2), simulated(&new(), 2));
@@ -76,7 +76,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
 
 /// Checks that a relay that restarts without its upload file receives the uploaded mission again.
 ///
-/// The mission was uploaded from the receiver, on one channel.
+/// The first upload came from a ground station at the receiver, on the channel that all share.
 #[test]
 fn a_relay_without_its_upload_is_offered_it_again() {
     let uploaded = simulated(&new(), 2);
@@ -104,16 +104,18 @@ fn a_relay_without_its_upload_is_offered_it_again() {
     assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
 }
 
-/// State of a wire that a relay's decision on a membership view may cut.
+/// State of a wire that a test cuts once a relay decides on a new membership view.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Wire {
     Open,
-    /// State of the wire: the next decision on a membership view cuts it, and is lost.
+    /// State of the wire: intact until the next decision on a membership view. That decision cuts the wire, and is
+    /// lost.
     Armed,
     Cut,
 }
 
-/// Creates a wire that a decision on a membership view cuts, as `state` says. The relay that decides has tty 1.
+/// Creates a wire that is cut by a decision on a membership view if `state` is [`Wire::Armed`] then. The relay that
+/// decides has tty 1.
 fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     let state = Arc::clone(state);
     let mut deframer = Deframer::new();
@@ -132,8 +134,9 @@ fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     })
 }
 
-/// Checks that the ground station reports one relay on the new mission until all fly it. The wire between relays 2
-/// and 3 is cut as soon as relay 3 has decided on the view with the mission.
+/// Checks that the ground station reports the first relay that flies the new mission, and later all.
+///
+/// The wire between relays 2 and 3 is cut as soon as relay 3 has decided on the membership view with the mission.
 #[test]
 fn the_ground_reports_progress_until_all_relays_fly() {
     let state = Arc::new(Mutex::new(Wire::Open));
@@ -182,7 +185,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
     }
 }
 
-/// Returns the contents of an upload file: `config` as version 5, based on the loaded `base`.
+/// Returns the contents of an upload file with `config` as version 5. The relays' mission before flight is `base`.
 fn stored(base: &Scenario, config: &Scenario) -> Vec<u8> {
     let [base, new] = [base, config].map(|scenario| mission::mission(scenario, 1, 1e-4).unwrap().0);
     let upload = Upload::new(&base, 5, *new.config()).unwrap();
@@ -317,7 +320,7 @@ const WRONG: &[&str] = &[
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Wrong options that only the mission in flight reveals, which the ground station requests first.
+/// Wrong options that the ground station recognises after it has requested the relays' present mission.
 const UNFIT: &[&str] = &[
     "--new-band 30,300",
     "--new-min-separation 1001",

@@ -87,8 +87,9 @@ fn the_unit_does_not_restart_after_permanent_errors() {
     assert!(unit.lines().any(|line| line == setting), "{unit}");
 }
 
-/// Checks that two of three relays do not fly if their stored membership view does not include them. Without that
-/// view they would have a quorum.
+/// Checks that two of three relays get no setpoints if their stored membership view is without them.
+///
+/// Without that stored view, the two relays would have a quorum.
 #[test]
 fn two_relays_that_recall_a_view_without_them_do_not_fly() {
     let mut chain = channel();

@@ -99,7 +99,8 @@ const QUICK: &str = "--probe-after-ms 300 --dead-after-ms 900";
 
 /// Checks that a ground station on a wire names the likely reason for a failed upload.
 ///
-/// It does not know the true reason: relays on a wire do not answer strangers, and only log why they reject frames.
+/// The ground station cannot know the true reason, because relays on a wire do not answer strangers, and only log why
+/// they reject frames.
 #[test]
 fn on_a_wire_the_ground_names_the_likely_cause() {
     let chain = Chain::with_ground(1, QUIET).with(QUICK);
@@ -135,7 +136,7 @@ fn on_a_wire_the_ground_names_the_likely_cause() {
 
 /// Checks that a ground station on a shared channel names the likely reason for a failed upload.
 ///
-/// It receives the frames of all relays there.
+/// The ground station receives the frames of all relays on the channel, and infers the reason from these.
 #[test]
 fn on_a_channel_the_ground_names_the_likely_cause() {
     let chain = Chain::on_channel(2, Medium::new(3, QUIET)).with(QUICK);

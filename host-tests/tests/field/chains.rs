@@ -8,7 +8,7 @@ use uav_relay_oracle::reference::{Link, Relay};
 
 use super::off;
 
-/// Upsilon = E[1/I], 1/W, of the constant field in the chains that a separate program computed.
+/// Upsilon = E[1/I], 1/W, of the constant interference in the chains that a separate program computed.
 ///
 /// I is the interference power. With this value, a relay straight above Rx at 20 m has an expected SIR of 0.8 at Rx.
 const UPSILON: f64 = 2_301_379.773_574_951;

@@ -29,8 +29,8 @@ fn beta_mgf(alpha: f64, beta: f64, y: f64) -> f64 {
     with / without
 }
 
-/// Returns E[exp(-y u)] for a Beta-distributed u, by the series e^-y 1F1(beta; alpha + beta; y). It is accurate for y
-/// up to 500.
+/// Returns E[exp(-y u)] for a Beta-distributed u, by the series e^-y 1F1(beta; alpha + beta; y). The series is
+/// accurate for y up to 500.
 fn beta_mgf_series(alpha: f64, beta: f64, y: f64) -> f64 {
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 0..3_000 {

@@ -81,9 +81,9 @@ fn no_estimate_without_enough_samples_or_spread() {
     assert_eq!(scaled(0.8e-12), None);
 }
 
-/// Returns the estimate of Upsilon = E[1/I] from sampled interference powers I around `mean_w`, in W.
+/// Returns the estimate of Upsilon = E[1/I] from a thousand interference powers I around `mean_w`, W.
 ///
-/// The largest permitted power, `I_max`, is 1e-6 W.
+/// The largest permitted power, `I_max`, is 1e-6 W. Returns `None` if the samples do not permit an estimate.
 fn scaled(mean_w: f32) -> Option<Estimate> {
     let mut estimator = Estimator::new(1e-6);
     for k in 0..1_000_u16 {

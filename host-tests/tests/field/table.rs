@@ -61,7 +61,7 @@ fn a_field_of_equal_values_is_constant() {
     assert_ne!(ONE, TWO);
 }
 
-/// Creates a field whose table is leaked, because a field borrows its table for good.
+/// Creates a field of interference whose table is leaked, because a field borrows its table for good.
 fn field(points: Vec<FieldPoint>) -> Result<Field, FieldError> {
     Field::try_new(Vec::leak(points))
 }

@@ -155,9 +155,9 @@ fn the_fewest_in_a_field_are_those_of_a_grid_search() {
     assert!(same > 300 && none > 20 && fewer > 10 && largest > 30);
 }
 
-/// Checks that the best target SIR of N identical relays is that of the closed form, or of Algorithm 4.
+/// Checks that the best target SIR of N identical relays in a field of interference is the known one.
 ///
-/// The closed form applies to a constant field.
+/// The closed form gives it for a constant field, and Algorithm 4 for other fields.
 #[test]
 fn identical_relays_in_a_field_are_optimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));
@@ -200,9 +200,9 @@ fn identical_relays_in_a_field_are_optimal() {
     assert!(above > 5);
 }
 
-/// Checks that the fewest relays found for a field, if powers differ, are not reported as proven.
+/// Checks that the fewest relays in a field of interference are not called proven if powers differ.
 ///
-/// Algorithm 4, which finds them, may miss a chain with fewer relays.
+/// Algorithm 4, which finds this number, may then miss a chain with fewer relays.
 #[test]
 fn different_relays_in_a_field_are_not_called_proven() {
     let link = field(1000.0, 20.0, vec![(0.0, 3e6), (1000.0, 5e6)]);

@@ -11,8 +11,9 @@ use uav_relay_oracle::reference::Link;
 
 use super::{ROUNDING, chain, round};
 
-/// Returns the mission of `link`, and its relays' profiles by index. Relays beyond the last one have the common
-/// profile.
+/// Returns the mission of `link`, and a function from a relay's index to its altitude and power.
+///
+/// A relay beyond those of `link` has the common profile of the mission.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
     let of = move |index: u16| profile_of(&mission, &own, index);
@@ -27,7 +28,8 @@ fn with(link: &Link, relays: usize) -> Link {
     link
 }
 
-/// Returns the fewest relays that meet `target`, by trying each number in f64; 0 if more than `most`.
+/// Returns the fewest relays that meet `target`, by trying each number in f64. Returns 0 if there is none up to
+/// `most`.
 fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
     let all = with(link, most);
     let mut from = 0.0;
@@ -49,8 +51,9 @@ fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
     last.sir_rx(x).unwrap()
 }
 
-/// Draws a target SIR that needs one to several dozen relays. It is a fraction of the most that the first and the
-/// last hop permit.
+/// Draws a target SIR: 1e-4 to 1.2 times the highest SIR that both the first and the last hop can have.
+///
+/// A target that can be met needs one to several dozen relays. Returns `None` if the last hop has no SIR.
 fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
     let d = link.distance_m;
     let first = (0..200)

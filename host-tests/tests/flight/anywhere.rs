@@ -65,7 +65,7 @@ fn starts(rng: &mut ChaCha8Rng, tame: bool) -> Vec<Point> {
     starts
 }
 
-/// Draws a mission upload whose sites turn the line from Tx to Rx by up to 80 degrees.
+/// Draws a mission upload that moves Tx or Rx, and so turns the line between them by up to 80 degrees.
 fn turned(rng: &mut ChaCha8Rng, setup: &Setup, axis: &Axis) -> UploadSpec {
     let config = *setup.mission.config();
     let angle = rng.random_range(-80.0_f64..=80.0).to_radians();

@@ -18,8 +18,9 @@ fn undisturbed(setup: &Setup) -> Vec<f32> {
     ends(&run(clean).unwrap())
 }
 
-/// Checks that a relay that was off returns to its position although its neighbours have closed up. They close up
-/// only as far as its silent drone permits.
+/// Checks that a relay that was switched off for a while gets its position back.
+///
+/// Meanwhile its neighbours have moved closer, but only as far as the silent relay's drone permits.
 #[test]
 fn a_relay_returning_between_two_others_gets_its_position() {
     for silent in 1..=8 {
@@ -47,7 +48,8 @@ fn a_relay_returning_between_two_others_gets_its_position() {
     }
 }
 
-/// Checks that all drones stay while two neighbours are in each other's position. The others do not know of the swap.
+/// Checks that no drone moves if two neighbouring drones start in each other's position. The other drones do not know
+/// of the swap.
 #[test]
 fn while_two_drones_are_in_the_wrong_order_all_stay() {
     for first in 0..7 {

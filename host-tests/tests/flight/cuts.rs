@@ -8,7 +8,7 @@ use super::*;
 /// Longest time from the last repair of the chain until all relays are in one membership view, s.
 const SOON_S: f64 = 120.0;
 
-/// Returns all pairs of different links to cut, each link named by the relay before it.
+/// Returns all pairs of different links to cut, each given by the index of the relay before it.
 ///
 /// The first cut of a pair is also the first to heal.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {
@@ -19,8 +19,8 @@ fn pairs() -> impl Iterator<Item = (u16, u16)> {
 
 /// Checks that all relays are in one membership view soon after two overlapping cuts of the chain.
 ///
-/// The four numbers of a row are the times in s at which the first cut begins and ends, and the second one. In the
-/// last row, the cuts heal within a second of each other.
+/// The four numbers of a row are times in s: begin and end of the first cut, then begin and end of the second cut. In
+/// the last row, the cuts heal within a second of each other.
 #[test]
 fn all_relays_are_in_one_view_soon_after_two_cuts() {
     let all = [

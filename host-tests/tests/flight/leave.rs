@@ -11,10 +11,10 @@ const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
     up_m: 25.0,
 };
 
-/// Returns the relays' lateral offsets and altitudes, m, during a cut behind relay 3 and long after it.
+/// Returns the relays' lateral offsets and altitudes, m: during a cut behind relay 3 and long after it.
 ///
-/// Relays without a quorum leave the line, sideways and upward. `room` selects whether the motion guard permits their
-/// way.
+/// Relays without a quorum leave the line, sideways and upward. With `room`, the motion guard permits the positions
+/// to which they leave.
 fn across(room: bool) -> [Vec<[f32; 2]>; 2] {
     [seconds(110), seconds(300)].map(|end| {
         let mut setup = eight(&mut ChaCha8Rng::seed_from_u64(1));

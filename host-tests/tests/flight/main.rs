@@ -28,7 +28,7 @@ const NOISE_M: f64 = 0.5;
 /// Rounding error of a position, m: positions are f32 of up to 1 km.
 const ROUNDING_M: f64 = 2e-3;
 
-/// Returns eight drones in order along x on one radio channel.
+/// Returns the setup of a flight of eight drones, which are in order along x, on one radio channel.
 fn eight(rng: &mut ChaCha8Rng) -> Setup {
     let mission = eight_apart(SEPARATION_M as f32);
     let mut setup = Setup::on_shared_channel(mission);
@@ -45,8 +45,8 @@ fn eight(rng: &mut ChaCha8Rng) -> Setup {
 
 /// Returns the smallest permitted distance between drones, m, each started at most `starts` times.
 ///
-/// The motion guard keeps the separation between reported positions. Both positions have a constant error, and the
-/// random error of one report for each start.
+/// The motion guard keeps the separation between reported positions. The reported position of each drone has a
+/// constant error, and the random error of one report for each start.
 fn floor_m(starts: usize) -> f64 {
     SEPARATION_M - 2.0 * BIAS_M - 2.0 * starts as f64 * NOISE_M - ROUNDING_M
 }

@@ -9,7 +9,7 @@ use host_tests::bench::Bench;
 /// Checks that a message of the leader from before its reboot does not spoil the agreement after it.
 ///
 /// The message starts a round along the chain, is delayed, and arrives in the last round of the new agreement, by
-/// Algorithm 2. No relay may follow it.
+/// Algorithm 2. No relay may act on the message.
 #[test]
 fn a_sweep_from_before_a_reboot_does_not_spoil_an_agreement() {
     let method = Method::Adjust(Adjust {
@@ -44,7 +44,7 @@ fn a_sweep_from_before_a_reboot_does_not_spoil_an_agreement() {
     }
 }
 
-/// Checks that a request for a membership view has no effect if it is delayed beyond a newer view.
+/// Checks that a delayed proposal of a membership view has no effect once a newer view is agreed.
 #[test]
 fn a_proposal_of_an_old_view_changes_nothing() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());
@@ -75,8 +75,9 @@ fn a_proposal_of_an_old_view_changes_nothing() {
     assert_eq!(chain.bench.setpoints(), before);
 }
 
-/// Checks that a relay requests a membership view when a neighbour reports a newer one. That neighbour refuses the
-/// relay's frames.
+/// Checks that a relay requests a membership view when a neighbour reports a newer one.
+///
+/// The neighbour refuses the relay's messages because they belong to the older view.
 #[test]
 fn a_relay_that_learns_of_a_newer_view_requests_one() {
     let mut chain = Chain::new(3, 20.0, LOW, Settings::default());

@@ -7,8 +7,8 @@ use host_tests::bench::Bench;
 
 /// Checks that a rebooted leader agrees with its neighbour within a second, at a `hop_time` of 30 ms.
 ///
-/// The random seeds vary the number of its first pass (a round of messages along the chain): it may be close to the
-/// last number before the reboot.
+/// The random seeds vary the number of the leader's first pass (a round of messages along the chain). This number may
+/// be close to the last number before the reboot.
 #[test]
 fn a_rebooted_leader_is_answered_for_any_seed() {
     // With prediction the chain agrees in one pass; without, in several, and numbers may be just behind those.
@@ -63,7 +63,7 @@ fn a_relay_rebooted_in_a_pass_gets_a_position_in_a_new_view() {
 }
 
 /// Checks that a relay that reboots in a settled chain gets a position by a new membership view. It requests the view
-/// at the first lease renewal that it does not know, or on its own.
+/// when it receives a lease renewal that it does not know, or else after a time by itself.
 #[test]
 fn a_relay_rebooted_later_gets_a_position_in_a_new_view() {
     for rebooted in 1..4 {

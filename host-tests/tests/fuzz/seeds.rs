@@ -62,7 +62,7 @@ fn scenario() -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Returns beginnings of inputs: mission, number of relays, method and parameters of Algorithm 2.
+/// Returns the first bytes of inputs. They select mission, number of relays, method and parameters of Algorithm 2.
 fn missions() -> Vec<Vec<u8>> {
     let align = (0..6).flat_map(|mission| [0, 8].map(|how| vec![mission, 3, how]));
     let joint = [1, 33, 65, 73].map(|how| vec![1, 3, how]);
@@ -137,16 +137,17 @@ fn relay() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Returns input bytes with an offer of the next mission version, from `side`. It is the paper's mission with the
-/// interferer at another position.
+/// Returns input bytes with an offer of the next mission version, from `side`. The offered mission is the paper's
+/// with the interferer at another position.
 fn offer(side: u8) -> Vec<u8> {
     let head = [9, side, 14, 1, 0, 0, 1];
     let interferer = [0, 0, 128, 0, 0, 192, 0, 0, 64];
     [&head[..], &interferer, &[255, 1, 1, 0, 0]].concat()
 }
 
-/// Returns an input: the second of four relays with a key receives a mission, and adopts it. The chain adopts it by a
-/// new membership view.
+/// Returns an input: the second of four relays with a key receives a mission, and adopts it.
+///
+/// The chain adopts the mission by a new membership view. `how` is the byte of the input that selects key and wiring.
 fn uploaded(how: u8) -> Vec<u8> {
     let head = [0, 3, 0, 1, how, 0, 0, 0, 0, 1, 0];
     let asks = [9, 0, 10, 0, 2, 1, 0, 0, 0, 1, 1, 0];
@@ -179,8 +180,9 @@ fn by_the_ground(index: u8) -> Vec<u8> {
     [&head[..], &asks, &offer, &asks, &offer, &[3, 9]].concat()
 }
 
-/// Returns an input: the last of four relays receives membership views, a fence and late frames. It has a motion
-/// guard and a position.
+/// Returns an input: the last of four relays receives membership views, a fence and late frames.
+///
+/// The relay has a motion guard and a position. `wiring` is the byte of the input that selects the wiring.
 fn formed(wiring: u8) -> Vec<u8> {
     let head = [0, 3, 0, 3, wiring, 32, 0, 0, 0, 0, 0, 1, 0];
     let position = [15, 0, 0, 0, 100, 0, 0, 20];

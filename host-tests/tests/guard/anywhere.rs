@@ -41,7 +41,7 @@ const ROUGH_S: f64 = 120.0;
 /// Time at which a flight fails if not all drones have arrived, s.
 const LAST_S: f64 = 900.0;
 
-/// Line of relays over the ground. All lines start at the same transmitter.
+/// Line from Tx to Rx: its number, and its direction on the ground. All lines start at the same Tx.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     number: u32,
@@ -81,7 +81,7 @@ struct Drone {
     at: Point,
     velocity: Point,
     bias: Point,
-    /// Point that the autopilot is following, over the ground, m.
+    /// Point that the autopilot is following, m, in coordinates of the ground and not of a line.
     target: Point,
     /// Velocity of the point that the autopilot is following, m/s.
     target_velocity: Point,
@@ -178,16 +178,16 @@ struct World {
     least_m: Vec<f64>,
     /// Time since which each drone has hovered under its pilot's control, s; infinite for other drones.
     hovers_s: Vec<f64>,
-    /// Time when a drone first received the position of its hovering neighbour, s; infinite before. The neighbour
+    /// Time when a drone first received the position of a hovering neighbour, s; infinite before. The neighbour
     /// hovers under its pilot's control.
     known_s: Vec<f64>,
-    /// Distance required of a drone and a neighbour that hovers under its pilot's control, m. It is set `BRAKES_S`
-    /// after `known_s`.
+    /// Distance required of a drone and a neighbour that hovers under its pilot's control, m. It applies from
+    /// `BRAKES_S` after the time in `known_s`, because the drone must brake first.
     hovering_m: Vec<f64>,
     /// Indices of drones whose pilots give control back as soon as no other drone is passing them.
     later: Vec<usize>,
-    /// Drones whose pilots gave control back in motion, and the times at which their braking ends, s. Their distances
-    /// are checked from then on.
+    /// Drones whose pilots gave control back in motion, and the times at which their braking ends, s. The distances
+    /// of these drones are checked from then on.
     brakes: Vec<(usize, f64)>,
     rng: ChaCha8Rng,
 }
@@ -371,7 +371,7 @@ impl World {
     }
 }
 
-/// Returns random agreed positions: in order along the line, separated, and within the box across it.
+/// Returns random agreed positions: in order along x, separated, and with y and altitude as permitted.
 fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(config.geofence.most_x_m);
     let step = f64::from(config.separation_m) * 1.001;

@@ -44,9 +44,9 @@ pub(crate) struct Drone {
     pub(crate) latency_s: f64,
     /// Motion guard of the drone; `None` while the relay is switched off.
     pub(crate) guard: Option<Guard>,
-    /// First setpoint of the guard after a time without one.
+    /// First setpoint of the guard since it last had none; `None` while it has none.
     begun: Option<Placement>,
-    /// Indices of the drones with which the relay has links, toward Tx and toward Rx.
+    /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],
     pub(crate) flies: bool,
     /// True while the drone's radio works.
@@ -58,7 +58,9 @@ pub(crate) struct Drone {
     /// Range of x that both neighbours keep clear, since they know that the pilot flies this drone.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
-    /// Numbers of the associations with the neighbours toward Tx and Rx, in the last messages to them.
+    /// Session numbers that this drone's guard last sent to the neighbours toward Tx and Rx.
+    ///
+    /// A reply counts only if it repeats the number.
     pub(crate) said: [u16; 2],
     next_report_s: f64,
     next_reminder_s: f64,
@@ -119,7 +121,7 @@ impl Drone {
             .into_iter()
             .zip(self.links)
         {
-            guard.link(side, link.map(node));
+            guard.set_neighbour(side, link.map(node));
         }
         guard.control(instant(now_s), !self.taken);
         self.guard = Some(guard);
@@ -241,7 +243,7 @@ impl Drone {
         self.orders.push_back((due_s, point));
     }
 
-    /// Calls `Guard::remind` once per second.
+    /// Makes the guard repeat its messages once per second, because messages may be lost.
     pub(crate) fn reminded(&mut self, now_s: f64) {
         if now_s >= self.next_reminder_s {
             self.next_reminder_s = now_s + 1.0;

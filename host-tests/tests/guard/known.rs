@@ -82,7 +82,7 @@ fn a_tight_row_of_drones_shifts_in_both_directions() {
 
 /// Checks that drones approach agreed positions that are too close, as far as the separation permits.
 ///
-/// Three drones have positions at a distance of 4 m along x, where the outer two need 10 m.
+/// The positions of three drones are 4 m apart along x, so that the outer two would be 8 m apart and not 10 m.
 #[test]
 fn drones_approach_positions_that_are_too_close() {
     let mut world = world(5, 100.0, 100.0);

@@ -42,7 +42,7 @@ pub(crate) struct Report {
     pub(crate) taken: u64,
     /// Number of drones that their pilots moved along the line.
     pub(crate) along: u64,
-    /// Number of neighbours whose final positions are closer along x than the separation.
+    /// Number of pairs of neighbours whose final positions are closer along x than the separation.
     pub(crate) close: u64,
     pub(crate) closest_m: f64,
     pub(crate) share_of_time: f64,

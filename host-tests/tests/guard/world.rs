@@ -68,7 +68,7 @@ impl World {
         let drone = &mut self.drones[k];
         drone.links[usize::from(side == Side::Downstream)] = neighbour;
         if let Some(guard) = &mut drone.guard {
-            guard.link(side, neighbour.map(node));
+            guard.set_neighbour(side, neighbour.map(node));
         }
     }
 
@@ -193,7 +193,9 @@ impl World {
         least < most
     }
 
-    /// Checks that no two drones came closer in this step, or can come before they stop, than permitted.
+    /// Checks that no two drones are closer than permitted in this step, and cannot be soon after.
+    ///
+    /// The check covers each position where a drone may be before new setpoints arrive.
     fn check(&mut self) {
         let separation = f64::from(self.config.separation_m);
         let floor = separation - self.allowed_m();
@@ -224,7 +226,8 @@ impl World {
     }
 }
 
-/// Returns the indices of drone `k`'s neighbours toward Tx and Rx, among `relays` drones.
+/// Returns the indices of drone `k`'s neighbours toward Tx and Rx among `relays` drones. The first and the last drone
+/// have only one.
 pub(crate) fn beside(k: usize, relays: usize) -> [Option<usize>; 2] {
     [k.checked_sub(1), (k + 1 < relays).then_some(k + 1)]
 }

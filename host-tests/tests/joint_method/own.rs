@@ -19,7 +19,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Draws a chain in the vertical plane in which some relays have their own power or a held altitude. Returns `None`
+/// Draws a chain in the vertical plane in which some relays have their own power or a fixed altitude. Returns `None`
 /// if no relay differs.
 fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     let drawn = scenario(rng, &(2..=20), ROOMY);
@@ -63,7 +63,7 @@ fn mixed(rng: &mut ChaCha8Rng) -> Option<(Scenario, Setup)> {
     Some((drawn, setup))
 }
 
-/// Checks that chains with different powers or held altitudes come near the joint optimum. Their SIR is never below
+/// Checks that chains with different powers or fixed altitudes come near the joint optimum. Their SIR is never below
 /// that at the configured altitudes.
 #[test]
 fn different_relays_come_near_the_joint_optimum() {
@@ -117,7 +117,7 @@ fn different_relays_come_near_the_joint_optimum() {
     assert!(f64::from(passes) <= 3.5 * count as f64, "{passes}");
 }
 
-/// Checks that a relay that holds its altitude keeps it, while its neighbours choose others.
+/// Checks that a relay that is configured to keep its altitude does so. Its neighbours choose other altitudes.
 #[test]
 fn one_relay_may_have_a_fixed_altitude() {
     let (link, corridor) = close_by(6);
@@ -143,9 +143,9 @@ fn one_relay_may_have_a_fixed_altitude() {
 
 /// Checks the number of round trips if some relays have a power or altitude of their own.
 ///
-/// The first round trip computes and finds that relays differ. Each further one collects the data of up to eight of
-/// these relays, and the last one computes again. If the leader is one of these relays, the first round trip is
-/// omitted.
+/// The first round trip computes and finds that relays differ. Each further round trip collects the data of up to
+/// eight of these relays, and the last one computes again. If the leader is one of these relays, the first round trip
+/// is omitted.
 #[test]
 fn different_relays_take_three_round_trips_or_more() {
     for (relays, own, trips) in [
@@ -255,8 +255,8 @@ fn faults_change_nothing_on_random_links() {
     assert!(injected > 10_000);
 }
 
-/// Checks that the joint solver reaches the optimum in few computation steps. It must abandon hopeless start points,
-/// but not the best one.
+/// Checks that the joint solver reaches the optimum in few computation steps. For this the solver must abandon
+/// hopeless start points, but not the best one.
 #[test]
 fn few_portions_lead_to_the_joint_optimum() {
     for (relays, lateral_m, most, best) in [

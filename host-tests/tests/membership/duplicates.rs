@@ -202,8 +202,8 @@ fn fly(medium: Medium, signed: bool, loss: f64, at_once: bool) -> Vec<(u64, Dura
     found
 }
 
-/// Checks that one of two duplicate relays gives up its setpoint in time, and one reports the other. The chain has to
-/// fly within `FLIES_MS`.
+/// Checks that one of two duplicate relays gives up its setpoint in time, and one reports the other. The whole chain
+/// must have setpoints within `FLIES_MS`.
 fn at_most_one_flies(medium: Medium, most_ms: u64) {
     let mut faults = Vec::new();
     for kind in 0..8 {
@@ -239,9 +239,10 @@ fn one_of_two_hidden_duplicates_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }
 
-/// Two chains that meet on a shared channel and both have a relay with one index.
+/// Test of two chains that meet on a shared channel. Each chain has a relay with the same index, a duplicate.
 ///
-/// Each chain has half of the other relays. They come into range once the relays of both have agreed on positions.
+/// Each chain has half of the other relays. The chains come into range of each other once both have agreed on
+/// positions.
 #[derive(Clone, Copy, Debug)]
 struct Meeting {
     relays: u16,
@@ -290,7 +291,7 @@ impl Meeting {
         }
     }
 
-    /// Returns the longest time with setpoints at both duplicates, ms, and their final number of setpoints.
+    /// Returns the longest time with setpoints at both duplicates, ms, and how many have one in the end.
     fn fly(self) -> (u64, usize) {
         let rng = &mut ChaCha8Rng::seed_from_u64(self.seed);
         let chain = self.first_chain(rng);
@@ -351,8 +352,9 @@ impl Meeting {
     }
 }
 
-/// Checks that one of two duplicates in settled chains gives up its setpoint when the chains meet. Only handshakes
-/// reveal a duplicate. Settled chains send them with the lease renewals alone.
+/// Checks that one of two duplicates in settled chains gives up its setpoint when the chains meet. Duplicates are
+/// relays with the same index. Only handshakes reveal a duplicate, and settled chains send them only with the lease
+/// renewals.
 #[test]
 fn one_of_two_settled_duplicates_loses_its_setpoint() {
     let mut faults = Vec::new();

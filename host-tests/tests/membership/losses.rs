@@ -7,7 +7,7 @@ use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
 
-/// Returns the time from the last loss to the settled chain, and the sweeps along the chain meanwhile.
+/// Returns the time from the last loss to the settled chain, and the number of sweeps in this time.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, TimelineEvent::Lost(_));
     let last = outcome

@@ -16,7 +16,8 @@ pub(crate) struct EpochPair {
     pub(crate) to: u32,
 }
 
-/// Signed frames that a relay has accepted since it was switched on. The sides are upstream and downstream.
+/// Signed frames that a relay has accepted since it was switched on. Arrays have one element for the upstream
+/// neighbour and one for the downstream neighbour.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AcceptedFrames {
     frames: [BTreeSet<(u32, Vec<u8>)>; 2],

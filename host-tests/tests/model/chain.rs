@@ -125,8 +125,9 @@ impl<'a> World<'a> {
         (0..self.relays.len()).try_for_each(|at| self.turn(at))
     }
 
-    /// Checks each pair of neighbours that hold positions for the same target SIR. Their separation must be kept, and
-    /// the hop between them must meet the target.
+    /// Checks each pair of neighbours that have agreed positions for the same target SIR.
+    ///
+    /// Their separation must be kept, and the hop between them must meet the target.
     fn neighbours_agree(&mut self) -> Checked {
         let places: Vec<_> = self.ledgers.iter().map(|ledger| ledger.place).collect();
         let hops = self.scenario.reference.hops(&places);
@@ -180,13 +181,14 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// Delivers bytes of a frame at the end of a line, then runs the receiver's main loop.
+    /// Delivers bytes of a frame to the receiver of `line`, then runs the receiver's main loop. A line is one
+    /// direction of a link.
     pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], frame: &Flying) -> Checked {
         self.deliver_and_check(line, bytes, frame)?;
         self.turn(end(line).0)
     }
 
-    /// Delivers bytes of a frame at the end of a line.
+    /// Delivers bytes of a frame to the receiver of `line`, one direction of a link.
     ///
     /// If they complete a pass (a round of messages along the chain), the model checks how the relay's statistics
     /// count it.
@@ -274,7 +276,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Returns true if every relay holds its position, all for the same target SIR.
+    /// Returns true if every relay has an agreed position, all for the same target SIR.
     pub(crate) fn agrees(&self) -> bool {
         let target = self.ledgers[0].target.map(f32::to_bits);
         self.ledgers

@@ -36,17 +36,18 @@ pub(crate) struct Ledger {
     longest: Duration,
     /// Membership view that the relay has accepted; 0 after each start.
     pub(crate) view: ViewId,
-    /// Number of the last pass (round of messages along the chain) that the relay accepted in this view.
+    /// Number of the last pass (round of messages along the chain) accepted in this membership view. `None` before
+    /// the first.
     pub(crate) pass: Option<u16>,
     /// Number of the last pass (round of messages along the chain) of the relay before each of its reboots.
     pub(crate) passes_before: Vec<u16>,
     /// Largest Upsilon = E[1/I] (I is the interference power) that the relay has ever measured, 1/W.
     ///
-    /// Measurements from before its reboots count, too.
+    /// `None` before the first measurement. Measurements from before its reboots count, too.
     pub(crate) measured_per_w: Option<f64>,
     /// Epoch of the relay since its last start: at least 1, increasing, different for all relays.
     pub(crate) epoch: u32,
-    /// Record of the relay's votes in its flash, after the last vote.
+    /// Record of the relay's votes in its flash, after the last vote; `None` before the first vote.
     pub(crate) record: Option<ViewRecord>,
     /// Signed frames that the relay has accepted since its last start.
     accepted: AcceptedFrames,
@@ -59,7 +60,7 @@ fn tick(settings: &Settings, relays: usize) -> Duration {
     Duration::from_micros(round.clamp(span / 64 + 1, span / QUESTIONS as u64))
 }
 
-/// Returns the longest interval of heartbeat requests to a neighbour, from the shortest one.
+/// Returns the longest interval of heartbeat requests to a neighbour, given the shortest one.
 fn spread(tick: Duration) -> Duration {
     Duration::from_micros(tick.as_micros() + tick.as_micros() / 8 + 1)
 }
@@ -70,7 +71,7 @@ pub(crate) struct Turn<'a> {
     pub(crate) relay: &'a Relay,
     pub(crate) sent: u32,
     pub(crate) events: &'a [Event],
-    /// Largest Upsilon = E[1/I] (I is the interference power) that any relay has measured, 1/W.
+    /// Largest Upsilon = E[1/I] (I is the interference power) that any relay has measured, if any, 1/W.
     pub(crate) measured_per_w: Option<f64>,
 }
 
@@ -159,7 +160,7 @@ impl Ledger {
         }
     }
 
-    /// Records that the relay received interference samples that it does not use.
+    /// Counts `samples` interference samples that the relay received but does not use.
     pub(crate) fn refuses(&mut self, samples: u32) {
         self.refused += samples;
     }
@@ -247,7 +248,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Checks that a relay holds its position only for a target SIR that the chain can meet.
+    /// Checks that a relay has an agreed position only for a target SIR that the chain can meet.
     fn check_target(&mut self, scenario: &Scenario, turn: &Turn) -> Checked {
         let Turn { relay, events, .. } = turn;
         let target = relay.target();

@@ -6,25 +6,27 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Operation on the simulated chain. A line is one direction of a link between neighbours; its number counts only
+/// Operation on the simulated chain. A line is one direction of a link between neighbours. Its number counts only
 /// lines with a frame in transit.
 #[derive(Clone, Debug)]
 pub(crate) enum Operation {
-    /// Operation: the next frame of a line arrives.
+    /// Operation: the next frame on a line (one direction of a link) arrives.
     Deliver(u8),
-    /// Operation: the next frame of a line is lost.
+    /// Operation: the next frame on a line (one direction of a link) is lost.
     Drop(u8),
-    /// Operation: the next frame of a line arrives twice.
+    /// Operation: the next frame on a line (one direction of a link) arrives twice.
     Twice(u8),
-    /// Operation: a frame of a line overtakes frames before it. The fields are the line, and a number that selects
-    /// one to four frames to overtake.
+    /// Operation: a frame overtakes frames before it. The fields are the line (direction of a link) and a number that
+    /// selects one to four frames to overtake.
     Overtake(u8, u8),
-    /// Operation: several frames of a line arrive in one read. The fields are the line and their number.
+    /// Operation: several frames arrive in one read. The fields are the line (direction of a link) and the number of
+    /// frames.
     Burst(u8, u8),
-    /// Operation: the next frame of a line is delayed. The fields are the line and the delay in ms.
+    /// Operation: the next frame on a line is delayed. The fields are the line (direction of a link) and the delay in
+    /// ms.
     Delay(u8, u16),
-    /// Operation: the next frame of a line arrives damaged. The fields are the line and, for each damaged byte, its
-    /// position and the flipped bits.
+    /// Operation: the next frame on a line arrives damaged. The fields are the line (direction of a link) and, for
+    /// each damaged byte, its position and the flipped bits.
     Damage(u8, Vec<(u8, u8)>),
     /// Operation: the clock advances to the next timer of any relay.
     Tick,
@@ -43,18 +45,20 @@ pub(crate) enum Operation {
     Join(u8),
     /// Operation: the leader is commanded to restart the agreement.
     Restart,
-    /// Operation: a recorded frame of a line arrives again, if the chain signs its frames. The fields are the line
-    /// and the frame.
+    /// Operation: a recorded frame arrives again, if the chain signs its frames. The fields are the line (direction
+    /// of a link) and the frame.
     Replay(u8, u8),
     /// Operation: a relay measures interference. The fields are the relay, and the power in per cent of the agreed
     /// one.
     Measure(u8, u8),
 }
 
-/// Difference of a leader's random seeds that raises its first message number by 64, the least step.
+/// Step between random seeds of a leader. A step raises the number of the leader's first message by 64, the least
+/// amount possible, so that a rebooted leader with such a seed repeats recent numbers.
 const NEXT_LIFE: u32 = 54_336;
 
-/// Draws a relay's random seed, sometimes one with which a rebooted leader repeats recent numbers.
+/// Draws a relay's random seed. With some seeds, a rebooted leader repeats its recent message numbers, which is hard
+/// to handle.
 pub(crate) fn seeds() -> impl Strategy<Value = u32> {
     prop_oneof![any::<u32>(), (0..4_u32).prop_map(|life| life * NEXT_LIFE)]
 }

@@ -18,13 +18,13 @@ use super::wires::Pass;
 /// that travels along the chain. No other pass has a multiple of this number.
 const FIRST: u16 = 64;
 
-/// Number of latest passes (rounds of messages along the chain) that are known to be over.
+/// Number of passes (rounds of messages along the chain) before the last one that count as late.
 ///
-/// A pass with an older number counts as one from before a reboot. A leader's next pass may skip at most so many
-/// numbers.
+/// A pass with an older number counts as one from before a reboot. A leader's next pass has a number that is at most
+/// this much larger.
 const NEAR: u16 = 32;
 
-/// Returns what a membership view adds to the mission digest in its messages along the chain.
+/// Returns the number that messages along the chain add to the mission digest in a membership view.
 ///
 /// It is the lower half of the view's 32-bit name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
@@ -47,7 +47,8 @@ pub(crate) enum PassClass {
     Late,
     /// Classification: a pass (a message along the chain) that does not continue the known ones.
     ///
-    /// It is of another membership view, from before the leader's reboot, or the relay has missed the pass before it.
+    /// The pass is of another membership view, or from before the leader's reboot, or the relay has missed the pass
+    /// before it.
     Foreign,
 }
 
@@ -116,7 +117,7 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay takes part in its view's first pass for the second time, after a reboot.
+    /// Returns true if the relay takes part in its membership view's first pass again, after a reboot.
     ///
     /// A pass is a round of messages along the chain.
     pub(crate) fn repeats_first_pass(&self) -> bool {

@@ -10,7 +10,7 @@ use super::scenario::{Calm, Kind};
 /// Longest time to an agreement of a chain without faults, ms of virtual time.
 const LONGEST_MS: u64 = 20_000;
 
-/// Largest number of further membership views after an agreement.
+/// Largest permitted number of further membership views after an agreement.
 const MOST_VIEWS: u32 = 2;
 
 /// Time of observation after the agreement, ms, in which no relay may be lost or move.
@@ -35,7 +35,7 @@ impl World<'_> {
             .collect()
     }
 
-    /// Runs the chain until every relay holds a position for the same target SIR. Returns the time taken.
+    /// Runs the chain until every relay has an agreed position for the same target SIR. Returns the time taken.
     fn agree(&mut self, at_most: Duration) -> Checked<Duration> {
         let begun = self.now;
         while !self.agrees() {
@@ -52,8 +52,8 @@ impl World<'_> {
 
     /// Returns the longest permitted time to an agreement after a restart in any state of the chain.
     ///
-    /// It allows for one lost message on each line. A relay that waits for a result over h hops retransmits after (2
-    /// h + 2) `hop_time` and an eighth.
+    /// The time allows for one lost message in each direction of each link. A relay that waits for a result over h
+    /// hops retransmits after 9/8 of (2 h + 2) `hop_time`.
     fn patience(&self) -> Duration {
         let hop_us = self.scenario.settings[0].hop_time.as_micros();
         let hops = 1..self.relays.len() as u64;
@@ -67,7 +67,7 @@ impl World<'_> {
         Duration::from_micros(self.scenario.calm.took_us + 4 * waits + silence_us + lease_us)
     }
 
-    /// Returns the longest time that a request for a new view takes to the leader. Each relay may wait for
+    /// Returns the longest time that a request for a membership view takes to the leader. Each relay may wait for
     /// `probe_after` before it forwards the request.
     fn view_request_time(&self) -> Duration {
         let calls = self.relays.len() as u64 - 1;

@@ -4,7 +4,7 @@ use uav_relay_oracle::reference::joint::Place;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Relay};
 
-/// Relative excess over the optimum that f32 rounding permits a target SIR.
+/// Largest permitted relative excess of a target SIR over the optimum, because of f32 rounding.
 const ABOVE: f64 = 1e-4;
 
 /// Reference model of a mission's chain, in f64.
@@ -21,7 +21,7 @@ pub(crate) enum Reference {
 }
 
 impl Reference {
-    /// Returns the SIRs of the N + 1 hops. Those at a relay without a position are meaningless.
+    /// Returns the SIRs of the N + 1 hops. The SIRs of the hops at a relay without a position are meaningless.
     pub(crate) fn hops(&self, places: &[Option<Place>]) -> Vec<f64> {
         let x: Vec<f64> = places
             .iter()

@@ -21,7 +21,8 @@ use super::reference::Reference;
 /// Number of samples that a relay averages at one position.
 pub(crate) const SAMPLES: u32 = 100;
 
-/// Range of the least separation in half of the chains with free altitudes, in units of D / (N + 1).
+/// Range from which the least separation is drawn in half of the chains with free altitudes. The unit is the distance
+/// of neighbours in an evenly spaced chain.
 const TIGHT: (f64, f64) = (0.05, 0.95);
 
 /// Number of scenes with free altitudes whose optima are recorded.
@@ -136,7 +137,7 @@ pub(crate) fn pool(seed: u64, count: u32) -> Vec<Scenario> {
         .collect()
 }
 
-/// Draws a mission of a kind; `None` if no chain can fly it.
+/// Draws a mission of a kind; `None` if no chain can carry out the drawn mission.
 fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
     let (mission, settings, reference) = match kind {
         Kind::Predicted | Kind::Tried => aligned(rng, kind)?,
@@ -163,7 +164,7 @@ fn drawn(rng: &mut ChaCha8Rng, kind: Kind) -> Option<Scenario> {
 
 type Parts = (Mission, Vec<Settings>, Reference);
 
-/// Returns the settings of each relay, with its own profile if `own` has one.
+/// Returns the settings of each relay. A relay whose index is in `own` has its own altitude and power.
 fn settings(relays: usize, common: Settings, own: &[(u16, Profile)]) -> Vec<Settings> {
     let mut all = vec![common; relays];
     for (index, profile) in own {

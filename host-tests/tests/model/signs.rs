@@ -8,7 +8,8 @@ pub(crate) const QUESTIONS: usize = 16;
 /// Number of heartbeat intervals after which a late reply no longer proves that the neighbour is alive.
 const OPEN: u32 = 4;
 
-/// Factor on the most requests that were ever unanswered before a reply. After more, the neighbour must be reported.
+/// Factor on the largest number of heartbeat requests that were ever unanswered at once. A neighbour with more
+/// unanswered requests than this product must be reported as lost.
 const MARGIN: usize = 3;
 /// Factor on `dead_after`: the silence after which a neighbour must be reported as lost in any case.
 pub(crate) const LONGEST: u32 = 8;

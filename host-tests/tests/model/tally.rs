@@ -11,7 +11,7 @@ use super::scenario::{Kind, Scenario};
 pub(crate) struct Tally {
     counts: BTreeMap<&'static str, u64>,
     most: BTreeMap<&'static str, u64>,
-    /// Longest time to an agreement, µs, by kind of mission and by signed or unsigned frames.
+    /// Longest time to an agreement, µs, by kind of mission and by signed (true) or unsigned frames.
     took_us: BTreeMap<(Kind, bool), u64>,
     sequences: BTreeMap<(Kind, bool), u64>,
 }

@@ -12,10 +12,10 @@ use super::accepted_frames::EpochPair;
 /// Time that a frame takes to a neighbour without faults.
 pub(crate) const FLIGHT: Duration = Duration::from_millis(5);
 
-/// Maximum number of frames in transit on one line; further frames are lost.
+/// Maximum number of frames in transit in one direction of a link; further frames are lost.
 const ROOM: usize = 12;
 
-/// Number of frames of each line that a simulated attacker has recorded.
+/// Number of latest frames in each direction of a link that a simulated attacker has recorded.
 const RECORDED: usize = 64;
 
 #[derive(Clone, Debug)]
@@ -45,7 +45,8 @@ pub(crate) struct Ended {
     pub(crate) broken: u32,
 }
 
-/// Links of a chain. Link k connects relays k and k + 1 (from 0); its lines are 2 k downstream and 2 k + 1 upstream.
+/// Links of a chain. Link k connects relays k and k + 1 (from 0). Its two directions are called lines: line 2 k is
+/// downstream, and line 2 k + 1 is upstream.
 #[derive(Debug)]
 pub(crate) struct Wires {
     lines: Vec<Line>,
@@ -129,14 +130,16 @@ impl Wires {
         }
     }
 
-    /// Returns one of the recorded frames of a line, chosen by `which`; `None` if there is none.
+    /// Returns one of the recorded frames of `line`, one direction of a link. `which` selects it. Returns `None` if
+    /// there is no such frame.
     pub(crate) fn recorded(&self, line: usize, which: u8) -> Option<Flying> {
         let recorded = &self.lines[line].recorded;
         let at = usize::from(which) % recorded.len().max(1);
         recorded.get(at).cloned()
     }
 
-    /// Returns the number of one of the lines with a frame in transit, chosen by `pick`.
+    /// Returns the number of a line (one direction of a link) with a frame in transit. `pick` selects one of these
+    /// lines.
     pub(crate) fn pick(&self, pick: u8) -> Option<usize> {
         let busy: Vec<usize> = (0..self.lines.len())
             .filter(|&line| !self.lines[line].flying.is_empty())
@@ -144,15 +147,16 @@ impl Wires {
         busy.get(usize::from(pick) % busy.len().max(1)).copied()
     }
 
-    /// Removes the frame that is `behind` frames after the next one of a line, or else its last frame.
+    /// Removes and returns a frame in transit on `line`, one direction of a link. It is the one that is `behind`
+    /// frames after the next one, or else the last one.
     pub(crate) fn take(&mut self, line: usize, behind: u8) -> Option<Flying> {
         let flying = &mut self.lines[line].flying;
         let last = flying.len().checked_sub(1)?;
         flying.remove(usize::from(behind).min(last))
     }
 
-    /// Receives bytes at the end of a line. Returns the numbers of frames that they complete. `whole` is the frame as
-    /// it was sent.
+    /// Receives bytes at the end of `line`, one direction of a link. Returns the numbers of frames that they
+    /// complete. `whole` is the frame as it was sent.
     pub(crate) fn arrive(&mut self, line: usize, bytes: &[u8], whole: &[u8]) -> Ended {
         let begun = &mut self.lines[line].begun;
         let mut ended = Ended::default();
@@ -176,7 +180,8 @@ impl Wires {
         }
     }
 
-    /// Cuts a link. Frames in transit are lost; the next frame of each of its two lines is returned.
+    /// Cuts a link, so that its frames in transit are lost. Returns the number and the next frame of each of its
+    /// directions, because first bytes of these frames may still arrive.
     pub(crate) fn cut(&mut self, link: usize) -> [(usize, Option<Flying>); 2] {
         self.cut[link] = true;
         [2 * link, 2 * link + 1].map(|line| {
@@ -196,7 +201,7 @@ impl Wires {
         self.cut.len()
     }
 
-    /// Delays the next frame of a line until `due`, while later frames pass it.
+    /// Delays the next frame of `line` (one direction of a link) until `due`, while later frames pass it.
     pub(crate) fn delay(&mut self, line: usize, due: Instant) {
         let Line { flying, late, .. } = &mut self.lines[line];
         late.extend(flying.pop_front().map(|frame| Flying { due, ..frame }));
@@ -217,7 +222,7 @@ impl Wires {
         self.hurry(now);
     }
 
-    /// Returns the arrival time and the line of the frame that arrives next; `None` without frames.
+    /// Returns the arrival time and the line (direction of a link) of the next frame to arrive, if any.
     pub(crate) fn next(&self) -> Option<(Instant, usize)> {
         let lines = self.lines.iter().zip(0..);
         let coming = lines.flat_map(|(line, number)| {

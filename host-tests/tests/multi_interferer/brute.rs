@@ -5,7 +5,8 @@ use uav_relay_scenario::scene::Scene;
 /// Number of cells of the grid in the first search.
 const CELLS: u32 = 600;
 
-/// Number of segments of the line. The best chain whose first relay is in a segment is a candidate.
+/// Number of segments into which the line from Tx to Rx is divided. The best chain whose first relay is in a segment
+/// is a candidate.
 const PARTS: f64 = 16.0;
 
 /// Number of the best candidates that are refined.
@@ -14,7 +15,7 @@ const CANDIDATES: usize = 4;
 /// Number of grid positions of each relay in a refinement, on either side of its present position.
 const BESIDE: i32 = 40;
 
-/// Half width of the first refinement, as a fraction of D.
+/// Half width of the first refinement's grid, as a fraction of the distance from Tx to Rx.
 const WINDOW: f64 = 0.06;
 
 /// Number of refinements of a candidate, each with a narrower window.

@@ -37,7 +37,7 @@ fn count(case: &Case, name: &str) -> u32 {
 
 /// Checks the single interferer that is fitted to several ones against values of a separate program.
 ///
-/// That program integrates the error of the fit by the midpoint rule on nx x nh cells.
+/// That program computes the error of the fit as a sum over a grid of nx times nh points.
 #[test]
 fn the_fit_agrees_with_the_reference_program() {
     let cases = cases::of("hyp_msi").unwrap();
@@ -101,7 +101,7 @@ fn equal_sources_at_one_position_are_one_of_their_sum() {
     }
 }
 
-/// Checks that a fitted interferer and its stated error change little with many more points. Prints the time.
+/// Checks that a fitted interferer and its stated error change little on a much finer raster. Prints the time.
 #[test]
 fn the_rasters_are_fine_enough() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(74));
@@ -181,7 +181,7 @@ fn extreme_scenes_have_a_finite_fit() {
 }
 
 /// Checks that the fitted interferer is on the true ones' side if lateral offsets are permitted. Without lateral
-/// offsets, its side is always positive.
+/// offsets, the y of the fitted interferer is always positive.
 #[test]
 fn with_lateral_range_the_fit_is_on_the_right_side() {
     let source = |x_m: f64, y_m: f64| Source {

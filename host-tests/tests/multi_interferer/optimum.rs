@@ -120,7 +120,7 @@ fn a_scene_without_an_optimum_has_none() {
     assert!(held(false) && !held(true));
 }
 
-/// Checks that a chain of as many relays as the separation permits is placed, and one of a thousand.
+/// Checks that positions are found for as many relays as the separation permits, and for a thousand.
 ///
 /// The thousand relays have different powers. One relay too many must be refused.
 #[test]
@@ -147,7 +147,7 @@ fn crowded_and_long_chains_are_placed() {
     assert!(found.sir > 40.0, "more than a hundred relays reach");
 }
 
-/// Checks that the best common altitudes of the paper's scenario are those of known values.
+/// Checks that the best common altitudes of the paper's scenario, and their SIRs, equal known values.
 ///
 /// The interferer is at y = 150 m, altitudes are 20 m to 300 m, and the separation is 4 m.
 #[test]

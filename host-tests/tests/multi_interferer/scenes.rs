@@ -105,12 +105,12 @@ pub(crate) fn scene(
     Scene::new(&scenario, n).unwrap()
 }
 
-/// Returns the scene of a reference link, with the first relay's altitude as the only one.
+/// Returns the scene of a reference link. Its relays may only have the altitude of the link's first relay.
 pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }
 
-/// Returns the scene with its lowest permitted altitude as the only one.
+/// Returns the scene with its lowest permitted altitude as the only permitted one.
 pub(crate) fn level(mut scene: Scene) -> Scene {
     scene.band.most_m = scene.band.least_m;
     scene

@@ -66,7 +66,7 @@ fn the_optimum_is_found_in_noise() {
     );
 }
 
-/// Checks that different relays in noise meet their agreed target SIR. It is never above the optimum.
+/// Checks that different relays in noise meet their agreed target SIR. The target must never be above the optimum.
 #[test]
 fn different_relays_in_noise_meet_the_agreed_target() {
     let mut rng = generator(1103);

@@ -22,7 +22,8 @@ fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
     sum / weight
 }
 
-/// Checks that E[1 / (I + N)] is at most the crate's bound and at least 1 / (E[I] + N).
+/// Checks that E[1 / (I + N)] is at most the crate's bound and at least 1 / (E[I] + N). I is the interference power,
+/// N the noise power.
 #[test]
 fn noise_in_a_field_is_bounded_from_above() {
     let mut worst = Vec::new();

@@ -67,7 +67,7 @@ fn the_joint_optimum_is_found_in_noise() {
     assert!(above * 50 <= of, "{above} of {of}");
 }
 
-/// Checks that message faults do not change a bit of joint positions with noise. They are losses of 30 % and
+/// Checks that message faults do not change a bit of joint positions with noise. The faults are losses of 30 % and
 /// corruption of 15 %.
 #[test]
 fn joint_chains_in_noise_settle_to_the_bit_despite_faults() {

@@ -31,8 +31,8 @@ fn hop_sirs_agree_with_the_reference() {
 
 /// Checks the farthest position at which a hop meets a target SIR against the reference.
 ///
-/// A third of the targets are near the SIR of a hop whose sender and interferer are equally far away. There the
-/// printed formulas lose their digits.
+/// A third of the targets are near the SIR of a hop whose sender and interferer are equally far away, because the
+/// printed formulas lose precision there.
 #[test]
 fn reaches_agree_with_the_reference() {
     let seen = reaches_agree(&mut generator(12), 20_000, false, |rng, of| {
@@ -87,7 +87,7 @@ fn the_reach_of_the_last_hop_agrees_with_the_reference() {
 
 /// Checks that chains of 1 to 50 relays, identical or with their own powers, reach the optimum.
 ///
-/// D is 10 m to 100 km, and the interferer is anywhere.
+/// Tx and Rx are 10 m to 100 km apart, and the interferer is anywhere.
 #[test]
 fn the_optimum_is_found_on_random_links() {
     let own_power = Style {
@@ -116,8 +116,8 @@ fn the_optimum_is_found_on_random_links() {
     }
 }
 
-/// Checks that relays of different altitudes and powers meet their agreed target SIR. It may be below the optimum,
-/// but not above.
+/// Checks that relays of different altitudes and powers meet their agreed target SIR. The target may be below the
+/// optimum, but not above.
 #[test]
 fn chains_of_different_relays_meet_the_agreed_target() {
     let mut all = Mixed::default();

@@ -164,7 +164,7 @@ fn a_plan_for_different_relays_is_what_they_agree_on() {
     }
 }
 
-/// Checks that the relays reach the SIR of the plan if one of them holds a high altitude. The others may have to take
+/// Checks that the relays reach the SIR of the plan if one of them keeps a high altitude. The others may have to take
 /// another side of the interferer.
 #[test]
 fn the_others_take_the_side_of_a_fixed_altitude() {

@@ -99,7 +99,7 @@ fn the_first_pass_after_a_reboot_is_never_the_next_one() {
 
 /// Checks that a rebooted relay takes no part in a later pass, a round of messages along the chain.
 ///
-/// After its reboot, it has received a delayed copy of the first pass.
+/// After its reboot, the relay has received a delayed copy of the first pass, which must not suffice to take part.
 #[test]
 fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
     let (now, sweep) = first_sweep(&mut relay(mission(3), 1));
@@ -114,7 +114,7 @@ fn a_delayed_first_pass_admits_no_relay_to_a_later_one() {
 
 /// Checks that a sweep message with the same number but other content counts as another one.
 ///
-/// A relay before this one that rebooted sends such a message.
+/// A relay closer to the leader sends such a message if it has rebooted.
 #[test]
 fn the_same_number_with_other_content_is_another_pass() {
     let changes: [fn(&mut Sweep); 4] = [

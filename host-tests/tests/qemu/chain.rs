@@ -105,7 +105,7 @@ fn five_drones_settle_like_the_simulation_with_faults() {
     }
 }
 
-/// Checks that the smallest firmware image agrees as the simulated chain does. It has no feature but the log.
+/// Checks that the smallest firmware image agrees as the simulated chain does. This image has no feature but the log.
 #[test]
 fn five_of_the_smallest_image_settle_like_the_simulation() {
     let flight = paper(5);

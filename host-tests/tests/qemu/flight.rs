@@ -158,7 +158,7 @@ fn an_arducopter_flies_to_the_agreed_place() {
     flies_to_its_place(Image::Radio, Kind::ArduCopter);
 }
 
-/// Checks that a drone without configured sites sends no targets to its autopilot.
+/// Checks that a drone that is not configured with the positions of Tx and Rx sends no targets.
 #[test]
 fn a_drone_without_sites_sends_no_targets() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);

@@ -24,7 +24,7 @@ impl Line {
             .map(|(_, rest)| rest.trim_start())
     }
 
-    /// Returns the f32 bits that the line has in parentheses behind `label`.
+    /// Returns the f32 bits that the line has in parentheses behind `label`. `None` if it has no such label.
     fn bits(&self, label: &str) -> Option<u32> {
         let (_, rest) = self.after(label)?.split_once("(0x")?;
         u32::from_str_radix(rest.split_once(')')?.0, 16).ok()

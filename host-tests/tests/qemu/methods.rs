@@ -124,7 +124,7 @@ fn five_drones_go_to_the_side_like_the_simulation() {
     settles(&flight);
 }
 
-/// Checks that a relay that holds its altitude moves to the side with the others.
+/// Checks that a relay that keeps a fixed altitude moves to the side with the others.
 #[test]
 fn five_drones_go_to_the_side_around_a_fixed_altitude() {
     let flight = past(150.0, 280.0, Some((3, 100.0)), Method::Joint);

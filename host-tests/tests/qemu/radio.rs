@@ -22,7 +22,7 @@ fn five_drones_on_one_radio_settle_like_the_simulation() {
     }
 }
 
-/// Checks that the others take exactly the positions of a chain of four after drone 3 was switched off.
+/// Checks that the other four drones take the positions of a chain of four if drone 3 is switched off.
 #[test]
 fn four_of_five_on_one_radio_recover_from_a_loss() {
     let flight = paper(5);

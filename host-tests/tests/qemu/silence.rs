@@ -12,7 +12,7 @@ use crate::fleet::{Fleet, Image, OF_THE_CHIP};
 use crate::log::Line;
 use crate::methods::field;
 
-/// Tolerance for delays of this machine, µs of the drones' clocks. They run 10.5 times too fast.
+/// Tolerance for delays of this machine, µs of the drones' clocks. These clocks run 10.5 times too fast.
 ///
 /// `a_silent_relay_is_noticed_by_both_neighbours_...` tests the exact time in simulation.
 const SLACK: u64 = 525_000;

@@ -78,6 +78,8 @@ impl Three {
     }
 
     /// Returns the last target of the first drone, and the positions of the other two drones.
+    ///
+    /// Returns `None` if the first drone has no target yet.
     fn places(&self) -> Option<[Placement; 3]> {
         let first = axis().place(self.mavsdk.target()?)?;
         let [second, third] = self.others.each_ref().map(|vehicle| vehicle.place);

@@ -23,7 +23,7 @@ const LARGE: usize = 32 * 1024;
 
 const KEY: [u8; 32] = *b"three drones and one transmitter";
 
-/// Returns the flight to upload: interferer, altitude and power differ from the loaded one.
+/// Returns the flight to upload. Its interferer, altitude and power differ from those of the mission before flight.
 fn moved(uavs: u16) -> Flight {
     let scenario = Scenario {
         interference: Interference::Sources(vec![Source {
@@ -131,8 +131,8 @@ fn three_drones_fly_the_transmitters_upload() {
     }
 }
 
-/// Checks that drones fly the newest mission stored in their flash. It has versions 2 and 3, and a version 4
-/// truncated by a power failure.
+/// Checks that drones fly the newest mission stored in their flash. The flash has versions 2 and 3, and a version 4
+/// that a power failure has truncated.
 #[test]
 fn three_drones_fly_a_stored_upload() {
     let loaded = paper(3);

@@ -38,7 +38,7 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
 
 const HOLDS: &str = "votes on the chain's membership restored from flash";
 
-/// Checks that drones with stored votes up to membership view 40 fly in a later view.
+/// Checks that drones with stored votes up to membership view 40 get setpoints in a later view.
 #[test]
 fn three_restarted_drones_keep_their_votes() {
     let flight = paper(3);
@@ -54,8 +54,9 @@ fn three_restarted_drones_keep_their_votes() {
     }
 }
 
-/// Checks that two of three drones do not fly if their stored membership view does not include them. Without that
-/// view they would have a quorum.
+/// Checks that two of three drones get no setpoints if their stored membership view is without them.
+///
+/// Without that stored view, the two drones would have a quorum.
 #[test]
 fn two_drones_that_recall_a_view_without_them_do_not_fly() {
     let flight = paper(3);

@@ -9,7 +9,7 @@ use uav_relay::{
     Measure, Method, Mission, MissionConfig, Profile, Schedule, Settings, Wiring, WithoutQuorum,
 };
 
-/// Draws a positive number: the usual one, a limit, or a log-uniform one between the limits.
+/// Draws a positive number: `usual`, `least`, `most`, or a log-uniform number between the last two.
 pub(crate) fn scaled(rng: &mut impl Rng, usual: f32, least: f32, most: f32) -> f32 {
     match rng.random_range(0..8) {
         0..4 => usual.clamp(least, most),
@@ -22,7 +22,7 @@ pub(crate) fn scaled(rng: &mut impl Rng, usual: f32, least: f32, most: f32) -> f
     }
 }
 
-/// Draws a number of either sign, up to `most`: 0, the usual one, the limit, or another.
+/// Draws a number of either sign, up to `most`: 0, `usual`, the limit, or a random number.
 pub(crate) fn signed(rng: &mut impl Rng, usual: f32, most: f32) -> f32 {
     let size = scaled(rng, usual.abs(), 1e-3, most);
     match rng.random_range(0..8) {
@@ -194,7 +194,7 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the shared settings of a chain in which an agreement may take any time.
+/// Draws the shared settings of a chain in which an agreement may take arbitrarily long.
 pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let usual = settings(rng, mission);
     let micros = |most: f64, rng: &mut _| f64::from(scaled(rng, 3e4, 1e3, 1e13)).min(most) as u64;

@@ -20,7 +20,7 @@ pub(crate) fn line(
     Some(Bench::new(relays?, now))
 }
 
-/// Returns true if all relays hold positions, or the leader reports that no target can be met.
+/// Returns true if all relays have agreed positions, or the leader reports that no target can be met.
 pub(crate) fn has_agreed(line: &Bench) -> bool {
     let mut leaders = line.relays.iter();
     let is_leader = |relay: &&Relay| relay.index() == relay.mission().leader();

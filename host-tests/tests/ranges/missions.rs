@@ -86,8 +86,9 @@ fn any_mission_ends_in_positions_or_infeasible() {
     assert!(of(ChainResult::Agreed) > came.len() / 4);
 }
 
-/// Checks that settings with which an agreement may take any time give finite numbers. These are fixed steps, long
-/// hops, and any `dead_after`.
+/// Checks that every reported number is finite with settings that make an agreement arbitrarily slow.
+///
+/// These are fixed steps, long hops, and any `dead_after`.
 #[test]
 fn every_slow_setting_gives_finite_numbers() {
     let came = each(200, |seed| {

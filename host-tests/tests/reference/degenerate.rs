@@ -123,9 +123,9 @@ fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
     assert!(link.chain_sir(&link.placement(best).unwrap()) >= best * (1.0 - 1e-14));
 }
 
-/// Checks that the paper's fixed-step search starts at a high enough target SIR.
+/// Checks the first target SIR of the paper's fixed-step search for an interferer behind Tx.
 ///
-/// With an interferer behind Tx, the first hop's SIR is not highest with the relay above Tx, but farther along.
+/// It must be the best SIR of the first hop, which that hop has with the relay farther along, and not above Tx.
 #[test]
 fn the_fixed_step_starts_above_the_hilltop() {
     let relay = Relay {

@@ -157,8 +157,8 @@ fn greedy_and_exact_agree_at_a_common_altitude() {
     );
 }
 
-/// Checks that the reference places a chain so that its target SIR is met. It traces the positions back through the
-/// sets of reachable positions.
+/// Checks that the reference finds positions that meet a given target SIR. The reference computes for each relay the
+/// positions that it can reach, and then chooses positions backward from Rx.
 #[test]
 fn placements_meet_their_target() {
     let style = Style {

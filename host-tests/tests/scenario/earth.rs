@@ -8,7 +8,8 @@ use super::*;
 const TX: [f64; 2] = [47.40, 8.54];
 const RX: [f64; 2] = [47.41, 8.55];
 
-/// Returns a scenario file with the interferer of `lines` and a line on level ground, 420 m above sea.
+/// Returns a scenario file whose interferer is described by `lines`. Tx and Rx are on the ground, 420 m above sea
+/// level.
 fn sited(lines: &str) -> String {
     let end =
         |[lat, lon]: [f64; 2]| format!("{{ lat_deg = {lat}, lon_deg = {lon}, amsl_m = 420 }}");

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Row of the table of numeric keys. It has the key's path, a file with `@` for the value, a value below the range,
-/// both limits, a value above, and the stated range.
+/// Row of the table of numeric keys. A row has the key's path, a file with `@` for the value, a value below the
+/// range, both limits, a value above, and the stated range.
 struct Row {
     key: &'static str,
     file: String,

@@ -105,8 +105,7 @@ fn an_eirp_outside_the_missions_range_is_refused() {
 /// End of a radio link: its position in m, and its antenna gain in dBi.
 type End = ([f64; 3], f64);
 
-/// Returns the received power in dBm for a transmitted power `dbm`. It counts free space, excess loss and both
-/// antennas.
+/// Returns the received power in dBm for a transmitted power `dbm`. Free space, excess loss and both antennas count.
 fn received_dbm(
     dbm: f64,
     (from, sends_dbi): End,
@@ -126,7 +125,7 @@ fn milliwatts(dbm: f64) -> f64 {
 
 /// Checks the crate's SINRs against a link budget.
 ///
-/// They are equal if all receiving antennas have the same gain, and otherwise not higher.
+/// Both are equal if all receiving antennas have the same gain. Otherwise the crate's SINRs are not higher.
 #[test]
 fn the_chain_has_the_sinrs_of_a_link_budget() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);

@@ -17,9 +17,10 @@ const RELAYS: u16 = 5;
 /// Factor on the path loss on the ground that the mission does not know: Rx is behind a hill.
 const HILL: f64 = 8.0;
 
-/// Returns the error of relay 1's estimate of the power at Rx, and the fraction of the optimum SIR.
+/// Returns two results of each random scene: the error of relay 1's power estimate at Rx, and the SIR.
 ///
-/// There is one pair for each of the random scenes.
+/// The error is relative, and `None` without an estimate. The SIR is the linear one of the chain's worst hop, by the
+/// true interference.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {
         let wild = RandomScene::new(seed, RELAYS, 1);

@@ -11,7 +11,7 @@ use uav_relay_tools::listening::{RandomScene, quantile};
 use crate::count;
 use crate::wrong::{named, share};
 
-/// Checks that a static world leads to at most five new agreements in an hour of measurements.
+/// Checks that a fixed interferer leads to at most five new agreements in an hour of measurements.
 #[test]
 fn with_a_fixed_interferer_estimates_stop_changing() {
     let seeds: Vec<u64> = (0..count(12)).collect();

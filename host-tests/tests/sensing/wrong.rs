@@ -71,9 +71,9 @@ fn with_wrong(wild: &RandomScene, node: u16, says: BrokenReading) -> Outcome {
     run(wrong).unwrap()
 }
 
-/// Checks that no kind of wrong sensor costs much SIR, and that the right sensor is reported as wrong.
+/// Checks that no kind of faulty sensor costs much SIR, and that the faulty one is reported.
 ///
-/// `node` gives the node with the wrong sensor for each scene. `sound` has the fraction of the optimum SIR that each
+/// `node` gives the node with the faulty sensor for each scene. `sound` has the fraction of the optimum SIR that each
 /// scene reaches without faults.
 fn hold(relays: u16, sound: &[f64], who: &str, node: impl Fn(u64) -> u16 + Sync) {
     for (what, says) in KINDS {
@@ -127,8 +127,10 @@ fn one_wrong_sensor_of_tx_or_rx_costs_little_sir() {
     }
 }
 
-/// Checks that one or two relays never blame another sensor, and report that no interferer fits. Three or four relays
-/// may blame another one in 2 % of the scenes.
+/// Checks that chains of one or two relays never report a correct sensor as wrong. They report that no interferer
+/// fits.
+///
+/// Three or four relays may report a correct sensor as wrong in 2 % of the scenes.
 #[test]
 fn a_short_chain_seldom_accuses_a_correct_sensor() {
     for relays in [1, 2, 3, 4] {
@@ -184,7 +186,9 @@ fn correct_sensors_are_not_accused() {
     assert_eq!(all, 0);
 }
 
-/// Checks that measurements of Tx and Rx help although they start late or stop early. Rx is behind a hill.
+/// Checks that measurements of Tx and Rx help although they start late or stop early.
+///
+/// The measurements matter because Rx is behind a hill, which the mission does not know.
 #[test]
 fn measurements_of_an_end_may_come_late_or_stop() {
     let [begin, late, end] = [0, 60_000, 10_000_000].map(Instant::from_millis);

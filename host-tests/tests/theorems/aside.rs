@@ -64,10 +64,7 @@ fn no_worse_than_brute_force(
         SceneResult { case, short, told }
     };
     // Fewer scenes than in the theorems' tests, because the search is expensive.
-    let seen: Vec<SceneResult> = (0..count(10_000) as u64)
-        .into_par_iter()
-        .map(look)
-        .collect();
+    let seen: Vec<SceneResult> = (0..count(3_000) as u64).into_par_iter().map(look).collect();
     let mut cases = BTreeMap::new();
     for one in &seen {
         *cases.entry(one.case.clone()).or_insert(0) += 1;
@@ -99,7 +96,8 @@ type Draw = fn(&mut ChaCha8Rng) -> LateralScene;
 
 /// Checks that the best position of a relay at a given altitude, with lateral offsets, is found.
 ///
-/// It is compared with brute force in random scenes. Every case of the solution must occur, except those of `absent`.
+/// The position is compared with brute force in random scenes. Every case of the solution must occur, except those of
+/// `absent`.
 fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -114,7 +112,7 @@ fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
 
 /// Checks that the best position of a relay at any altitude, with lateral offsets, is found.
 ///
-/// It is compared with brute force in random scenes. The cases of the solution in `cases` must occur.
+/// The position is compared with brute force in random scenes. The cases of the solution in `cases` must occur.
 fn anywhere(seed: u64, draw: Draw, cases: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,

@@ -132,7 +132,8 @@ impl LateralScene {
             .fold(0.0, f64::max)
     }
 
-    /// Returns the best SIR that a random search from `at` finds. Steps along one axis would stick to ridges.
+    /// Returns the best SIR that a random search from `at` finds. It moves along all axes at once, because a search
+    /// along one axis at a time would not get along a ridge.
     pub(crate) fn about(&self, mut at: [f64; 3], ranges: [(f64, f64); 3]) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut most = self.sir(at);

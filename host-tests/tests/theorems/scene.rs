@@ -36,7 +36,8 @@ impl Scene {
         }
     }
 
-    /// Draws a scene with D of 10 m to 100 km and the interferer anywhere. The lowest altitude is 0.002 to 0.5 of D.
+    /// Draws a scene with Tx and Rx 10 m to 100 km apart and the interferer anywhere. The lowest altitude is 0.002 to
+    /// 0.5 of that distance.
     pub(crate) fn random(rng: &mut impl Rng) -> Self {
         let style = Style {
             relays: 1..=1,

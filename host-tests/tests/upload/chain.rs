@@ -6,8 +6,8 @@ use super::*;
 
 const AT: Instant = seconds(20);
 
-/// Runs `setup` with an upload of `config`. Returns the time from the upload to the last agreement, ms, and the bytes
-/// that it costs.
+/// Runs `setup` with an upload of `config`. Returns the time from the upload to the last agreement, ms, and the
+/// number of bytes that are sent because of the upload.
 fn fly(mut setup: Setup, end: Side, config: MissionConfig) -> (u64, u64) {
     let mut calm = setup.clone();
     calm.partitions.clear();
@@ -45,7 +45,7 @@ fn an_uploaded_interferer_is_flown_from_either_end() {
     }
 }
 
-/// Relays are loaded with a mission of one direction or with a way back, and get another one in flight.
+/// Checks that all relays fly an uploaded mission that adds, removes or changes the return direction.
 #[test]
 fn a_way_back_is_uploaded_and_flown_by_all() {
     let back = |base: MissionConfig, reverse: f32, rx_power_w: f32| MissionConfig {

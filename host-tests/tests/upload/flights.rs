@@ -6,7 +6,8 @@ use rand::{RngExt, SeedableRng};
 
 use super::*;
 
-/// Returns eight drones that take off close together, and a mission to upload in flight or at hover.
+/// Returns the setup of eight drones that take off close together, and a mission to upload. The upload comes in
+/// flight or at hover.
 fn flight(seed: u64) -> (Setup, MissionConfig) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let base = eight_apart(SEPARATION_M);

@@ -58,8 +58,9 @@ fn upload(
 
 /// Checks a run with uploads. Returns the first fault as an error.
 ///
-/// Members of a membership view must fly the same mission, which a quorum has held. Setpoints must be within limits.
-/// A settled chain must fly `version`, in the positions of a new chain with `config`.
+/// All members of a membership view must use the same mission, which at least as many relays must have received
+/// before. Setpoints must be within limits. A settled chain must use mission `version`, in the positions of a new
+/// chain with `config`.
 fn judge(
     setup: &Setup,
     outcome: &Outcome,
@@ -96,7 +97,7 @@ fn judge(
     ledger::judge(setup, outcome, &left(outcome), version, config)
 }
 
-/// Runs `setup`. Checks that all relays that are left fly mission `version` with `config` in the end.
+/// Runs `setup`. Checks that all relays that are left use mission `version` with `config` in the end.
 fn flies(setup: &Setup, version: u16, config: MissionConfig, name: &str) -> Outcome {
     let outcome = run(setup.clone()).unwrap();
     judge(setup, &outcome, version, config).unwrap_or_else(|what| panic!("{name}: {what}"));

@@ -6,7 +6,8 @@ use uav_relay_sim::simulator::fleet::somewhere;
 
 use super::*;
 
-/// Returns the sites of `base` with the receiver moved forward and to the right, m.
+/// Returns positions of Tx and Rx. Compared with `base`, Rx is `on_m` farther along the line and `right_m` to the
+/// right, m.
 fn ends(base: &Mission, on_m: f32, right_m: f32) -> Sites {
     let distance_m = base.config().distance_m;
     let axis = somewhere(f64::from(distance_m)).unwrap();
@@ -24,7 +25,7 @@ fn ends(base: &Mission, on_m: f32, right_m: f32) -> Sites {
     }
 }
 
-/// Returns an upload of `version` with another receiver site, from the ground station at `end`.
+/// Returns an upload of mission `version` that moves the receiver, from the ground station at `end`.
 fn to_another_place(base: &Mission, at: Instant, version: u16, end: Side) -> UploadSpec {
     let sites = ends(base, 150.0, 200.0);
     let mut config = moved(base, 700.0, -300.0);
@@ -44,8 +45,9 @@ fn sited(relays: u16, shared: bool) -> (Mission, Setup) {
     (base, setup)
 }
 
-/// Checks a run like [`judge`], and that all relays use the sites of mission `version`. Without such an upload, these
-/// are the loaded ones.
+/// Checks a run like [`judge`], and that all relays use mission `version`'s positions of Tx and Rx.
+///
+/// If that mission was not uploaded or has no such positions, those from before flight apply.
 fn judge_between(setup: &Setup, outcome: &Outcome, version: u16) -> Result<(), String> {
     let spec = setup
         .uploads

@@ -21,8 +21,8 @@ fn seed() -> u64 {
     number("SEED", 1)
 }
 
-/// Checks that the ground station reports completion once all relays fly the upload, and not before. Frames are lost,
-/// and two ground stations are active.
+/// Checks that the ground station reports completion once all relays fly the upload, and not before. This must hold
+/// although frames are lost and two ground stations are active.
 #[test]
 fn the_ground_reports_flown_once_every_relay_flies_it() {
     let told: Vec<bool> = (0..count())
@@ -200,8 +200,10 @@ fn an_upload_outside_the_geofence_is_refused_and_reported() {
     }
 }
 
-/// Checks that a relay with its own altitude refuses an upload like the others. Its geofence is wider only for that
-/// altitude.
+/// Checks that a relay with its own altitude refuses an upload like the others.
+///
+/// The uploaded altitude is outside the permitted range. It is within that relay's geofence only because the geofence
+/// includes the relay's own altitude.
 #[test]
 fn a_relay_with_its_own_altitude_refuses_like_the_others() {
     let base = at_120(3, Band::at(120.0));
@@ -230,8 +232,8 @@ fn a_relay_with_its_own_altitude_refuses_like_the_others() {
     }
 }
 
-/// Checks that a far relay's refusal reaches the ground station. Only that relay has a geofence; a newer upload
-/// clears the refusal.
+/// Checks that a single relay's refusal reaches the ground station. A newer upload must clear the refusal. Only one
+/// relay, at any place in the chain, refuses, because only this relay has a geofence.
 #[test]
 fn a_refusal_of_a_far_relay_reaches_the_ground() {
     let base = at_120(5, Band::at(120.0));
@@ -309,9 +311,9 @@ fn a_refusal_reaches_the_ground_despite_losses() {
     });
 }
 
-/// Checks that of two uploads by two ground stations, all relays fly the newer one.
+/// Checks that of two uploads by two ground stations, all relays use the newer one in the end.
 ///
-/// The other station must learn of it.
+/// The ground station with the older upload must learn of the newer one.
 #[test]
 fn the_newer_upload_of_two_stations_is_flown() {
     let settled: Vec<u64> = (0..count())
@@ -372,8 +374,8 @@ fn the_newer_upload_of_two_stations_is_flown() {
     );
 }
 
-/// Checks that a ground station at either end learns which mission is flown. Frames are lost, and missions are
-/// uploaded.
+/// Checks that a ground station at either end learns which mission the relays use. This must hold although frames are
+/// lost and missions are uploaded.
 #[test]
 fn the_ground_learns_which_mission_is_flown() {
     for round in 0..40 {

@@ -33,7 +33,7 @@ pub(crate) struct Wires {
 }
 
 impl Wires {
-    /// Creates relays loaded with `base`, each with its own `settings` and a key.
+    /// Creates relays with a key that have the mission `base` before flight. Each has its own `settings`.
     pub(crate) fn new(base: Mission, seed: u64, settings: impl Fn(u16) -> Settings) -> Self {
         let relay = |index| {
             let identity = Identity { network: 7, index };
@@ -61,7 +61,7 @@ impl Wires {
         self.loss.set(loss);
     }
 
-    /// Starts an upload from the ground station at `end`, which is loaded with `base`.
+    /// Starts an upload from the ground station at `end`. The relays' mission before flight is `base`.
     pub(crate) fn upload(&mut self, base: &Mission, end: Side, upload: Upload) {
         let now = self.bench.now;
         self.bench
@@ -70,7 +70,7 @@ impl Wires {
             .unwrap();
     }
 
-    /// Makes the ground station at `end`, loaded with `base`, request the mission in flight.
+    /// Makes the ground station at `end` request the mission in flight. The relays' mission before flight is `base`.
     pub(crate) fn request_flown(&mut self, base: &Mission, end: Side) {
         let now = self.bench.now;
         self.bench.ground(base, end, AUTH).request_flown(now);

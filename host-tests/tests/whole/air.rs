@@ -27,11 +27,12 @@ pub(crate) struct Kind {
     pub(crate) seed: u64,
     /// Reception range on a shared channel, as a difference of relay indices.
     pub(crate) reach: usize,
-    /// Relay (from 0) that is loaded with another mission, and that mission.
+    /// Relay (from 0) that has another mission than the others before flight, if any, and that mission.
     pub(crate) stranger: Option<(usize, Mission)>,
-    /// Relay (from 0) whose epoch goes back at its second start.
+    /// Relay (from 0) whose epoch goes back at its second start, if any.
     pub(crate) goes_back: Option<usize>,
-    /// Relay (from 0) of which a second drone, the copy, exists. The copy's number follows those of all relays.
+    /// Relay (from 0) of which a second drone, the copy, exists, if any. The copy's number follows those of all
+    /// relays.
     pub(crate) copied: Option<usize>,
 }
 
@@ -121,25 +122,27 @@ pub(crate) struct Air {
     loss: f64,
     rng: ChaCha8Rng,
     seen: Vec<ObservedState>,
-    /// Largest number of groups of relays that flew different agreements at once.
+    /// Largest number of groups of relays that used positions of different agreements at the same time.
     pub(crate) groups: usize,
-    /// Time at which the largest number of groups flew different agreements, µs.
+    /// Time at which the largest number of groups used positions of different agreements, µs.
     pub(crate) groups_us: u64,
-    /// Time since which all relays have held positions in one view, µs; `None` while they do not.
+    /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
+    /// the agreed membership of the chain.
     pub(crate) whole_since_us: Option<u64>,
-    /// Number of relays that may be missing from an agreement that counts as flown.
+    /// Number of relays that may lack an agreed position without an interruption of the time in `flown_us`.
     pub(crate) spare: usize,
-    /// Total time in which the relays, except for at most `spare`, have flown one agreement, µs.
+    /// Total time in which all relays but at most `spare` have had positions of one agreement, µs.
     pub(crate) flown_us: u64,
-    /// Time at which the relays, except for at most `spare`, first flew one agreement, µs.
+    /// Time at which all relays but at most `spare` first had positions of one agreement, µs.
     pub(crate) first_us: Option<u64>,
-    /// Longest interruption of the time in which the relays fly one agreement, µs.
+    /// Longest interruption of the time in `flown_us`, µs: too many relays lack an agreed position.
     pub(crate) longest_us: u64,
     flies: bool,
     changed_us: u64,
     /// Number of frames sent by all relays.
     pub(crate) frames: u64,
-    /// Last times at which the copied relay received its copy, and the copy received the relay, µs.
+    /// Last times at which the copied relay received its copy, and the copy received the relay, µs. `None` before the
+    /// first.
     received_us: [Option<u64>; 2],
     /// Time since which a relay and its copy have both had setpoints, µs.
     ///
@@ -464,7 +467,7 @@ impl Air {
         }
     }
 
-    /// Adds the time since the last call to the time flown, or to the present interruption.
+    /// Adds the time since the last call to the time in `flown_us`, or to the present interruption of it.
     pub(crate) fn measure(&mut self) {
         let span_us = self.now_us - self.changed_us;
         if self.flies {
@@ -482,8 +485,8 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the size of the largest group that flies one agreement with all members of its view. A view is the
-    /// agreed membership of the chain.
+    /// Returns the size of the largest membership view whose members all have positions of one agreement. A view is
+    /// the agreed membership of the chain.
     fn flying(&self) -> usize {
         let holds = |seen: &&ObservedState| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding
@@ -497,7 +500,7 @@ impl Air {
         holding.iter().filter_map(of).max().unwrap_or(0)
     }
 
-    /// Returns true if all relays are on and hold positions in one membership view of all relays.
+    /// Returns true if all relays are on and have agreed positions in one membership view of all relays.
     fn is_whole(&self) -> bool {
         let all = usize::from(self.kind.mission.relays());
         let is_on = |at: &usize| self.seen[*at].is_on;

@@ -18,8 +18,8 @@ fn event_count(air: &Air, name: &str) -> u32 {
     air.events.iter().filter_map(of).sum()
 }
 
-/// Checks that four relays fly without long pauses although one link works in one direction only. One of the relays
-/// may be left out.
+/// Checks that relays have agreed positions nearly all the time although one link is one-way. The chain may leave out
+/// one of the four relays.
 #[test]
 fn a_permanent_one_way_link_leaves_out_one_relay_for_good() {
     let mut late = Vec::new();
@@ -50,10 +50,10 @@ fn a_permanent_one_way_link_leaves_out_one_relay_for_good() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Simulates eight relays with a flapping link for two hours. Returns them, and the fraction of time flown.
+/// Simulates eight relays with a flapping link for two hours.
 ///
-/// The link is between relays `link + 1` and `link + 2`. The fraction counts from the first agreement; at least seven
-/// relays must fly it.
+/// Returns the relays, and the fraction of the time after the first agreement in which at least seven relays had
+/// positions of one agreement. The link is between relays `link + 1` and `link + 2`.
 fn flown_with_flaps(link: usize, (up_us, down_us): (u64, u64), seed: u64) -> (Air, f64) {
     let mut schedule = Schedule::of(8, seed);
     schedule.kind.reach = 3;
@@ -115,7 +115,8 @@ fn a_left_out_relay_attracts_no_other() {
 /// before the other does, and soon after that the link is lost again.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
-/// Checks that one flapping link costs at most a tenth of the flight time, for periods of 5 s to 300 s.
+/// Checks that one flapping link costs at most a tenth of the time with agreed positions. The periods are 5 s to 300
+/// s.
 #[test]
 fn random_flapping_links_cost_a_tenth_of_the_time_at_most() {
     let (first, count) = (number("SEED", 1), number("COUNT", 20));

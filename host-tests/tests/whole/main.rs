@@ -15,7 +15,8 @@ use host_tests::fixtures::voted;
 use rand::{RngExt, SeedableRng};
 use schedule::{SECOND, Schedule, random, with_copy, without_steps};
 
-/// Longest permitted time from the last fault until all relays hold positions in one view, s.
+/// Longest permitted time from the last fault until all relays have agreed positions in one view, s. A view is the
+/// agreed membership of the chain.
 const WHOLE_S: u64 = 120;
 
 /// Returns the environment variable `name` as a number, or `usual`.
@@ -28,7 +29,7 @@ fn number(name: &str, usual: u64) -> u64 {
 struct Measured {
     seed: u64,
     /// Time from the last fault until the chain was whole for good, s; `None` beyond 15 minutes. In a whole chain,
-    /// all relays hold positions in one membership view.
+    /// all relays have agreed positions in one membership view.
     whole_s: Option<f64>,
     groups: usize,
     groups_s: f64,
@@ -41,7 +42,8 @@ fn flown(seed: u64, schedule: &Schedule) -> Measured {
     ended(seed, schedule, schedule.begun())
 }
 
-/// Runs the chain `air` to the end of its schedule, and until it is whole.
+/// Runs the chain `air` to the end of its schedule, and then until all relays have agreed positions. Gives up after
+/// 15 minutes.
 fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Measured {
     let end = schedule.faults_end_us;
     air.run(end);
@@ -132,8 +134,9 @@ fn every_schedule_ends_in_one_whole_chain_within_120_s() {
 
 /// Checks that of a relay and its copy, one loses its setpoint within 2 s.
 ///
-/// The copy is a second drone with the same index. The chain must be whole once one of them is removed. Two chains
-/// may fly at once only if a cut separates relay and copy, because each of them has its vote.
+/// The copy is a second drone with the same index. The chain must be whole once one of them is removed. Two
+/// agreements may be in use at once only if a cut separates relay and copy: both of them vote then, so that two parts
+/// may have a quorum.
 #[test]
 fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
@@ -163,8 +166,8 @@ fn with_a_duplicate_one_chain_flies_and_recovers_later() {
 
 /// Checks that a chain becomes whole again after schedules of faults that are hard to recover from.
 ///
-/// The difficulties are view numbers far ahead, an idle neighbour that is switched on elsewhere, two interleaved
-/// chains, and two candidates for one position that are received in turn.
+/// The difficulties are numbers of membership views far ahead, an idle neighbour that is switched on elsewhere, two
+/// interleaved chains, and two candidates for one position that are received in turn.
 #[test]
 fn schedules_that_once_got_stuck_end_in_one_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
@@ -229,7 +232,7 @@ fn a_drone_switched_on_hours_early_joins_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Checks that a chain recovers if one relay has a stored vote with a far later view number. The vote is from an
+/// Checks that a chain recovers if one relay has a stored vote on a far later membership view. The vote is from an
 /// earlier flight.
 #[test]
 fn a_relay_with_far_later_views_joins_within_120_s() {
@@ -255,7 +258,8 @@ fn a_relay_with_far_later_views_joins_within_120_s() {
 
 /// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
-/// Returns the number of chains, those that recovered late, and those that flew as two chains at once.
+/// Returns the number of chains, the results of those that recovered late, and the results of those in which two
+/// agreements were in use at once.
 fn with_steps(forward: bool) -> (u64, Vec<Measured>, Vec<Measured>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);
@@ -294,10 +298,10 @@ fn clocks_that_step_back_leave_one_whole_chain() {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks that clocks that step forward seldom let two chains fly at once.
+/// Checks that clocks that step forward seldom let two agreements be in use at once.
 ///
-/// A relay whose clock steps forward stops waiting for the leases of others too early. Two chains may then fly until
-/// these leases expire.
+/// A relay whose clock steps forward stops waiting for the leases of others too early. Two parts of the chain may
+/// then use different agreements until these leases expire.
 #[test]
 fn clocks_that_step_forward_seldom_split_the_chain() {
     let (count, late, two) = with_steps(true);

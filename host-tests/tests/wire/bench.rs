@@ -19,7 +19,7 @@ pub(crate) struct Bench {
     relay: Relay,
     /// Node number of the relay.
     pub(crate) own: u16,
-    /// Digest of the mission with which the relay was loaded.
+    /// Digest of the mission that the relay has before flight.
     pub(crate) mission: u16,
     pub(crate) now: Instant,
 }

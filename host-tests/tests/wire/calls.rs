@@ -9,7 +9,7 @@ use super::votes::*;
 
 /// Checks that a relay without a quorum has no setpoint and requests no further membership view.
 ///
-/// The relay is in the middle of its group, and forwards the decision that refuses the view.
+/// The relay has neighbours on both sides, so that it also forwards the decision that refuses the view.
 #[test]
 fn a_part_without_quorum_stops_requesting_views() {
     let mut bench = Bench::new(4, 8, Wiring::Pair);
@@ -38,8 +38,8 @@ fn a_part_without_quorum_stops_requesting_views() {
     assert!(bench.now > Instant::from_millis(60_000));
 }
 
-/// Checks that a leader without a quorum proposes again, after ever longer waits. The first one is `probe_after`; it
-/// doubles with each refusal, up to eight times.
+/// Checks that a leader without a quorum proposes again, after ever longer waits. The first wait is `probe_after`.
+/// Each refusal doubles the wait, up to eight times `probe_after`.
 #[test]
 fn a_leader_without_quorum_proposes_at_growing_intervals() {
     let mut head = Bench::new(1, 8, Wiring::Pair);
@@ -84,8 +84,9 @@ fn a_leader_without_quorum_proposes_at_growing_intervals() {
     }
 }
 
-/// Checks that a hello is answered by a hello only if it requests one. A view number far ahead of the relay's own is
-/// approached in limited steps.
+/// Checks that a hello is answered by a hello only if it requests one.
+///
+/// If a hello reports a far later membership view, the relay raises the view number in its answer by at most 4096.
 #[test]
 fn a_hello_is_answered_by_a_hello_on_request() {
     for (asks, newest, known) in [

@@ -24,9 +24,10 @@ fn receive(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, WireMessag
     bench.sent_with_claims()
 }
 
-/// Returns relay 4 of 8 after it answered a sweep message in its own name by an index claim.
+/// Returns relay 4 of 8 after it received a sweep message that names relay 4 as the sender.
 ///
-/// It claims its index because another node may have it. Also returns that sweep message and the number of the claim.
+/// The relay has answered by an index claim, because another node may have its index. Also returns that sweep message
+/// and the number of the claim.
 fn relay_4(wiring: Wiring, port: Port) -> (Bench, WireMessage, u32) {
     let mut bench = Bench::new(4, 8, wiring);
     bench.now = NOW;
@@ -139,8 +140,10 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
     (relay, frames)
 }
 
-/// Checks that handshakes take the place of index claims if relays have a key. One of two duplicates becomes passive,
-/// the other one answers; a relay's own handshakes have no effect on it.
+/// Checks that handshakes take the place of index claims if relays have a key.
+///
+/// One of two duplicates (relays with the same index) becomes passive, the other one answers. A relay's own
+/// handshakes have no effect on it.
 #[test]
 fn with_a_key_handshakes_are_the_claims() {
     let mut passive = 0;

@@ -124,7 +124,9 @@ fn a_quorum_is_over_half_or_half_with_the_proposer() {
     }
 }
 
-/// Checks that a member of the earlier membership view adds its vote, and its own lease if shorter.
+/// Checks that a member of the earlier membership view adds its vote to a proposal.
+///
+/// The member also lowers the proposal's remaining lease to its own if that is shorter.
 #[test]
 fn a_member_adds_its_vote() {
     let last = last_of_20(true);
@@ -145,8 +147,9 @@ fn a_member_adds_its_vote() {
     }
 }
 
-/// Checks that the last relay decides again for a view that was accepted and may have been agreed on. A view is the
-/// agreed membership of the chain.
+/// Checks that the last relay decides for an earlier view if relays may have agreed on it already.
+///
+/// As in Paxos, the value that was accepted last is proposed again. A view is the agreed membership of the chain.
 #[test]
 fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);
@@ -175,7 +178,7 @@ fn a_possibly_decided_view_is_proposed_again() {
 
 /// Checks that a leader continues if its proposal ends in a decision for an earlier membership view.
 ///
-/// It must send its next proposal.
+/// The leader must then send its next proposal.
 #[test]
 fn a_leader_continues_after_an_earlier_view_is_decided() {
     let mut head = Bench::new(1, 8, Wiring::Pair);

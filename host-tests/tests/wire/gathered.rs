@@ -12,9 +12,10 @@ use super::votes::FORMS;
 const UP: Port = Port::Upstream;
 const DOWN: Port = Port::Downstream;
 
-/// Checks that the result of a collection of relays' profiles is stale if the relay does not await it.
+/// Checks that a result of a collection of profiles is stale if the relay does not await it.
 ///
-/// In a field of interference, messages that collect profiles and joint positions are stale, too.
+/// A profile is a relay's altitude and power. In a field of interference, messages that collect profiles and joint
+/// positions are stale, too.
 #[test]
 fn profiles_that_are_not_awaited_are_stale() {
     let field = Interference::Field(FIELD);
@@ -31,7 +32,7 @@ fn profiles_that_are_not_awaited_are_stale() {
     }
 }
 
-/// Returns relay 4 of 8, which uses the joint method. With `differs`, it holds an altitude of 33 m.
+/// Returns relay 4 of 8, which uses the joint method. If `differs` is true, it keeps an altitude of its own, 33 m.
 fn fourth(differs: bool) -> Bench {
     let common = source().common;
     let settings = Settings {
@@ -46,7 +47,10 @@ fn fourth(differs: bool) -> Bench {
     Bench::with(source(), 4, settings)
 }
 
-/// Returns a message that collects relays' profiles, or its result, with those of the relays `indices`.
+/// Returns the message `name`: a collection of relays' profiles (altitude and power), or its result.
+///
+/// The profiles are those of the relays `indices`. The collection has pass number `number`, and begins behind relay
+/// `after`.
 fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> WireMessage {
     let seat = |index: &u16| json!({ "relay": index, "altitude_m": 30.0, "power_w": 0.5 });
     let seats: Vec<_> = indices.iter().map(seat).collect();
@@ -55,7 +59,8 @@ fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> Wi
     WireMessage::new(name, &fields)
 }
 
-/// Returns a collection of relays' profiles, or its result, with the profile of one more relay.
+/// Returns a copy of a collection of relays' profiles (altitude and power), with one more profile. It may also be the
+/// result of a collection.
 fn with_profile(
     message: &WireMessage,
     name: &str,
@@ -92,7 +97,7 @@ fn a_collection_is_forwarded_and_its_result_returned() {
     }
 }
 
-/// Checks that a relay forwards a full collection of relays' profiles unchanged.
+/// Checks that a relay forwards a full collection of profiles (altitude and power) unchanged.
 ///
 /// The next collection must begin with the relays after the last one in it.
 #[test]
@@ -125,7 +130,8 @@ fn a_full_roster_is_continued_by_the_next_pass() {
 
 /// Checks that a relay that has missed the collection of profiles refuses a sweep that needs them.
 ///
-/// It requests a new view then. A relay misses a collection, for example, by a reboot.
+/// A profile is a relay's altitude and power. The relay then requests a new membership view. A relay misses a
+/// collection, for example, by a reboot.
 #[test]
 fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
     let fresh = fourth(false);
@@ -147,9 +153,9 @@ fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
     }
 }
 
-/// Checks that a collection of relays' profiles is stale if it has the receiver's or a later one's.
+/// Checks that a collection of profiles is stale if it has the receiver's profile or a later relay's.
 ///
-/// The relays that the message has passed cannot have added these.
+/// A profile is a relay's altitude and power. The relays that the message has passed cannot have added these.
 #[test]
 fn a_collection_with_its_receivers_profile_is_stale() {
     for index in [4, 5] {
@@ -162,8 +168,8 @@ fn a_collection_with_its_receivers_profile_is_stale() {
 
 /// Checks that a relay treats a wrong result of a collection of profiles as stale, and changes nothing.
 ///
-/// The result has another number or begins behind another relay, lacks profiles, has some of relays beyond the chain,
-/// or arrives twice.
+/// A profile is a relay's altitude and power. A result is wrong if it has another number or begins behind another
+/// relay, lacks profiles, has some of relays beyond the chain, or arrives twice.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let mut bench = fourth(false);

@@ -276,7 +276,7 @@ fn vote(name: &str, of: &MessageFields<'_>) -> Message {
     })
 }
 
-/// Decodes an upload with the crate, and checks each number. Only the crate can construct an upload.
+/// Decodes an upload with the crate, and checks each number. Code outside the crate cannot construct an upload.
 fn upload(wire_message: &WireMessage, of: &MessageFields<'_>) -> Upload {
     let upload = Upload::decode(&offer::kept(wire_message)).unwrap();
     let config = upload.config();
@@ -336,7 +336,8 @@ fn upload(wire_message: &WireMessage, of: &MessageFields<'_>) -> Upload {
     upload
 }
 
-/// Decodes summed measurements with the crate, and checks each number. Only relays can add measurements up.
+/// Decodes summed measurements with the crate, and checks each number. Code outside the crate cannot construct such
+/// sums.
 fn sense(wire_message: &WireMessage, of: &MessageFields<'_>) -> Message {
     let message = Message::decode(wire_message.body()).unwrap();
     let (Message::Sense(heard) | Message::Sensed(heard)) = &message else {

@@ -15,7 +15,7 @@ use uav_relay_decode::{walk, write};
 /// Tables of messages and fields, read from `FORMAT.md`.
 pub(crate) static FORMAT: LazyLock<Format> = LazyLock::new(|| Format::load().unwrap());
 
-/// Body of a valid message, whose fields have the names in `FORMAT.md`.
+/// Valid message without the header and CRC of its frame. Its fields have the names in `FORMAT.md`.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) struct WireMessage(Vec<u8>);
 
@@ -25,7 +25,8 @@ impl fmt::Debug for WireMessage {
     }
 }
 
-/// Decodes and checks a body by the tables of `FORMAT.md`. The error is the reason for a refusal.
+/// Decodes and checks a message by the tables of `FORMAT.md`. The `body` is a frame without header and CRC. The error
+/// is the reason for a refusal.
 fn walked(body: &[u8]) -> Result<Fields<'static>, MessageError> {
     match walk::message(&FORMAT, body) {
         Ok((_, fields)) => Ok(fields),
@@ -47,7 +48,8 @@ impl WireMessage {
         walked(body).map(|_| Self(body.to_vec()))
     }
 
-    /// Checks a body by the tables of `FORMAT.md`. The error is the reason for a refusal.
+    /// Checks a message by the tables of `FORMAT.md`. The `body` is a frame without header and CRC. The error is the
+    /// reason for a refusal.
     pub(crate) fn verdict(body: &[u8]) -> Result<(), MessageError> {
         walked(body).map(|_| ())
     }

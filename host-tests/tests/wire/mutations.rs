@@ -57,7 +57,7 @@ const NODES: [u16; 20] = [
 
 const SITES: [i32; 2] = [900_000_000, 1_800_000_000];
 
-/// Returns all 4-byte numbers to try in a body: f32, view identifiers and coordinates of sites. The body's own
+/// Returns all 4-byte numbers to try in a body: f32, view identifiers and coordinates of Tx and Rx. The body's own
 /// numbers and their neighbours are added if the rules of its message compare them.
 fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     let mut floats: Vec<f32> = BOUNDS.iter().map(|bound| *bound as f32).collect();

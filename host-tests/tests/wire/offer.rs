@@ -5,7 +5,7 @@ use uav_relay_decode::envelope::sealed;
 
 use super::message::WireMessage;
 
-/// Names of the fields with the sites of Tx and Rx; all are 0 for a mission without sites.
+/// Names of the fields with the surveyed positions of Tx and Rx. All are 0 for a mission without these positions.
 pub(crate) const SITES: [&str; 6] = [
     "tx_lat_e7",
     "tx_lon_e7",
@@ -15,11 +15,11 @@ pub(crate) const SITES: [&str; 6] = [
     "rx_amsl_mm",
 ];
 
-/// Offset of the number of relays in an offer's body, bytes.
+/// Offset of the number of relays from the start of an offer's body, bytes. A body is a frame without header and CRC.
 const RELAYS: usize = 5;
-/// Offset of the noise power in an offer's body, bytes.
+/// Offset of the noise power from the start of an offer's body, bytes. A body is a frame without header and CRC.
 const NOISE: usize = 83;
-/// Offset of the sites of Tx and Rx in an offer's body, bytes.
+/// Offset of the return direction's fields in an offer's body, bytes. They are `reverse` and the power of Rx.
 const BACK: usize = 87;
 const SITES_AT: usize = 95;
 
@@ -28,7 +28,8 @@ pub(crate) const BYTES: usize = 121;
 /// Length of the part of an offer's body that a relay stores: all but the number of the answered hello.
 pub(crate) const KEPT: usize = 119;
 
-/// Returns an offer of mission `version` that eight relays loaded with `base` can fly.
+/// Returns an offer of mission `version` that eight relays can fly. Their mission before flight has the digest
+/// `base`.
 pub(crate) fn upload(version: u16, base: u16) -> WireMessage {
     let fields = json!({
         "version": version, "base": base, "relays": 8, "distance_m": 1000.0, "min_separation_m": 4.0,
@@ -42,7 +43,7 @@ pub(crate) fn upload(version: u16, base: u16) -> WireMessage {
     WireMessage::new("Offer", &fields)
 }
 
-/// Returns the offer with the sites of Tx and Rx: latitude, longitude and height of each.
+/// Returns the offer with surveyed positions of Tx and Rx: latitude, longitude and height of each.
 pub(crate) fn with_sites(offer: &WireMessage, sites: [i32; 6]) -> WireMessage {
     let sites = SITES.into_iter().zip(sites);
     offer.with(sites.map(|(name, number)| (name, json!(number))).collect())
@@ -55,8 +56,8 @@ pub(crate) fn kept(offer: &WireMessage) -> Vec<u8> {
 
 /// Returns the digest and version of an offered mission.
 ///
-/// The digest is the low half of a CRC-32C of the mission's numbers. If the offer has sites, the digest also covers
-/// these.
+/// The digest is the low half of a CRC-32C of the mission's numbers. If the offer has surveyed positions of Tx and
+/// Rx, the digest also covers these.
 pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
     let body = offer.body();
     let mut covered = body[RELAYS..NOISE].to_vec();
@@ -71,7 +72,7 @@ pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
     (digest, offer.number("version") as u16)
 }
 
-/// Returns the mission digest `digest` combined with the offer's sites; unchanged without sites.
+/// Returns the mission digest `digest` combined with the offer's positions of Tx and Rx, if it has any.
 pub(crate) fn between(offer: &WireMessage, digest: u16) -> u16 {
     let sites = &offer.body()[SITES_AT..KEPT];
     if sites.iter().all(|byte| *byte == 0) {

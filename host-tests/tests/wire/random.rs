@@ -21,8 +21,8 @@ use super::strategies::{bodies, headers, kinds, messages};
 proptest! {
     #![proptest_config(config(4000))]
 
-    /// Checks that both codecs agree on random messages, and the overhead of a frame. It is a header, a CRC, a
-    /// stuffing byte and a delimiter.
+    /// Checks that both codecs agree on random messages. A frame is longer than its message by 16 bytes: header, CRC,
+    /// a stuffing byte and a delimiter.
     #[test]
     fn both_codecs_write_the_same_and_read_each_other(wire_message in messages(), head in headers()) {
         let message = message(&wire_message);
@@ -56,7 +56,7 @@ proptest! {
 
     /// Checks that the longest messages have the documented lengths.
     ///
-    /// An offer fills a frame except for the tag.
+    /// The longest message, an offer, fills a frame except for the authentication tag.
     #[test]
     fn the_longest_messages_have_the_documented_lengths(
         offer in kinds(&["Offer"]),
@@ -181,7 +181,7 @@ fn node_numbers_out_of_range_are_not_encoded() {
     }
 }
 
-/// Checks that a sweep message with a joint solution is encoded as `Aside`, without measured values.
+/// Checks that a sweep with a joint solution is encoded as message `Aside`, without measured values.
 #[test]
 fn joint_sweeps_are_asides_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {

@@ -28,7 +28,7 @@ fn is_accepted(body: &[u8]) -> bool {
     }
 }
 
-/// Checks that an offer is refused if its relays do not fit on the line with its least separation. It tries f32
+/// Checks that an offer is refused if its relays do not fit on the line with its least separation. The test tries f32
 /// separations around the limit.
 #[test]
 fn an_offer_needs_space_for_its_relays() {
@@ -55,7 +55,7 @@ fn an_offer_needs_space_for_its_relays() {
     assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
 }
 
-/// Returns a mission of eight relays whose other numbers differ from those of the paper's.
+/// Returns a mission of eight relays with `channel`. All its other numbers differ from those of the paper.
 fn other(channel: Channel) -> MissionConfig {
     MissionConfig {
         relays: 8,

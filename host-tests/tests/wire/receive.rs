@@ -21,8 +21,8 @@ use super::message::WireMessage;
 use super::strategies::pieces;
 use super::stream::{chunks, unstuffed};
 
-/// Returns the name of the counter that the bytes between two delimiters must increment. They arrive at relay `own`
-/// of 8.
+/// Returns the name of the counter that a received frame must increment at relay `own` of 8. `chunk` has the bytes of
+/// the frame between two delimiters.
 fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port) -> &'static str {
     let plain = match unstuffed(chunk) {
         Ok(plain) => plain,

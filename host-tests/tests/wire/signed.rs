@@ -44,7 +44,7 @@ pub(crate) fn settings(wiring: Wiring) -> Settings {
 pub(crate) struct SignedBench {
     pub(crate) relay: Relay,
     peers: Vec<Peer>,
-    /// Digest of the mission with which the relay was loaded.
+    /// Digest of the mission that the relay has before flight.
     pub(crate) base: u16,
 }
 
@@ -180,7 +180,7 @@ impl SignedBench {
         counted(self.relay.stats())
     }
 
-    /// Returns the digest and version of the uploaded mission that the relay holds; `None` without one.
+    /// Returns the digest and version of the uploaded mission that the relay has stored, if any.
     pub(crate) fn held(&self) -> Option<(u16, u16)> {
         let mission_id = self.relay.upload().map(Upload::id)?;
         Some((mission_id.digest, mission_id.version))

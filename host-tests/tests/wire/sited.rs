@@ -16,7 +16,8 @@ use super::signed::{NOW, SignedBench, settings};
 use super::uploads::fourth;
 use super::votes::{FLIES, REFUSED, WHOLE, hello};
 
-/// Coordinates of two sites a kilometre apart, to the millimetre.
+/// Latitude, longitude and height of Tx, then of Rx: a kilometre apart to the millimetre. Units are 1e-7 degrees and
+/// mm.
 const A_KILOMETRE: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -38,16 +39,17 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
     }
 }
 
-/// Returns an upload of version 2 with sites a kilometre apart, and these sites. The receiver is `east` units of 1e-7
-/// degrees farther east.
+/// Returns an upload of version 2 with positions of Tx and Rx, and these positions. They are a kilometre apart, but
+/// Rx is moved east by `east` units of 1e-7 degrees.
 fn farther(base: u16, east: i32) -> (WireMessage, [i32; 6]) {
     let mut sites = A_KILOMETRE;
     sites[4] += east;
     (with_sites(&upload(2, base), sites), sites)
 }
 
-/// Checks that an upload whose sites do not fit its distance is refused. Relays with and without sites refuse it,
-/// because a chain must decide unanimously.
+/// Checks that an upload is refused if the positions of Tx and Rx do not fit its length.
+///
+/// Relays that do not use these positions refuse it, too, because all relays of a chain must decide alike.
 #[test]
 fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
     for sited in [false, true] {
@@ -180,7 +182,8 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     assert_eq!(stale(&met, line), (1, 0));
 }
 
-/// Checks that a relay that adopts another line has no setpoint at first. It waits until its drone can have stopped.
+/// Checks that a relay whose new mission is along another line waits until its drone can have stopped. Meanwhile the
+/// relay has no setpoint.
 #[test]
 fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let config = paper(1);

@@ -182,8 +182,8 @@ fn empty_frames_are_ignored() {
     assert_eq!(deframed(&[1, 0]), [Ok(vec![])]);
 }
 
-/// Draws streams of pieces of frames, or of any bytes. Of these bytes, one in 64 is a delimiter, and half are small.
-/// This gives short runs and frequent zeros.
+/// Draws streams of pieces of frames, or of random bytes. One in 64 of the random bytes is a delimiter, and half of
+/// them are small, so that the stream has short runs and frequent zeros.
 fn streams() -> impl Strategy<Value = Vec<u8>> {
     let byte = any::<[u8; 2]>().prop_map(|draw| match draw {
         [_, 0..4] => 0,

@@ -43,9 +43,9 @@ fn agreed_in_view(view: u32) -> (Bench, u16) {
     (bench, own)
 }
 
-/// Checks that a relay accepts messages along the chain and lease renewals only with its view's digest.
+/// Checks that a relay accepts messages along the chain only with the digest of its membership view.
 ///
-/// It answers those with another digest by a hello.
+/// The same holds for lease renewals. The relay answers messages with another digest by a hello.
 #[test]
 fn passes_have_the_digest_of_their_view() {
     for view in [id(1, 1), id(300, 7), id(4_194_303, 1000)] {
@@ -206,7 +206,8 @@ fn a_view_counts_after_its_first_pass_or_renewal() {
     }
 }
 
-/// Checks that the second lease renewal grants a lease. Its expiry causes a request for a new membership view.
+/// Checks that the second lease renewal grants a lease. When the lease expires, the relay requests a new membership
+/// view.
 #[test]
 fn a_lease_is_granted_by_the_next_renewal_and_runs_out() {
     let (mut bench, own) = agreed_in_view(id(3, 2));

@@ -17,14 +17,15 @@ pub(crate) const fn id(number: u32, node: u16) -> u32 {
     number << 10 | node as u32
 }
 
-/// Returns what a membership view adds to the mission digest in the messages of that view.
+/// Returns the number that a membership view adds to the mission digest in messages of that view.
 pub(crate) fn mark(view: u32) -> u16 {
     let low = view & 0xFFFF;
     let (top, next) = (view >> 24, view >> 16 & 0xFF);
     u16::try_from((low + (next << 8) + top) & 0xFFFF).unwrap()
 }
 
-/// Time for which other relays may rely on a booted relay, in units of 0.1 s. It is `dead_after`.
+/// Remaining lease of a relay that has just booted, in units of 0.1 s. It is `dead_after`, the time for which other
+/// relays may rely on this one.
 pub(crate) const RELIED: u16 = 150;
 
 /// Returns the proposal of membership view `view` as the relay at position `place` forwards it. All relays up to
@@ -66,8 +67,9 @@ pub(crate) fn refused(
     WireMessage::new("Decision", &fields)
 }
 
-/// Returns the hello of a node that receives no other node and knows only membership view 0. The node holds the
-/// uploaded mission `holds`: its digest and version.
+/// Returns the hello of a node in membership view 0 that receives no other node.
+///
+/// `holds` has the digest and the version of the mission that the node has stored.
 pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) -> WireMessage {
     let (digest, version) = holds;
     let fields = json!({
@@ -77,15 +79,18 @@ pub(crate) fn hello(mission: u16, neighbour: u16, holds: (u16, u16), flags: u8) 
     WireMessage::new("Hello", &fields)
 }
 
-/// Returns the hello of a node that receives no other node, and holds and flies the loaded mission.
+/// Returns the hello of a node that uses the mission from before flight and receives no other node.
+///
+/// `newest` is the newest membership view that it knows.
 pub(crate) fn loaded_hello(newest: u32, mission: u16, neighbour: u16, flags: u8) -> WireMessage {
     let hello = hello(mission, neighbour, (mission, 0), flags | FLIES);
     hello.with(json!({ "latest_view": newest }))
 }
 
-/// Returns a hello with the nodes that its sender receives, and with its number of connected relays.
+/// Returns a copy of a hello with other values for received nodes and connected relays.
 ///
-/// Bit 0 of `hears` is the nearest node. `behind` counts the connected relays with the sender.
+/// Bit 0 of `hears` is the nearest node. `behind` is the length of the chain of connected relays that ends with the
+/// sender.
 pub(crate) fn with_neighbours(hears: u8, behind: u16, hello: &WireMessage) -> WireMessage {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }

@@ -30,7 +30,8 @@ pub struct Mean {
 
 /// Returns the mean results of `draws` (at least 2) chains of randomly placed relays.
 ///
-/// `seed` is that of the random positions. Work: `draws` sorted chains, N + 1 SIRs each.
+/// `seed` is that of the random positions. The cost for N relays: sorting N numbers and computing N + 1 SIRs for each
+/// of the chains.
 pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut places = vec![0.0; scene.relays.len()];
@@ -71,8 +72,8 @@ const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m from Tx, that maximise the weakest received signal, without interference.
 ///
-/// All relays get the altitude and power of the first one. Empty without relays. Work: 200 chain lengths and N
-/// positions.
+/// All relays get the altitude and power of the first one. Empty without relays. The cost is that of computing the
+/// length of a chain 200 times.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
         return Vec::new();
@@ -135,7 +136,7 @@ impl Hops<'_> {
     }
 }
 
-/// Returns equally spaced relay positions k D / (N + 1), m from Tx, for k from 1 to N.
+/// Returns equally spaced positions, m from Tx: relay k of N is at k / (N + 1) of the distance to Rx.
 pub fn equal_places(scene: &Scene) -> Vec<f64> {
     let hops = (scene.relays.len() + 1) as f64;
     (1..=scene.relays.len())

@@ -17,7 +17,7 @@ use super::multi_interferer::optimum;
 
 const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 
-/// Random scene: relays on 1 km, and interferers that the relays may have to locate.
+/// Random experiment: relays on a line of 1 km, and interferers that the relays may have to locate.
 ///
 /// The interferers have 1 to 100 W. They are at X from -0.2 to 1.2 D and |Y| from 0.05 to 0.8 D, with D the distance
 /// from Tx to Rx.
@@ -27,12 +27,12 @@ pub struct RandomScene {
     pub scenario: Scenario,
     /// Number of relays.
     pub relays: u16,
-    /// Seed of the scene's and of its simulation's random numbers.
+    /// Seed of the random numbers that draw the interferers, and of those in the simulation.
     pub seed: u64,
 }
 
 impl RandomScene {
-    /// Draws a random scene with `relays` relays and `sources` interferers.
+    /// Draws a random experiment with `relays` relays and `sources` interferers.
     pub fn new(seed: u64, relays: u16, sources: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut scenario = Scenario::default();
@@ -55,7 +55,7 @@ impl RandomScene {
         }
     }
 
-    /// Moves the scene's first interferer to (`x_m`, `y_m`), m.
+    /// Moves the first interferer of the experiment to (`x_m`, `y_m`), m.
     pub fn place(&mut self, x_m: f64, y_m: f64) {
         if let Known::Sources(sources) = &mut self.scenario.interference
             && let Some(source) = sources.first_mut()
@@ -64,19 +64,19 @@ impl RandomScene {
         }
     }
 
-    /// Returns a copy of this scene with the interferers of `scene`.
+    /// Returns a copy of this experiment with the interferers of `scene`.
     pub fn with(&self, scene: &Scene) -> Self {
         let mut wild = self.clone();
         wild.scenario.interference = Known::Sources(scene.sources.clone());
         wild
     }
 
-    /// Returns the scene with its true interferers, for exact SIRs.
+    /// Returns the chain with its true interferers, from which exact SIRs are computed.
     pub fn scene(&self) -> Result<Scene, FigureError> {
         Scene::new(&self.scenario, self.relays).ok_or(NO_SCENE)
     }
 
-    /// Returns the mission that the relays are loaded with, with `guess` as its interference.
+    /// Returns the mission loaded into the relays before flight, with `guess` as its interference.
     pub fn mission(&self, guess: Interference) -> Result<Mission, FigureError> {
         let (told, _) = mission(&self.scenario, self.relays, 1e-4)?;
         let config = MissionConfig {
@@ -141,7 +141,7 @@ impl RandomScene {
 
 /// Returns the chain's true SIR after each agreement on positions, linear.
 ///
-/// The first agreement precedes all measurements. `stands` are the states of the simulated chain in order.
+/// The relays had no measurements at the first agreement. `stands` are the states of the simulated chain in order.
 pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
     let mut sirs = Vec::new();
     for stand in stands {
@@ -157,13 +157,14 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
 /// Largest number of agreements, based on measurements, after which the figure shows the SIR.
 pub const LAST: usize = 8;
 
-/// Ratios of the SIR to the best possible one, after 0, 1, 2 and more agreements based on measurements. Each list has
-/// one ratio for each random scene.
+/// Ratios of the SIR to the best possible one, after 0, 1, 2 and more agreements that use measurements.
+///
+/// Each list has one ratio for each random experiment.
 pub type Shares = [Vec<f64>; LAST + 1];
 
-/// Simulates `scenes` random scenes; returns the SIR over the best possible one after each agreement.
+/// Simulates `scenes` random experiments; returns each chain's SIR over the best possible one.
 ///
-/// `setup` returns the simulation of a scene.
+/// There is a ratio after each agreement on positions. `setup` returns the simulation of an experiment.
 pub fn shares(
     scenes: u64,
     relays: u16,
@@ -228,22 +229,22 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
 /// Time after the start of a run from which its SIRs count, s.
 const BEGUN_S: u32 = 60;
 
-/// Mean ratios of the SIR to the best possible one while the interferer moves, one for each scene.
+/// Mean ratios of the SIR to the best possible one while the interferer moves, one for each experiment.
 ///
 /// The first minute of a run does not count. The best possible SIR is that of the same moment.
 #[derive(Clone, Debug, Default)]
 pub struct MovingShares {
-    /// Mean ratios of chains that track the interferer, one for each scene.
+    /// Mean ratios of chains that track the interferer, one for each experiment.
     pub followed: Vec<f64>,
-    /// Mean ratios of chains that do not move, one for each scene. They keep the positions that were best after the
-    /// first minute.
+    /// Mean ratios of chains that do not move, one for each experiment. They keep the positions that were best after
+    /// the first minute.
     pub stayed: Vec<f64>,
 }
 
-/// Simulates `scenes` scenes in which an interferer passes the line Tx-Rx at a distance of 300 m.
+/// Simulates `scenes` experiments in which an interferer moves past the line Tx-Rx, 300 m away from it.
 ///
-/// Returns the mean ratios of SIR to the best possible one, for chains that track the interferer and chains that do
-/// not move.
+/// Returns the mean ratios of the SIR to the best possible one, for chains that track the interferer and for chains
+/// that do not move.
 pub fn moving_shares(
     scenes: u64,
     relays: u16,

@@ -120,7 +120,7 @@ fn the_command_prints_the_references_theorems() {
     }
 }
 
-/// Checks that a single relay with lateral room is placed beside the line, at the reference's optimum.
+/// Checks that a single relay that may leave the line is placed beside it, at the reference's optimum.
 #[test]
 fn one_lateral_relay_agrees_with_the_3d_reference() {
     let side = example("side.toml");

@@ -14,42 +14,46 @@ use crate::geodetic::Geodetic;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
 
-/// Distance from the setpoint, m, below which the carrot (the autopilot's moving target) has arrived.
+/// Distance to the setpoint, m, below which the moving target for the autopilot counts as arrived.
 const ARRIVED_M: f32 = 0.01;
 
-/// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s.
+/// Ratio k of the moving target's speed to its remaining distance, 1/s, near the setpoint.
 const END_PER_S: f32 = 0.5;
 
 /// Minimum speed of the moving target near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
-/// Gain of an autopilot's position control, 1/s. A drone d metres behind flies 1.25 d m/s faster than the target.
+/// Gain of an autopilot's position control, 1/s. A drone d metres behind its target flies 1.25 d m/s faster than the
+/// target.
 const CATCH_UP_PER_S: f32 = 1.25;
 
-/// Fraction of the speed limit at which the moving target flies. The rest is a margin for a drone that overshoots its
-/// speed.
+/// Maximum speed of the moving target as a fraction of the speed limit. The rest is a margin, because a drone
+/// overshoots the speed of its target.
 const CARROT_PART: f32 = 0.96;
 
-/// Ratio of the target's acceleration, near its maximum speed, to the speed that it still lacks, 1/s.
+/// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the
+/// difference of maximum speed and present speed.
 ///
 /// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum speed of a target whose drone lags behind, as a fraction of the speed limit. The target never stops for
-/// good.
+/// Minimum speed of the moving target, as a fraction of the speed limit. The target slows down for a drone that lags
+/// behind, but never stops for good.
 const LEAST_PART: f32 = 0.1;
 
-/// Ratio of the target's deceleration across the direction of a new setpoint to its acceleration.
+/// Factor on the acceleration limit for motion across the direction to a new setpoint. The moving target loses its
+/// speed across that direction with twice the acceleration of [`Pace`].
 ///
 /// The target does not turn at once, because the drone would overshoot it and come back. Its velocity in other
 /// directions is gone within [`Pace::stopping_time`].
 const TURN_PART: f32 = 2.0;
 
-/// Remaining distance at which the moving target counts as stopped, m. The drone, which lags behind, then has up to
-/// 0.5 m left.
+/// Remaining distance to the setpoint at which the moving target counts as stopped, m. The drone lags behind the
+/// target, and then has up to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
-/// Time from a new setpoint until the drone reacts, ms: 200 to the flight controller, and 1000 of lag.
+/// Time from a new setpoint until the drone reacts, ms. 200 are for the way to the flight controller, and 1000 for
+/// the drone's lag.
 const BEHIND_MS: u64 = 1_200;
 
 /// Half-life of the moving target's speed near the setpoint, ms: ln 2 / k with k = 0.5 /s.
@@ -59,13 +63,14 @@ const HALVES_MS: u64 = 1_387;
 /// distance, to [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
-/// Maximum time before its last step for which an earlier position of the target is computed.
+/// Maximum age of a drone's position from which the drone's lag behind the moving target is computed. The drone's
+/// position is compared with the target's position of the same time.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
-/// Maximum time step of the moving target. After a longer gap it continues from its position.
+/// Maximum time step of the moving target. After a longer gap it continues from its last position, without a jump.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
 
-/// Speed limit and acceleration of the targets that are sent to an autopilot.
+/// Speed limit and acceleration of the moving target that is sent to an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pace {
@@ -95,7 +100,7 @@ impl Pace {
         pace
     }
 
-    /// Returns the maximum speed, m/s, of a target that has to stop after `left_m` metres.
+    /// Returns the maximum speed, m/s, of a moving target that has to stop after `left_m` more metres.
     fn speed_before_m_s(self, left_m: f32) -> f32 {
         let a = self.acceleration_m_s2;
         // Here the two parts meet, both at the speed a / k.
@@ -176,7 +181,8 @@ impl Carrot {
         self.is_standing
     }
 
-    /// Returns the moving target's position `ago` before its last step, extrapolated back by its velocity.
+    /// Returns the position of the moving target at the time `ago` before its last step. It extrapolates backward by
+    /// the target's velocity.
     fn place_before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -187,7 +193,7 @@ impl Carrot {
         }
     }
 
-    /// Returns the position where the target stops if it decelerates from now on, not beyond `setpoint`.
+    /// Returns the position where the moving target stops if it decelerates now, not beyond `setpoint`.
     pub(super) fn stop(&self, setpoint: Placement, pace: Pace) -> Placement {
         let to = self.way_to(setpoint);
         let left = length(to);
@@ -208,7 +214,8 @@ impl Carrot {
         way(self.place, setpoint)
     }
 
-    /// Advances the target toward `setpoint` until `now`. `drone` is the drone's position and its age, if known.
+    /// Moves the target toward `setpoint` for the time until `now`. `drone` is the drone's position and its age, if
+    /// known.
     pub(super) fn advance(
         &mut self,
         now: Instant,
@@ -294,20 +301,20 @@ fn length(a: [f32; 3]) -> f32 {
 
 /// Interval at which a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
-/// Interval at which a standing target is sent again. A PX4 leaves its mode after a second without one.
+/// Interval at which a standing target is sent again. A PX4 leaves OFFBOARD after a second without a target.
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
 /// repetition makes it wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
-/// Number of consecutive reports of another target after which the target counts as refused. An ArduCopter reports
-/// its target twice a second.
+/// Number of consecutive reports of another target after which the sent target counts as refused. An ArduCopter
+/// reports its target twice a second.
 const REFUSED_AFTER: u8 = 6;
 /// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
-/// Tolerance between the target that an ArduCopter reports and a standing target, 1e-7 degrees. For a moving target
+/// Maximum difference of a standing target from the one that an ArduCopter reports, 1e-7 degrees. For a moving target
 /// it is [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
 const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
@@ -354,7 +361,7 @@ impl Target {
         self.is_accepted = false;
     }
 
-    /// Compares the autopilot's reported target with the one sent; returns true, once, if they differ. They count as
+    /// Compares the autopilot's reported target with the sent one; returns true, once, if they differ. They count as
     /// different only after the target was sent for some time, and several reports differ.
     ///
     /// While the target moves, the report may lag behind it by the time between two messages.
@@ -393,7 +400,7 @@ impl Target {
         before < REFUSED_AFTER && self.other_targets >= REFUSED_AFTER
     }
 
-    /// Records that the drone's own position was sent as the target.
+    /// Schedules the next transmission after the drone's own position was sent as the target.
     pub(super) fn on_own_place_sent(&mut self, now: Instant) {
         self.due = now + STANDING;
     }

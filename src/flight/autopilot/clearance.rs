@@ -17,7 +17,7 @@ use crate::event::Event;
 use crate::flight::mavlink::frame::Address;
 use crate::side::Side;
 
-/// Number of the MAVLink command that clears lost relays, MAV_CMD_USER_1.
+/// Number of the command MAV_CMD_USER_1, by which an operator reports that lost relays have landed.
 pub(super) const CLEAR_LOST: u16 = 31_010;
 
 /// Value of `MAV_RESULT` for an accepted command.
@@ -29,22 +29,20 @@ const DENIED: u8 = 2;
 #[derive(Clone, Debug, Default)]
 struct LostSide {
     nodes: Vec<u16, MOST>,
-    /// True if more relays are lost on this side than one command can name. They then can not be cleared by a
-    /// command.
+    /// True if more relays are lost on this side than a command can name. No command can then clear them.
     is_full: bool,
 }
 
-/// Lost relays on both sides, and the answer to the operator's last command to clear them.
+/// Lost relays on both sides, and the operator's command that reports them as landed (clears them).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// Last accepted command to clear lost relays: its sender and the relays that it names.
+    /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers.
     accepted: Option<(Address, RelayNumbers)>,
-    /// Pending answer to a command: its addressee, and its `MAV_RESULT`.
+    /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without one.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays the operator has cleared. The relay has not been told yet; `None` if there is nothing
-    /// to tell.
+    /// Side whose lost relays have landed; `None` once this is passed to the relay.
     cleared: Option<Side>,
 }
 
@@ -72,8 +70,8 @@ impl Clearance {
         }
     }
 
-    /// Processes the operator's command to clear lost relays; returns the event for the firmware. `from` is its
-    /// sender, and `parameters` are the numbers of the relays.
+    /// Processes the operator's command that reports lost relays as landed. Returns the event for the firmware.
+    /// `from` is the command's sender, and `parameters` are the numbers of the relays.
     pub(super) fn command(
         &mut self,
         from: Address,
@@ -102,17 +100,17 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true while the answer to the last command, or the side to clear, has not been taken.
+    /// Returns true while the last command is not answered, or its effect not passed to the relay.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }
 
-    /// Removes and returns the pending answer to a command: its addressee, and its `MAV_RESULT`.
+    /// Removes and returns the answer to send to the last command: its addressee, and its `MAV_RESULT`.
     pub(super) const fn take_answer(&mut self) -> Option<(Address, u8)> {
         self.answer.take()
     }
 
-    /// Removes and returns the side whose lost relays this relay has to clear.
+    /// Removes and returns the side whose lost relays have landed, for the relay.
     pub(super) const fn take_cleared(&mut self) -> Option<Side> {
         self.cleared.take()
     }

@@ -38,25 +38,25 @@ const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Lateness of a target from which on a PX4 may have entered its failsafe.
+/// Maximum delay in sending a target to a PX4. After a longer one the PX4 may have entered its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
-/// Time for which positions must be received regularly before [`State::Blind`] ends.
+/// Time for which positions must be received regularly before [`State::Blind`] (position lost) ends.
 const RECOVERY: Duration = Duration::from_millis(1_000);
-/// Time used instead of [`RECOVERY`] if the position was also lost less than [`SHORT_TIME`] before.
+/// Time used instead of [`RECOVERY`] if the drone's position is lost again within [`SHORT_TIME`].
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
-/// Time between two losses of the drone's position within which the second one needs [`LONG_RECOVERY`].
+/// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Time within which an ArduCopter reports its fence after a mode change caused by a breach.
+/// Maximum time from an ArduCopter's mode change to its report of the fence breach that was the cause.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason not to engage the drone must last before it is reported.
+/// Time for which a reason not to control the drone must last before the operator is told.
 const SETTLED: Duration = Duration::from_millis(1_000);
-/// Minimum time between two reports of reasons not to engage the drone.
+/// Minimum time between two reports of reasons not to control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which the guard must hold the drone back before the reason is reported. The guard keeps drones apart.
+/// Time for which the guard (collision avoidance) must hold the drone back before this is reported.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
@@ -70,7 +70,8 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     pub(super) axis: Axis,
-    /// Positions of Tx and Rx with which the link was created. Stored only if uploaded missions can replace them.
+    /// Positions of Tx and Rx with which the link was created. Stored only if a mission uploaded in flight can
+    /// replace them.
     loaded: [Sites; UPLOAD as usize],
     pace: Pace,
     clock: MonotonicClock,
@@ -95,18 +96,20 @@ pub struct Autopilot {
     recovery: Duration,
     /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason for which the drone cannot be engaged, and its start. `None` if the drone can be engaged.
+    /// Reason for which the relay cannot control the drone, `None` if it can, and the time since then.
     wait: (Option<WaitReason>, Instant),
-    /// Last reported reason for which the drone cannot be engaged, and the time of the report.
+    /// Last reported reason for which the relay cannot control the drone, and the time of the report. An inner `None`
+    /// is the report that it can.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
-    /// True while the relay is ready to be engaged.
+    /// True while the relay is ready to control the drone, once the pilot chooses OFFBOARD or GUIDED.
     ready: bool,
-    /// Reasons why the guard (collision avoidance) holds the drone back, as last reported to the operator. The first
-    /// is because of the upstream neighbour, the second because of the downstream one.
+    /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
+    /// because of the upstream neighbour, the second because of the downstream one.
     hold: [Option<HoldReason>; 2],
-    /// Newest reasons why the guard (collision avoidance) holds the drone back, with their start.
+    /// Newest reasons why the guard (collision avoidance) holds the drone back, and since when. The first is because
+    /// of the upstream neighbour, the second because of the downstream one.
     newest_hold: ([Option<HoldReason>; 2], Instant),
-    /// True from a new view (agreed set of relays) until the positions of its relays are agreed.
+    /// True from the acceptance of a new view (set of relays) until the relays have agreed on positions.
     is_new_view: bool,
     report: Report,
     position: Option<Position>,
@@ -162,8 +165,8 @@ impl Autopilot {
 
     /// Sets a number that differs at each start of the companion, such as the relay's seed.
     ///
-    /// It marks this link's questions. Without it, an answer to an earlier start, buffered in a cable, may count as
-    /// an answer to this link, and a mode that the pilot chose before the restart as a new choice.
+    /// It marks this link's clock requests (TIMESYNC). Without it, a reply to an earlier start, buffered in a cable,
+    /// may count as a reply to this link. A mode that the pilot chose before the restart then counts as a new choice.
     pub const fn set_seed(&mut self, seed: u32) {
         self.vehicle.echo.seed(seed);
     }
@@ -256,9 +259,9 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Sets the line from Tx to Rx along which the drone flies, if a new mission has other sites. Call it when
-    /// `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds its
-    /// position until the next setpoint, because the present one belongs to the previous line. Constant work; the
+    /// Sets the line from Tx to Rx along which the drone flies, when a mission changes the two positions. Call it
+    /// when `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds
+    /// its position until the next setpoint, because the present one belongs to the previous line. Constant work; the
     /// same line again has no effect.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
         let now = self.clock.advance(now);
@@ -281,8 +284,8 @@ impl Autopilot {
         }
     }
 
-    /// Sets the setpoint, from `Relay::setpoint`. With `None`, or a setpoint that is not finite or not near the line,
-    /// the drone holds its position.
+    /// Sets the position to fly to, from `Relay::setpoint`. With `None`, or a setpoint that is not finite or too far
+    /// from the line Tx to Rx, the drone holds its position.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
         let now = self.clock.advance(now);
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
@@ -313,14 +316,14 @@ impl Autopilot {
         self.antenna = side;
     }
 
-    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the drone's setpoint.
+    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
-    /// Sets the relay's readiness to be engaged; true at the start. While it is false, a PX4 in [`State::Standby`]
-    /// receives no targets, so that it refuses OFFBOARD. Nothing else changes: an engaged drone stays engaged, and an
-    /// ArduCopter accepts GUIDED all the same.
+    /// Sets whether the relay is ready to control the drone; true at the start. While it is false, a PX4 in
+    /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD. Nothing else changes: a drone that the
+    /// relay controls stays under control, and an ArduCopter accepts GUIDED all the same.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
@@ -337,8 +340,8 @@ impl Autopilot {
 
     /// Reports to the operator why the guard (collision avoidance) holds the relay back, for each side.
     ///
-    /// Reasons are sent while the drone is engaged or in [`State::Standby`], once they have lasted for 3 s, because
-    /// they come and go while an agreement spreads. Equal lines are at least 10 s apart.
+    /// Reasons are sent while the relay controls the drone or in [`State::Standby`], once they have lasted for 3 s.
+    /// Shorter ones are normal while the relays agree on new positions. Equal lines are at least 10 s apart.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
         if self.newest_hold.0 != reasons {
@@ -368,8 +371,9 @@ impl Autopilot {
 
     /// Processes an event of the relay, and sends events that matter in flight to the operator as text.
     ///
-    /// A new view (agreed set of relays) is reported once its positions are agreed, if the drone is engaged and not
-    /// held back. The reason to hold a drone back is reported by [`handle_hold`](Self::handle_hold).
+    /// A new view (agreed set of relays) is reported once its positions are agreed, if the relay controls the drone
+    /// and the guard does not hold it back. The reason to hold a drone back is reported by
+    /// [`handle_hold`](Self::handle_hold).
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {
@@ -463,8 +467,8 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Keeps the state [`State::Blind`] until positions have been received regularly for some time. The state then
-    /// does not alternate with every other position.
+    /// Keeps the state [`State::Blind`] (position lost) until positions come regularly for some time. Otherwise the
+    /// state would change with every position of an irregular sequence.
     fn recover(&mut self, now: Instant, observed: &mut Observed) {
         if self.state != State::Blind {
             self.located_at = None;
@@ -496,7 +500,7 @@ impl Autopilot {
         Release { cause, mode }
     }
 
-    /// Returns the reason for which the pilot cannot engage the drone now, or `None`.
+    /// Returns the reason for which the pilot cannot give the relay control now; `None` if there is none.
     fn wait_reason(&self, now: Instant) -> Option<WaitReason> {
         let vehicle = &self.vehicle;
         let is_px4 = vehicle.kind() == Some(Kind::Px4);
@@ -517,7 +521,7 @@ impl Autopilot {
         }
     }
 
-    /// Reports the reason for which the drone cannot be engaged, once it has lasted for a moment.
+    /// Reports the reason for which the relay cannot control the drone, once it has lasted for a second.
     fn review_wait(&mut self, now: Instant) {
         if self.state != State::Standby {
             self.reported_wait = None;
@@ -546,7 +550,7 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the reason not to engage the drone is reported; `None` without a report.
+    /// Returns the time to report the present reason not to control the drone; `None` if it is reported.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -708,7 +712,7 @@ impl Autopilot {
         Some(Position { at, ..position })
     }
 
-    /// Returns the position of a drone that is too far from its line, and its distance from the line. Such a drone
+    /// Returns the position of a drone too far from the line Tx to Rx, and its distance from that line. Such a drone
     /// has no position in the mission's coordinates. `None` for a drone near the line, and without a position for 3
     /// s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
@@ -716,18 +720,19 @@ impl Autopilot {
         OffLine::new(at, &self.axis)
     }
 
-    /// Returns the noise measured by a SiK radio (RADIO_STATUS), with the drone's position. It is meant for `Relay::handle_sample`.
-    /// It is the newest measurement in the air since the last call; without the feature `sensing` there is none.
+    /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. The caller passes them to
+    /// `Relay::handle_sample`. The measurement is the newest one that was taken in the air. `None` if there is no new
+    /// one since the last call, or without the feature `sensing`.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.noise.take()
     }
 
-    /// Returns the side whose lost relays the operator has cleared, once: for `Relay::clear_lost`.
+    /// Returns the side whose lost relays have landed, as the operator has reported. Once, for `Relay::clear_lost`.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
         self.clearance.take_cleared()
     }
 
-    /// Returns the next event.
+    /// Returns the next event of this link for the firmware; `None` if there is none.
     pub fn poll_event(&mut self) -> Option<AutopilotEvent> {
         let hears = self.streams.answers_requests();
         let mistrusted = || {
@@ -771,8 +776,8 @@ impl Autopilot {
         self.parser.counters()
     }
 
-    /// Signs all frames with the key of `signing`, and accepts only frames signed with it and RADIO_STATUS. A ground
-    /// station sets the autopilot's key (SETUP_SIGNING).
+    /// Signs all frames with the key of `signing`, and accepts only frames that are signed with it. An exception is
+    /// RADIO_STATUS of a radio, which cannot sign. A ground station sets the autopilot's key (SETUP_SIGNING).
     #[cfg(feature = "mavlink-signing")]
     pub const fn sign(&mut self, signing: Signing) {
         self.trust.sign_with(signing);
@@ -789,7 +794,7 @@ impl Autopilot {
     ///
     /// | step | from | to | data | why at this point |
     /// | --- | --- | --- | --- | --- |
-    /// | 1 | relay | link | line between the sites of an adopted mission | the positions and the setpoint of later steps are along it |
+    /// | 1 | relay | link | line between the Tx and Rx positions of an adopted mission | the positions and the setpoint of later steps are along it |
     /// | 2 | | link | timeouts that are due by `now` | an overdue link releases the drone |
     /// | 3 | link | relay | control state | an engaged relay starts from the first position that it receives afterwards |
     /// | 4 | link | relay | position, sample of the radio's noise, side with cleared lost relays | the relay computes its setpoint from them |
@@ -807,7 +812,7 @@ impl Autopilot {
     /// once, and [`handle_bearing`](Self::handle_bearing) the bearing of an antenna that [`point_antenna`](Self::point_antenna) does not set. The first line is that of [`new`](Self::new); an
     /// exchange replaces a line of [`fly_along`](Self::fly_along).
     ///
-    /// Constant work: one call of each input of the relay and of the link, and a new [`Axis`](crate::flight::axis::Axis) when the sites have changed.
+    /// Constant work: one call of each input of the relay and of the link, and a new [`Axis`](crate::flight::axis::Axis) when these positions have changed.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -873,7 +878,7 @@ impl Autopilot {
         (is_news, position)
     }
 
-    /// Switches to the line between the sites (Tx and Rx) of the relay's mission, if they have changed.
+    /// Switches to the line between the Tx and Rx positions of the relay's mission, if these have changed.
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();

@@ -32,12 +32,12 @@ const PERIOD: Duration = Duration::from_millis(1_000);
 
 const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 
-/// Topic of a line of text to the operator. A newer line replaces a waiting one of its topic.
+/// Topic of a line of text to the operator. If a line has to wait, a newer line of the same topic replaces it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
-    /// Engagement or release of the drone by the relay.
+    /// Control of the drone: the relay takes or loses it.
     Control,
-    /// Reason for which the pilot cannot engage the drone.
+    /// Reason for which the pilot cannot give the relay control of the drone.
     Wait,
     /// Reason why the guard (collision avoidance) holds the drone back because of its upstream neighbour.
     Upstream,
@@ -47,7 +47,7 @@ pub(super) enum Topic {
     Relay,
     /// Breach of the autopilot's own fence.
     Fence,
-    /// Command of the operator to clear lost relays.
+    /// Command of the operator that reports lost relays as landed.
     Clearance,
 }
 
@@ -55,7 +55,7 @@ impl Topic {
     const COUNT: usize = 7;
 }
 
-/// Line of text for the operator, stored in two parts.
+/// Line of text for the operator. The text is stored in two parts, which are joined when it is sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Line {
     topic: Topic,
@@ -146,7 +146,7 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// Queues a line for the operator. A full queue drops its oldest line.
+    /// Queues a line for the operator. If the queue is full, its oldest line is dropped.
     pub(super) fn queue_line(&mut self, line: Line) {
         let newest = self.lines.iter().rfind(|other| other.topic == line.topic);
         if newest == Some(&line) {
@@ -236,7 +236,7 @@ impl Report {
         }
     }
 
-    /// Removes the next text or number that is due, and returns it as encoded by `encode`. `None` if nothing is due.
+    /// Removes the next text or number that is due, and returns it encoded by `encode`. `None` if nothing is due.
     pub(super) fn take<T>(
         &mut self,
         now: Instant,
@@ -277,7 +277,7 @@ impl Report {
     }
 }
 
-/// Maximum number of relays that one command to clear lost relays can name.
+/// Maximum number of lost relays that one command of the operator can report as landed.
 pub(super) const MOST: usize = 7;
 
 /// Numbers of the relays that a command names; unused entries are 0.
@@ -296,30 +296,33 @@ pub enum AutopilotEvent {
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
     Released(Release),
-    /// Reason for which the drone cannot be engaged, or is not engaged in the companion's mode.
+    /// Reason for which the pilot cannot give the relay control of the drone, by OFFBOARD or GUIDED. Or the reason
+    /// for which the relay does not use the mode that the pilot has chosen.
     Waits(WaitReason),
-    /// Readiness: the pilot may now engage the drone by choosing the companion's mode.
+    /// Readiness: the pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
     Ready,
     /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
     ///
     /// The sent position is outside the autopilot's own fence, or another companion sends targets to it.
     Refused,
-    /// Report of the autopilot that it is outside of its fence.
+    /// Report of the autopilot that the drone is outside of the autopilot's fence.
     FenceBreached,
-    /// Drone so far from its line that it has no position in the mission's coordinates. Check that the sites are
-    /// those of this flight. Reported once on the ground and at most once in 10 s in the air.
+    /// Drone so far from the line Tx to Rx that it has no position in the mission's coordinates. Check that the
+    /// configured positions of Tx and Rx are those of this flight. Reported once on the ground and at most once in 10
+    /// s in the air.
     OffLine(OffLine),
-    /// Command of the operator over MAVLink that clears all lost relays of one side.
-    /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
+    /// Accepted command of the operator that clears the lost relays of one side, because they have landed. It came
+    /// over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
     LostCleared {
-        /// Side whose relays are cleared.
+        /// Side of this relay whose lost relays have landed.
         side: Side,
         /// Numbers of the relays, padded with zeros.
         relays: RelayNumbers,
         /// Sender of the command.
         from: Address,
     },
-    /// Denied command of the operator to clear lost relays. It does not name exactly the lost relays of one side.
+    /// Denied command of the operator, which reports lost relays as landed. It does not name exactly the lost relays
+    /// of one side.
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: RelayNumbers,
@@ -337,12 +340,12 @@ pub(super) struct Events {
     pub(super) restarted: bool,
     pub(super) released: Option<Release>,
     pub(super) state: Option<State>,
-    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], whichever is newer.
+    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], the newer one of the two.
     pub(super) waits: Option<AutopilotEvent>,
     pub(super) breached: bool,
     pub(super) refused: bool,
     pub(super) off_line: Option<OffLine>,
-    /// Pending [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
+    /// Pending result of a command: [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
     pub(super) clearance: Option<AutopilotEvent>,
 }
 

@@ -19,7 +19,7 @@
 //! mode first, and receives that as the reason. Only the pilot's choice of a mode ends a PX4's failsafe. Nothing else changes a state: no setpoint,
 //! and no message of a neighbour.
 
-/// Control state of the drone: if the relay controls the drone, and which targets the autopilot gets.
+/// Control state of the drone. It says whether the relay controls the drone, and which targets the autopilot gets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum State {
     /// No autopilot is received on the link.
@@ -29,9 +29,9 @@ pub enum State {
     Grounded,
     /// Drone in the air that is not controlled by the relay.
     Standby,
-    /// Controlled by the relay: the drone flies to its setpoint.
+    /// Controlled by the relay: the drone flies to the relay's setpoint.
     Engaged,
-    /// Controlled by the relay without a known position: the last target is kept.
+    /// Controlled by the relay, but the drone's position is unknown: the autopilot keeps the last target.
     Blind,
 }
 
@@ -42,11 +42,12 @@ pub enum State {
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Observed {
-    /// True if the autopilot was received within 3 s.
+    /// True if a heartbeat of the autopilot was received within the last 3 s.
     pub(super) is_received: bool,
     /// True if the drone is armed and in the air.
     pub(super) flying: bool,
-    /// True if the pilot has chosen the mode in which a companion sets the target. The choice was made since this link started.
+    /// True if the pilot has chosen the mode OFFBOARD or GUIDED since this link started. In this mode the relay sets
+    /// the target.
     pub(super) granted: bool,
     /// True if the drone's position is known.
     pub(super) located: bool,
@@ -194,19 +195,20 @@ impl Release {
     }
 }
 
-/// Reason for which the pilot cannot engage the drone, or for which the granted mode was not used.
+/// Reason for which the pilot cannot give the relay control of the drone. Or the reason for which the relay does not
+/// use the mode OFFBOARD or GUIDED that the pilot has chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {
-    /// The autopilot is in its failsafe. It ends when the pilot chooses a mode.
+    /// The autopilot is in its failsafe, which ends when the pilot chooses a mode.
     Failsafe,
     /// Messages from the autopilot arrive late.
     Link,
     /// OFFBOARD or GUIDED was chosen before this link started. Another mode has to be chosen first.
     Found,
-    /// The pilot has not yet been seen to choose a mode.
+    /// No mode change by the pilot has been received since this link started.
     Unseen,
-    /// The drone's position is unknown, or not near the line.
+    /// The drone's position is unknown, or too far from the line Tx to Rx.
     Position,
     /// The relay is not ready ([`handle_ready`](super::Autopilot::handle_ready)).
     NotReady,

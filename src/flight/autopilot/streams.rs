@@ -14,13 +14,13 @@ const WINDOW: Duration = Duration::from_millis(4_000);
 /// Maximum time from a request for a message to its answer.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Number of [`WINDOW`]s without a message after which requests for it end. A message without which the drone cannot
-/// fly is requested every [`SELDOM`] windows instead.
+/// Number of [`WINDOW`]s in which a message is missing before it is no longer requested. A message without which the
+/// drone cannot fly is requested every [`SELDOM`] windows instead.
 const MAX_SILENT_WINDOWS: u8 = 4;
 /// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.
 const SELDOM: u8 = 16;
 
-/// Number of unanswered requests after which the autopilot seems not to receive the link's frames.
+/// Number of unanswered requests after which the autopilot seems unable to receive the link's frames.
 const UNANSWERED: u8 = 2;
 
 /// Values of `MAV_RESULT` with which the autopilot denies a request for good.
@@ -30,8 +30,8 @@ const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// True for a message without which the drone cannot be controlled. False for the fence's state and the target,
-    /// which not every autopilot sends.
+    /// True for a message without which the drone cannot be controlled. The other requested messages (fence, target)
+    /// are not sent by every autopilot.
     is_vital: bool,
 }
 
@@ -63,7 +63,7 @@ const REQUESTED: [RequestedMessage; 4] = [
 struct Stream {
     is_requested: bool,
     messages: u32,
-    /// Number of consecutive windows in which the requested message was not received.
+    /// Number of consecutive time windows in which this message was not received although it was requested.
     silent_windows: u8,
     is_denied: bool,
 }
@@ -73,7 +73,7 @@ struct Stream {
 pub(super) struct Streams {
     all: [Stream; REQUESTED.len()],
     since: Instant,
-    /// Index of the message of the outstanding request, and the request's time.
+    /// Outstanding request: the index of the requested message, and the time of the request.
     outstanding: Option<(usize, Instant)>,
     unanswered: u8,
     is_answered: bool,
@@ -151,7 +151,7 @@ impl Streams {
         self.since = now;
     }
 
-    /// Requests the message with the autopilot's target again. An ArduCopter sends it only in the companion's mode.
+    /// Requests the autopilot's report of its target again, because an ArduCopter sends it only in GUIDED.
     pub(super) fn renew(&mut self) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;

@@ -19,10 +19,10 @@ const IN_A_ROW: u8 = 3;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Mistrust {
-    /// The autopilot signs, the link has no key, and no request is answered. The autopilot seems to ignore unsigned
+    /// The autopilot signs, the link has no key, and the autopilot answers no request. It seems to ignore unsigned
     /// frames.
     NoKey,
-    /// The autopilot signs, the link has no key, but requests are answered all the same.
+    /// The autopilot signs and the link has no key, but the autopilot answers requests all the same.
     SignsOnly,
     /// The link has a key, and the autopilot does not sign. Its frames are therefore ignored.
     Unsigned,
@@ -58,7 +58,7 @@ pub(super) struct Trust {
     #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
-    /// Kind of signature mismatch in the last heartbeats, and the number of consecutive heartbeats with it.
+    /// Kind of signature mismatch in the latest heartbeats, and the number of consecutive ones with it.
     row: Option<(Mistrust, u8)>,
     /// Kinds of signature mismatch that have to be reported, as bits.
     due: u8,
@@ -79,7 +79,7 @@ impl Trust {
         }
     }
 
-    /// Returns true if the signature of the frame, or its absence, is acceptable.
+    /// Returns true if the frame is accepted: its signature is valid, or it may be unsigned.
     fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         let (takes, wrong) = self.judge(now, received, frame);
         if !takes {
@@ -146,8 +146,8 @@ impl Trust {
         frame
     }
 
-    /// Returns the next signature mismatch to report, once. `hears` is true if the autopilot answers requests, `None`
-    /// while that is unknown.
+    /// Returns the next signature mismatch to report, once. `hears` is true if the autopilot answers requests, false
+    /// if it does not, and `None` while that is unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL

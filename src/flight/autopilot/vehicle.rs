@@ -14,14 +14,14 @@ use crate::time::{Duration, Instant};
 /// Time without a heartbeat after which the autopilot counts as gone.
 pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Age of a position of the drone from which on it is not used.
+/// Age from which on a received position of the drone is too old to be used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// Silence of the autopilot from which on a PX4 may have entered its failsafe. It does so after a second without a
+/// Silence of the autopilot after which a PX4 may have entered its failsafe. It does so after a second without a
 /// target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
-/// Maximum time between the measurement of a position and its message.
+/// Assumed maximum time from the measurement of a position to the transmission of its message.
 const MEASURED: Duration = Duration::from_millis(300);
 
 /// MAVLink component number of an autopilot.
@@ -54,7 +54,7 @@ pub struct Position {
     pub velocity_m_s: [f32; 3],
 }
 
-/// Consequence of a received MAVLink message for the link.
+/// Kind of news that a received MAVLink message has for the link.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum VehicleUpdate {
     /// Message of another sender, or without new information.
@@ -87,11 +87,11 @@ pub(super) struct Vehicle {
     /// Time of the autopilot's last message of any kind.
     frame_at: Option<Instant>,
     mode: u32,
-    /// True while the mode is OFFBOARD or GUIDED.
+    /// True while the autopilot's mode is OFFBOARD or GUIDED, in which the relay sets the target.
     granted: bool,
     /// Value of `MAV_STATE` in the last heartbeat.
     status: u8,
-    /// True if OFFBOARD or GUIDED, once entered, counts as the pilot's choice: see [`Self::review_choice`].
+    /// True if OFFBOARD or GUIDED, once entered, counts as chosen by the pilot ([`Self::review_choice`]).
     chosen: bool,
     armed: bool,
     in_air: bool,
@@ -99,14 +99,14 @@ pub(super) struct Vehicle {
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// Measurement time of the last position, also of one far from the line.
+    /// Measurement time of the last position, also of one that is too far from the line Tx to Rx.
     measured_at: Option<Instant>,
     position: Option<Position>,
 }
 
 impl Vehicle {
-    /// Processes a received message. The first sender that identifies itself as an autopilot is kept for good, since
-    /// other vehicles may be received through it.
+    /// Processes a received message. The first sender that identifies itself as an autopilot is kept for good,
+    /// because the same port may also receive other vehicles.
     pub(super) fn read(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
@@ -236,12 +236,13 @@ impl Vehicle {
         }
     }
 
-    /// Clears the pilot's choice of a mode if the autopilot may change the mode by itself. It may also have done so before.
+    /// Withdraws the right to control the drone if the autopilot may have changed its mode by itself.
     ///
-    /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its failsafe after a
-    /// second without one. A PX4 is therefore sent targets only after it has reported a mode other than OFFBOARD outside of a
-    /// failsafe: since the link started, since the last failsafe, and since the link was last interrupted or late. An ArduCopter
-    /// does not change to GUIDED by itself. There another mode since the start of the link and since the last silence is enough.
+    /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its
+    /// failsafe after a second without one. A PX4 is therefore sent targets only after it has reported a mode other
+    /// than OFFBOARD outside of a failsafe: since the link started, since the last failsafe, and since the link was
+    /// last interrupted or late. An ArduCopter does not change to GUIDED by itself. There another mode since the
+    /// start of the link and since the last silence is enough.
     pub(super) fn review_choice(&mut self, now: Instant) {
         let before = |at: Option<Instant>, limit| at.is_some_and(|at| now.since(at) < limit);
         self.chosen &= match self.kind() {
@@ -256,12 +257,13 @@ impl Vehicle {
         };
     }
 
-    /// Clears the pilot's choice, because targets were not sent in time.
+    /// Withdraws the right to control the drone because targets were not sent in time. The pilot has to choose the
+    /// mode anew.
     pub(super) const fn unchoose(&mut self) {
         self.chosen = false;
     }
 
-    /// Returns true if messages of the autopilot may be older than they seem.
+    /// Returns true if messages of the autopilot may have been delayed, so that they show an old state.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         self.echo.is_late(now) || self.measured_at.is_none_or(|at| now.since(at) >= STALE)
     }
@@ -288,7 +290,7 @@ impl Vehicle {
         Some(FlightMode::of(self.kind()?, self.mode))
     }
 
-    /// Discards all reports of an autopilot that has restarted.
+    /// Discards the state received from an autopilot that has restarted since.
     fn restart(&mut self) {
         self.heard_at = None;
         self.granted = false;
@@ -301,7 +303,8 @@ impl Vehicle {
         self.position = None;
     }
 
-    /// Converts the stored position by `moved` to another line; drops it if that returns `None`.
+    /// Converts the stored position to the coordinates of another line by `moved`. Drops the position if that returns
+    /// `None`.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -339,7 +342,7 @@ impl Vehicle {
         (self.armed && self.in_air).then_some(position.place)
     }
 
-    /// Returns the time at which the next known value becomes too old, if no message renews it.
+    /// Returns the time at which the next received value becomes too old, if no new message comes before.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let silent = self.heard_at.map(|at| at + SILENT);
         let gap = self.frame_at.map(|at| at + GAP);
@@ -355,7 +358,8 @@ impl Vehicle {
 /// True if this crate was built with the feature `sensing`.
 const SENSING: bool = cfg!(feature = "sensing");
 
-/// Newest noise measurement of a SiK radio, until the relay takes it: drone's position, noise in W.
+/// Newest noise measurement of a SiK radio for the relay: drone's position, noise in W. `None` once the relay has
+/// taken it.
 #[derive(Clone, Debug)]
 pub(super) struct RadioNoise(Option<(Placement, f32)>);
 
@@ -379,39 +383,40 @@ impl RadioNoise {
 
 const PERIOD: Duration = Duration::from_millis(500);
 
-/// Maximum age of the newest answered TIMESYNC question; beyond it the link counts as late.
+/// Maximum age of the newest TIMESYNC request with a reply. If it is older, the link counts as late.
 const LATE: Duration = Duration::from_millis(1_500);
 
 const SUPPORT_TIMEOUT: Duration = Duration::from_millis(10_000);
 
-/// Maximum age of a TIMESYNC question whose answer counts.
+/// Maximum age of a TIMESYNC request whose reply is still accepted.
 const OLDEST: Duration = Duration::from_millis(60_000);
 
-/// Number of low bits of a TIMESYNC question that hold the link's tag. The higher bits hold the link's time in µs,
-/// enough for 200 days. The autopilot returns all bits unchanged.
+/// Number of low bits of a TIMESYNC request's time stamp that hold the link's tag. The higher bits hold the link's
+/// time in µs, enough for 200 days. The autopilot returns all bits unchanged.
 const SHIFT: u32 = 20;
-/// Tag in the TIMESYNC questions of a link without a seed.
+/// Tag in the TIMESYNC requests of a link whose seed was not set.
 const TAG: u32 = 0xA_52A5;
 
-/// Measurement of the link's delay by echoes (TIMESYNC): an upper bound of a message's age.
+/// Measurement of the link's delay by echoes (TIMESYNC). It gives an upper bound of the age of received messages.
 ///
-/// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock may lose
-/// time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in order: a message
-/// received after an answer was sent after the question, so it is not older than the question.
+/// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's
+/// clock may lose time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes
+/// stay in order: a message received after a reply was sent after the request, so it is not older than the request.
 ///
-/// A question has a tag, drawn at each start of the companion. An answer buffered since before a restart therefore does not count.
+/// A request has a tag, drawn at each start of the companion. A reply buffered since before a restart therefore does
+/// not count.
 ///
-/// An autopilot that has not answered within [`SUPPORT_TIMEOUT`] of the first question does not support echoes. Then only the time stamps
-/// of its positions show their ages. Until then a link that has just started counts as late. An autopilot that has answered once
-/// counts as late whenever it does not answer.
+/// An autopilot that has not replied within [`SUPPORT_TIMEOUT`] of the first request does not support echoes. Then
+/// only the time stamps of its positions show their ages. Until then a link that has just started counts as late. An
+/// autopilot that has replied once counts as late whenever it does not reply.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Tag in the low bits of every question, by which this link recognises its own answers.
+    /// Tag in the low bits of every request, by which this link recognises the replies to its own requests.
     tag: u32,
     due: Option<Instant>,
-    /// Time of the first TIMESYNC question.
+    /// Time of the first TIMESYNC request.
     begun_at: Option<Instant>,
-    /// Time of the newest TIMESYNC question that was answered.
+    /// Time at which the newest TIMESYNC request with a reply was sent.
     answered_at: Option<Instant>,
 }
 
@@ -427,12 +432,12 @@ impl Default for Echo {
 }
 
 impl Echo {
-    /// Derives the tag of this link's TIMESYNC questions from `seed`.
+    /// Derives the tag of this link's TIMESYNC requests from `seed`.
     pub(super) const fn seed(&mut self, seed: u32) {
         self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
     }
 
-    /// Forgets all TIMESYNC questions and answers.
+    /// Forgets all TIMESYNC requests and replies.
     pub(super) fn restart(&mut self) {
         *self = Self {
             tag: self.tag,
@@ -440,7 +445,7 @@ impl Echo {
         };
     }
 
-    /// Returns the TIMESYNC question to send at `now`; `None` if none is due.
+    /// Returns the time stamp of the TIMESYNC request to send at `now`; `None` if none is due.
     pub(super) fn take(&mut self, now: Instant) -> Option<u64> {
         if self.due.is_some_and(|due| due > now) {
             return None;
@@ -450,7 +455,7 @@ impl Echo {
         Some(now.as_micros() << SHIFT | u64::from(self.tag))
     }
 
-    /// Processes an answer to a TIMESYNC question, which contains the `question`.
+    /// Processes the reply to a TIMESYNC request; `question` is the request's time stamp in the reply.
     pub(super) fn handle_reply(&mut self, now: Instant, question: u64) {
         let asked_at = Instant::from_micros(question >> SHIFT);
         let is_own = question & ((1 << SHIFT) - 1) == u64::from(self.tag) && asked_at <= now;
@@ -459,7 +464,7 @@ impl Echo {
         }
     }
 
-    /// Returns the earliest time at which a message received now was sent, if that is known.
+    /// Returns the earliest time at which a message received now can have been sent; `None` if unknown.
     pub(super) const fn floor(&self) -> Option<Instant> {
         self.answered_at
     }
@@ -473,7 +478,7 @@ impl Echo {
         }
     }
 
-    /// Returns the time at which the next question is due or the link becomes late.
+    /// Returns the time at which the next TIMESYNC request is due, or at which the link counts as late.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let late = self.answered_at.map(|at| at + LATE).filter(|at| *at > now);
         let all = [self.due, late, self.begun_at.map(|at| at + SUPPORT_TIMEOUT)];
@@ -484,26 +489,26 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the window over which the minimum delay of messages is taken. Each half is replaced in turn, so that the
-/// minimum covers the last 4 to 8 s.
+/// Half of the window in which the minimum delay of messages is taken. The two halves are replaced in turn, so that
+/// the minimum covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of the window for the minimum delay.
+/// Minimum number of messages in each half of the window in which the minimum delay is taken.
 ///
 /// With fewer, a gap and the late messages that arrive at once after it could increase the minimum.
 const LEAST: u8 = 8;
 
-/// Assumed maximum drift between the clocks of relay and autopilot, as an exponent: one part in 2^10.
+/// Assumed maximum relative drift between the clocks of relay and autopilot, as an exponent: 2^-10.
 ///
 /// With more drift, messages seem late by the drift within the window for the minimum delay.
 const DRIFT: u32 = 10;
 
-/// Conversion from the autopilot's clock to the relay's, by the message with the minimum delay.
+/// Conversion from the autopilot's clock to the relay's clock.
 ///
-/// It uses the minimum difference between the two clocks. A message can be late because the link is slow, and it can
-/// seem late because the autopilot's clock has lost time. A minimum that is never renewed takes the second for the
-/// first for good. A minimum that is renewed within 4 s to 8 s of messages corrects this, and a late message then
-/// counts as late for that long.
+/// It uses the minimum difference between the two clocks, that of the message with the least delay. A message can be
+/// late because the link is slow, and it can seem late because the autopilot's clock has lost time. A minimum that is
+/// never renewed takes the second for the first for good. A minimum that is renewed within 4 s to 8 s of messages
+/// corrects this, and a late message then counts as late for that long.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RemoteClock {
     known: Option<Anchor>,
@@ -511,11 +516,12 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum difference of the relay's clock and the autopilot's, µs, in the last and this half window.
+    /// Minimum differences of the relay's and the autopilot's clock, µs. The first is for the last half of the
+    /// window, the second for the present one.
     least: [i64; 2],
     since: Instant,
     messages: u8,
-    /// Time of the last message on both clocks, the autopilot's in µs.
+    /// Time of the last message on the relay's clock, and on the autopilot's clock in µs.
     last: (Instant, i64),
 }
 
@@ -570,25 +576,25 @@ pub(super) const fn millis(micros: u64) -> u32 {
     ((high / 1_000) << 16).wrapping_add(low / 1_000)
 }
 
-/// Minimum time between two reports that the drone is far from its line.
+/// Minimum time between two reports that the drone is too far from the line Tx to Rx.
 const AGAIN: Duration = Duration::from_millis(10_000);
 
-/// Age from which on the last position far from the line is not returned any more.
+/// Maximum age of a reported position too far from the line Tx to Rx; an older one counts as unknown.
 const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 
-/// Position of a drone that is too far from its line for the mission's coordinates, and its distance.
+/// Position of a drone too far from the line Tx to Rx for the mission's coordinates, and its distance.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OffLine {
-    /// Position that the autopilot reports.
+    /// Position of the drone that the autopilot reports.
     pub at: Geodetic,
-    /// Distance along the ground to the nearest point of the line Tx to Rx, m.
+    /// Distance of the drone along the ground from the nearest point of the line Tx to Rx, m.
     pub away_m: u32,
 }
 
 impl OffLine {
-    /// Returns the position `at` with its distance from the line `axis`. `None` for a place that is not on earth.
-    /// Constant work.
+    /// Returns the position `at` with its distance from the line `axis`; `None` if `at` is not on earth. Constant
+    /// work.
     pub fn new(at: Geodetic, axis: &Axis) -> Option<Self> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -600,9 +606,10 @@ impl OffLine {
     }
 }
 
-/// Detection of a drone that is too far from its line for the mission's coordinates.
+/// Detection of a drone that is too far from the line Tx to Rx for the mission's coordinates.
 ///
-/// Sites with latitude and longitude swapped are valid places, and nothing else shows the mistake.
+/// It finds Tx and Rx positions with latitude and longitude swapped, because these are valid and nothing else shows
+/// the mistake.
 ///
 /// | position | effect |
 /// | --- | --- |
@@ -618,7 +625,7 @@ pub(super) struct OffLineDetector {
 }
 
 impl OffLineDetector {
-    /// Records a position far from the line; returns true if it has to be reported.
+    /// Records a position too far from the line Tx to Rx; returns true if it has to be reported.
     pub(super) fn record(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;
@@ -631,7 +638,7 @@ impl OffLineDetector {
         true
     }
 
-    /// Records a position near the line.
+    /// Records that the drone's position is near the line Tx to Rx, so that it is not reported as far off.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;
@@ -680,7 +687,7 @@ mod clock_tests {
         Instant::from_millis(ms)
     }
 
-    /// Returns the apparent age of each message of a simulated flight, ms.
+    /// Simulates messages of a flight, and returns the age that each message seems to have, ms.
     ///
     /// `clock_ms` returns the autopilot's clock at a time, and `delay` the link's delay at a time.
     fn ages(clock_ms: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {

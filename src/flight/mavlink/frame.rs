@@ -48,8 +48,8 @@ pub struct Address {
     pub component: u8,
 }
 
-/// Returns the checksum of a frame; `covered` are the bytes between the start byte and the checksum. `known` has the
-/// message's seed.
+/// Returns the checksum of a frame with the `covered` bytes between start byte and checksum. `known` has the CRC seed
+/// of the message.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);
@@ -57,7 +57,7 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
     digest.finalize()
 }
 
-/// Properties of a MAVLink message that the checksum and the parser need.
+/// Properties of a kind of MAVLink message that the checksum and the parser need.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Known {
@@ -99,8 +99,8 @@ pub mod id {
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// Maximum length of the extensions that later dialects may add to a message, bytes. A longer message is treated as
-/// noise.
+/// Maximum number of bytes that later dialects may have added to a message as extensions. A longer message is treated
+/// as noise.
 const ADDED: u8 = 24;
 
 impl Known {

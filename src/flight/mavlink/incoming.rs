@@ -88,7 +88,7 @@ pub enum Incoming {
     },
     /// POSITION_TARGET_LOCAL_NED: the vehicle's target in its local frame; only its kind is read.
     PositionTargetLocal {
-        /// Bits of the target's values that the vehicle ignores.
+        /// Mask of the target's values that the vehicle ignores: position, velocity, acceleration, yaw.
         type_mask: u16,
     },
     /// POSITION_TARGET_GLOBAL_INT: the vehicle's target.
@@ -99,7 +99,7 @@ pub enum Incoming {
         lon_e7: i32,
         /// Altitude of the target above the reference of `frame`, m.
         altitude_m: f32,
-        /// Bits of the target's values that the vehicle ignores.
+        /// Mask of the target's values that the vehicle ignores: position, velocity, acceleration, yaw.
         type_mask: u16,
         /// Value of `MAV_FRAME`: 5 is above mean sea level.
         frame: u8,
@@ -112,7 +112,7 @@ pub enum Incoming {
         parameters: [f32; 7],
         /// System and component of the addressee.
         to: Address,
-        /// True for a repetition of a command that was not answered.
+        /// True if the sender repeats a command because it has received no answer.
         is_repeated: bool,
     },
     /// COMMAND_ACK: reply to a command.
@@ -126,7 +126,7 @@ pub enum Incoming {
     TimeSync {
         /// Clock of the replying system, ns; 0 in a request.
         answered: u64,
-        /// Clock of the requesting system, which the reply repeats, in its own units.
+        /// Time stamp of the request, which the reply repeats, in units that the requesting system chooses.
         asked: u64,
     },
     /// FENCE_STATUS: state of the vehicle's geofence.
@@ -203,10 +203,10 @@ impl Incoming {
     }
 }
 
-/// Step of a SiK radio's levels, 1/1.9 dB, as a power of 2: log2(10) / 19.
+/// Step of a SiK radio's levels, 1/1.9 dB, as the binary logarithm of a power ratio: log2(10) / 19.
 const SIK_PER_UNIT: f32 = 0.174_838_32;
 
-/// Level 0 of a SiK radio, -127 dBm, as a power of 2 of a watt: -15.7 log2(10).
+/// Level 0 of a SiK radio, -127 dBm, as the binary logarithm of the power in W: -15.7 log2(10).
 const SIK_ZERO: f32 = -52.154_27;
 
 /// Returns the noise power, W, for the value `noise` of a SiK radio's RADIO_STATUS.
@@ -227,7 +227,7 @@ pub fn noise_w(noise: u8) -> Option<f32> {
 pub struct Received {
     /// Address of the sender.
     pub from: Address,
-    /// Decoded message; `None` for a kind that this crate skips, or that only companions send.
+    /// Decoded message; `None` for a kind of message that this crate does not read.
     pub message: Option<Incoming>,
     /// MAVLink id of the received message.
     pub id: u32,
@@ -241,8 +241,8 @@ pub struct Received {
 pub struct Counters {
     /// Number of valid frames.
     pub frames: u32,
-    /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. They are corrupted
-    /// frames, sometimes other bytes.
+    /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. Most are corrupted
+    /// frames; other bytes can also look like a frame.
     pub broken: u32,
 }
 

@@ -35,7 +35,7 @@ pub enum Outgoing<'a> {
     SetMessageInterval {
         /// Id of the requested message.
         id: u32,
-        /// Requested interval, µs.
+        /// Interval requested between two of these messages, µs.
         interval_us: u32,
     },
     /// COMMAND_ACK: reply to a command.
@@ -60,7 +60,7 @@ pub enum Outgoing<'a> {
     },
     /// TIMESYNC request, which the autopilot sends back.
     TimeSync {
-        /// Time stamp of the question, returned in the answer.
+        /// Time stamp of the request, which the reply repeats.
         asked: u64,
     },
     /// STATUSTEXT: text for an operator, of at most 50 bytes; a longer text is truncated.
@@ -212,7 +212,7 @@ impl Outgoing<'_> {
     }
 }
 
-/// Writer into a frame; it never overflows, since each message's fields are at most `LONGEST` bytes.
+/// Writer of a message's fields into a frame. It never overflows, since these fields are at most `LONGEST` bytes.
 struct Writer(FrameBytes);
 
 impl Writer {

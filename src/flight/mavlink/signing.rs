@@ -24,10 +24,10 @@ use crate::time::{Duration, Instant};
 /// Length of a signature's truncated hash, bytes.
 const TAG: usize = 6;
 
-/// Length of link id and timestamp in a signature, bytes.
+/// Length of the link id and the timestamp in a signature, bytes.
 const STAMPED: usize = SIGNATURE - TAG;
 
-/// Maximum age of a sender's first signed frame: a minute, in timestamp units of 10 µs.
+/// Maximum age of the first signed frame of a sender, in timestamp units of 10 µs: one minute.
 const BEHIND: u64 = 6_000_000;
 
 /// Maximum timestamp of a signature, in the year 2104.
@@ -38,12 +38,13 @@ const UNIT_US: u32 = 10;
 /// Seconds from 1970-01-01 to 2015-01-01, where signature timestamps start.
 const BEGIN_S: u64 = 1_420_070_400;
 
-/// Number of senders whose timestamps are remembered. An autopilot forwards frames that others have signed.
+/// Number of senders whose timestamps are remembered. There can be several, because an autopilot forwards frames that
+/// others have signed.
 const SENDERS: usize = 8;
 
-/// Sender of signed frames, and the minimum timestamp of its next frame, against replays. With [`SENDERS`] known
-/// senders, a new one replaces the sender with the oldest last frame. Frames of that sender that are at most a minute
-/// old could then be replayed.
+/// Sender of signed frames, with the minimum timestamp of its next frame, which prevents replays. If [`SENDERS`]
+/// senders are known, a new one replaces the sender whose last frame is the oldest. Frames of the replaced sender
+/// that are at most a minute old could then be replayed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct Sender {
     from: Address,
@@ -57,7 +58,7 @@ struct Sender {
 pub struct Stamp(u64);
 
 impl Stamp {
-    /// Timestamp of a board without a clock.
+    /// Timestamp to start with on a board that does not know the time.
     pub const UNKNOWN: Self = Self(0);
 
     /// Converts a Unix time, µs since 1970-01-01.
@@ -84,7 +85,7 @@ pub enum Flaw {
 pub struct Signing {
     key: [u8; 32],
     link: u8,
-    /// Present timestamp for signatures. It belongs to the time `at`.
+    /// Timestamp of this link at the time `at`, in units of 10 µs.
     stamp: u64,
     at: Instant,
     /// Timestamp of the last sent frame.
@@ -120,8 +121,8 @@ impl Signing {
         }
     }
 
-    /// Advances the own timestamp to `now`, by at most about an hour per call. An exact step would need a 64-bit
-    /// division, which takes a kilobyte of flash.
+    /// Advances the timestamp for signatures to `now`, by at most about an hour per call. An exact step would need a
+    /// 64-bit division, which takes a kilobyte of flash.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;

@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Reports the relay at `place`, long after its last setpoint.
+    /// Tells the guard that its relay is reported at `place`, long after the guard's last setpoint.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);
@@ -19,7 +19,8 @@ impl One {
     }
 }
 
-/// Returns a message of a neighbour that knows this relay's association.
+/// Returns a message of a neighbour that knows this relay's association (session), for the tests. It has the fence
+/// number `number`, and `x_m` as the neighbour's x and agreed x.
 fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
     let echo = one.sent(side).association;
     Fence {
@@ -175,8 +176,8 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// Checks that a relay that halts on its way into the geofence stops outside, where it is. The nearest position
-/// inside may be occupied by a neighbour.
+/// Checks that a relay that halts on its way into the geofence stops outside, at its position. A neighbour may be at
+/// the nearest position inside.
 #[test]
 fn a_relay_that_halts_outside_the_geofence_stops_there() {
     let mut one = One {
@@ -250,7 +251,7 @@ fn a_halt_outlasts_a_reboot_of_its_requester() {
     }
 }
 
-/// Checks that a relay that is flown again, on the wrong side of a neighbour, requests a halt at once.
+/// Checks that a drone that its pilot gives back on the wrong side of a neighbour halts the chain.
 #[test]
 fn a_relay_flown_again_out_of_order_requests_a_halt() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -276,7 +277,7 @@ fn a_relay_flown_again_out_of_order_requests_a_halt() {
     }
 }
 
-/// Checks that a halt request is forwarded by a relay without setpoints, or one that has just started.
+/// Checks that a halt request is forwarded by a relay that is in manual control or has just started.
 #[test]
 fn a_halt_passes_a_relay_that_is_not_flown() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -303,7 +304,8 @@ fn a_halt_passes_a_relay_that_is_not_flown() {
     assert_eq!(before.setpoint().to_bits(), 55.0_f32.to_bits());
 }
 
-/// Checks that a relay in manual control reports that it is on the wrong side of a flown neighbour.
+/// Checks that a relay in manual control reports that it is on the wrong side of a neighbour. The neighbour flies to
+/// its setpoints.
 #[test]
 fn an_unflown_relay_reports_that_it_is_out_of_order() {
     let mut one = One {
@@ -327,8 +329,8 @@ fn an_unflown_relay_reports_that_it_is_out_of_order() {
     assert_eq!(reasons(&one), [None, Some(HoldReason::Order)]);
 }
 
-/// Checks that a relay that starts beside a silent relay moves away along x before it changes altitude. It keeps the
-/// separation along x until an operator reports the silent relay as gone, and reports why it waits.
+/// Checks that a relay that starts beside a silent relay moves away along x before it changes altitude. It then keeps
+/// the separation along x until an operator reports the silent relay as gone. Its hold reason is the lost relay.
 #[test]
 fn a_relay_moves_away_from_a_silent_one_before_across() {
     let mut one = One {
@@ -340,7 +342,7 @@ fn a_relay_moves_away_from_a_silent_one_before_across() {
     one.is_at_place(high);
     one.is_at_place(high);
     assert_eq!(one.guard.setpoint(), Some(high));
-    one.guard.link(Side::Upstream, None);
+    one.guard.set_neighbour(Side::Upstream, None);
     one.is_at_place(high);
     assert_eq!(one.guard.setpoint(), Some(aside(110.0, 0.0, 80.0)));
     assert_eq!(
@@ -378,8 +380,8 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
         };
         one.receive(side, node, told);
         assert_eq!(one.guard.hold_reason(side), Some(HoldReason::Order));
-        one.guard.link(side, None);
-        one.guard.link(side.other(), None);
+        one.guard.set_neighbour(side, None);
+        one.guard.set_neighbour(side.other(), None);
         for _ in 0..60 {
             one.is_at(100.0);
             one.guard.remind();
@@ -392,7 +394,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     }
 }
 
-/// Checks that a relay beside one in manual flight does not halt the chain if the two are in order.
+/// Checks that a neighbour in manual control whose reported position is in order causes no halt.
 #[test]
 fn a_reported_position_in_manual_flight_avoids_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
@@ -421,7 +423,7 @@ fn a_reported_position_in_manual_flight_avoids_a_halt() {
 }
 
 /// Checks that a fence message from before a reboot is not taken for the position of its sender. A message with a
-/// fence number contains the x of the fence plane, which may be far from the sender.
+/// fence number has the x of the fence (limit of x), which may be far from the sender.
 #[test]
 fn an_old_fence_gives_no_position_of_its_owner() {
     for (number, is_wrong) in [(0, true), (7, false)] {
@@ -444,8 +446,8 @@ fn an_old_fence_gives_no_position_of_its_owner() {
     }
 }
 
-/// Checks that relay 2 reports the lowest x of itself and of relay 3 to the relay upstream. Relay 3 is 2.5 m short of
-/// relay 2 along x, within the errors of their reports.
+/// Checks that a relay reports the lowest x of itself and of the relays downstream. Relay 3 is 2.5 m before relay 2
+/// along x, within the errors of their reports, so relay 2 has to report the x of relay 3.
 #[test]
 fn gaps_that_are_negative_by_the_error_add_up() {
     let config = GuardConfig {
@@ -493,9 +495,9 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Checks the fence planes of relay 2 if relay 1 starts beside it, after relay 3 has cleared one. Relays 1 and 2 are
-/// in order only within the error of the reports. Each next fence plane then is the separation beyond relay 1, too
-/// (rule 7).
+/// Checks that a new neighbour upstream moves a fence (limit of x) that relay 3 has already passed. Relay 1 starts
+/// beside relay 2; the two are in order only within the error of the reports. Each next fence of relay 2 then is the
+/// separation beyond relay 1, too (rule 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {
@@ -515,15 +517,15 @@ fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
         let neighbours = if k == 3 { [Some(2), None] } else { neighbours };
         Guard::new(config, neighbours, 7 + u32::from(k), Instant::ZERO)
     });
-    guards[1].link(Side::Upstream, None);
+    guards[1].set_neighbour(Side::Upstream, None);
     guards[1].forget(Side::Upstream, false);
     let mut fences = [0.0_f32; 2];
     for second in 1..20 {
         let now = Instant::from_millis(1_000 * second);
         let first = usize::from(second < 10);
         if second == 10 {
-            guards[0].link(Side::Downstream, Some(2));
-            guards[1].link(Side::Upstream, Some(1));
+            guards[0].set_neighbour(Side::Downstream, Some(2));
+            guards[1].set_neighbour(Side::Upstream, Some(1));
         }
         for k in first..3 {
             guards[k].commit(places[k]);

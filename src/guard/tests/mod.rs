@@ -33,7 +33,8 @@ fn at(x_m: f32) -> Placement {
     Placement::on_line(x_m, 50.0)
 }
 
-/// Returns the first message of a neighbour, which knows no association of this relay yet.
+/// Returns the first message of a neighbour for the tests. It does not know this relay's association (session) number
+/// yet.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,
@@ -47,7 +48,7 @@ fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     }
 }
 
-/// Guard under test, with the clock of the test.
+/// Guard under test, with the time of the test.
 struct One {
     guard: Guard,
     now: Instant,
@@ -65,7 +66,7 @@ impl One {
         one
     }
 
-    /// Reports the relay at `x_m`, long after the last setpoint.
+    /// Tells the guard that its relay is reported at `x_m`, long after the guard's last setpoint.
     fn is_at(&mut self, x_m: f32) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, at(x_m));
@@ -140,8 +141,8 @@ fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Checks rule 1: a relay stays beyond the fence plane of its upstream neighbour. It does so even if the neighbour on
-/// the other side started too close.
+/// Checks rule 1: a relay stays beyond the fence (limit of x) of its upstream neighbour. It does so even if the
+/// downstream neighbour started too close.
 #[test]
 fn a_relay_between_two_fences_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
@@ -175,7 +176,7 @@ fn a_lost_relay_is_kept_clear_of() {
         one.receive(Side::Downstream, 2, lost.sent(Side::Upstream));
     }
     assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
-    one.guard.link(Side::Downstream, None);
+    one.guard.set_neighbour(Side::Downstream, None);
     assert_eq!(one.setpoint().to_bits(), 290.0_f32.to_bits());
     assert_eq!(
         one.guard.hold_reason(Side::Downstream),
@@ -187,18 +188,18 @@ fn a_lost_relay_is_kept_clear_of() {
     lost.guard.commit(at(50.0));
     let least = lost.setpoint();
     assert!(least >= 300.0 - 200.0);
-    lost.guard.link(Side::Upstream, None);
+    lost.guard.set_neighbour(Side::Upstream, None);
     assert_eq!(lost.setpoint().to_bits(), least.to_bits());
     lost.guard.forget(Side::Upstream, false);
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// Checks that a relay keeps clear of relays beyond a removed neighbour until it hears one of them.
+/// Checks that a relay does not approach relays behind a removed neighbour before it hears one of them.
 #[test]
 fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
     let mut next = One::new([None, Some(3)], 100.0, 100.0);
-    one.guard.link(Side::Upstream, None);
+    one.guard.set_neighbour(Side::Upstream, None);
     one.guard.forget(Side::Upstream, true);
     one.guard.commit(at(200.0));
     assert_eq!(one.setpoint().to_bits(), 300.0_f32.to_bits());
@@ -211,7 +212,7 @@ fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     });
     assert_eq!(one.guard.steer(one.now), Some(at(310.0)));
     one.is_at(310.0);
-    one.guard.link(Side::Upstream, Some(1));
+    one.guard.set_neighbour(Side::Upstream, Some(1));
     for _ in 0..6 {
         one.receive(Side::Upstream, 1, next.sent(Side::Downstream));
         next.receive(Side::Downstream, 3, one.sent(Side::Upstream));
@@ -223,9 +224,9 @@ fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
 #[test]
 fn a_relay_never_received_may_be_anywhere() {
     let mut guard = Guard::new(config(), [Some(1), Some(3)], 7, Instant::ZERO);
-    guard.link(Side::Upstream, None);
-    guard.link(Side::Downstream, Some(4));
-    guard.link(Side::Downstream, None);
+    guard.set_neighbour(Side::Upstream, None);
+    guard.set_neighbour(Side::Downstream, Some(4));
+    guard.set_neighbour(Side::Downstream, None);
     let now = Instant::from_millis(1000);
     guard.position(now, at(500.0));
     for target in [100.0, 900.0] {
@@ -271,11 +272,12 @@ fn a_relay_that_turns_stays_within_its_earlier_setpoints() {
     assert_eq!(after(21_000, &[], 95.0), (95.0, 95.0));
 }
 
-/// Setpoints of two neighbouring relays, m along x: that of relay 1, then that of relay 2. They are compared exactly.
+/// Setpoints of two neighbouring relays along x, m: relay 1, relay 2. The tests compare them exactly.
 #[derive(PartialEq, Debug)]
 struct Both(f32, f32);
 
-/// Two guards with one fence between them: relay 1 toward Tx and relay 2 toward Rx.
+/// Two neighbouring guards that exchange messages about their fence (limit of x). Relay 1, the owner, is toward Tx,
+/// and relay 2, the follower, toward Rx.
 struct Pair {
     owner: One,
     follower: One,
@@ -355,7 +357,7 @@ fn the_owner_follows_the_follower() {
     );
 }
 
-/// Checks rules 1 and 5: toward Tx relay 1 moves first, then its fence plane, and then relay 2.
+/// Checks rules 1 and 5: toward Tx relay 1 moves first, then the fence (limit of x), and then relay 2.
 #[test]
 fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -369,7 +371,7 @@ fn the_follower_follows_the_owner() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Checks rule 3: late messages, and messages with an older fence plane, have no effect.
+/// Checks rule 3: late messages, and messages with an older fence (limit of x), let no relay move.
 #[test]
 fn late_messages_grant_nothing() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -402,8 +404,8 @@ fn late_messages_grant_nothing() {
     );
 }
 
-/// Checks that an old position report frees no space for a neighbour. It is older than the setpoint, or too early to
-/// show its effect.
+/// Checks that an old position report lets no neighbour move into the space that a relay will leave. The report is
+/// older than the setpoint, or too early to show its effect.
 #[test]
 fn an_old_report_frees_nothing() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -463,7 +465,8 @@ fn relays_in_the_wrong_order_stay() {
 }
 
 /// Checks that a restarted relay is recognised, and its late old messages are ignored. The restarted relay does not
-/// know the fence plane that it announced. Its neighbour keeps to that plane until the two have exchanged messages.
+/// know the fence (limit of x) that it announced. Its neighbour keeps to that fence until the two have exchanged
+/// messages.
 #[test]
 fn a_restart_is_distinguished_from_late_messages() {
     let mut pair = Pair::new([100.0, 100.0], [300.0, 300.0]);
@@ -503,7 +506,7 @@ fn a_restart_is_distinguished_from_late_messages() {
     );
 }
 
-/// Checks that a relay out of order with its downstream neighbour lets no upstream neighbour move. It requests a
+/// Checks that a relay on the wrong side of its downstream neighbour lets no upstream neighbour move. It requests a
 /// halt, in a message whose x does not count.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {

@@ -10,7 +10,7 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::Instant;
 
-/// Three relays in a row, 100 m apart; the pilot takes the middle one.
+/// Three relays in a row, 100 m apart, of which the tests give the middle one to its pilot.
 struct Row {
     all: [One; 3],
 }
@@ -35,7 +35,7 @@ impl Row {
         row
     }
 
-    /// Exchanges messages between the relays until none is pending.
+    /// Exchanges messages between the three relays until none is pending.
     fn talk(&mut self) {
         for _ in 0..8 {
             for k in 0..3 {
@@ -45,7 +45,8 @@ impl Row {
         }
     }
 
-    /// Passes the next message of relay `k` to its neighbour and returns it. Relays count from 0.
+    /// Passes the next message of relay `k` to its neighbour and returns it; `None` if none is pending. `k` is 0 to
+    /// 2.
     fn speak(&mut self, k: usize) -> Option<Fence> {
         let (side, to, fence) = self.all[k].guard.poll()?;
         let from = u16::try_from(k).unwrap_or(0) + 1;
@@ -152,7 +153,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
 }
 
 /// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. Beside means
-/// within the separation along x.
+/// closer than the separation along x.
 #[test]
 fn no_relay_moves_across_toward_a_drone_beside_it() {
     for (y_m, moves) in [(-30.0, true), (30.0, false)] {
@@ -173,7 +174,7 @@ fn no_relay_moves_across_toward_a_drone_beside_it() {
     }
 }
 
-/// Checks that a neighbour counts as lost if it falls silent after it sent only its position. It had just started,
+/// Checks that a neighbour counts as lost if it became silent right after its start. It had sent only its position,
 /// and had no association (session) yet.
 #[test]
 fn a_relay_that_fell_silent_after_its_start_is_lost() {
@@ -182,7 +183,7 @@ fn a_relay_that_fell_silent_after_its_start_is_lost() {
     row.all[1].guard = Guard::new(config(), [Some(1), Some(3)], 99, now);
     row.all[1].guard.position(now, at(200.0));
     row.talk();
-    row.all[0].guard.link(Side::Downstream, None);
+    row.all[0].guard.set_neighbour(Side::Downstream, None);
     row.all[0].guard.commit(at(195.0));
     assert!(row.setpoint(0) < Some(195.0));
     let reason = row.all[0].guard.hold_reason(Side::Downstream);
@@ -214,9 +215,9 @@ fn a_late_position_of_a_drone_flown_again_is_no_obstacle() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// Checks that the hold reason names a neighbour that restarted and is not flown to setpoints again. The companion of
-/// the neighbour restarted, and its pilot has not engaged setpoint control. The limit of the neighbour's old
-/// association still holds.
+/// Checks that the hold reason tells that a restarted neighbour does not fly to setpoints. The neighbour's companion
+/// computer restarted, and its pilot has not engaged setpoint control again. The limit of x of the neighbour's old
+/// association (session) still holds.
 #[test]
 fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     let mut row = Row::new();
@@ -234,8 +235,8 @@ fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// Checks that a relay reports a silent flown neighbour that makes no room. It does so after five reminders, and not
-/// while the relay itself moves.
+/// Checks that a relay reports a silent neighbour in setpoint control that makes no room. It does so after five
+/// reminders, and not while the relay itself moves.
 #[test]
 fn a_relay_that_stands_for_long_reports_pending() {
     let mut row = Row::new();
@@ -310,7 +311,7 @@ fn lost_messages_are_repeated() {
 }
 
 /// Checks that late messages change nothing after a pilot has taken a drone over or given it back. Old fence messages
-/// do not make the drone count as flown, old leave notices not as released.
+/// do not make the drone count as flown to setpoints, and old leave notices not as released.
 #[test]
 fn late_messages_do_not_change_who_is_flown() {
     let mut row = Row::new();
@@ -346,7 +347,7 @@ fn late_messages_do_not_change_who_is_flown() {
     assert_eq!(row.setpoint(0), Some(200.0 - APART));
 }
 
-/// Checks that two neighbours that are flown by hand and then by setpoints again associate anew.
+/// Checks that two neighbours start a new association (session) after both were flown by hand.
 #[test]
 fn two_neighbours_are_released_and_flown_again() {
     let mut row = Row::new();

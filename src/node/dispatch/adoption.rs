@@ -69,7 +69,7 @@ impl Node {
         }
     }
 
-    /// Makes `mission`, whose identifier is `id`, the active mission of the new view.
+    /// Makes `mission` with the identifier `id` the active mission of the new view.
     fn activate_mission(&mut self, now: Instant, mission: Mission, id: MissionId) {
         if id == self.member.active {
             // The number of relays may have changed.
@@ -80,10 +80,10 @@ impl Node {
         self.raise(Event::Adopted);
     }
 
-    /// Replaces the active mission by the stored one, `mission`. `now` is `None` after a start.
+    /// Replaces the active mission by `mission`, the stored one. `now` is `None` after a start.
     ///
-    /// With other sites of Tx and Rx all positions are void: there is no setpoint until the next agreement, and the
-    /// guard starts again.
+    /// If the new mission has other positions of Tx and Rx, all relay positions become invalid: there is no setpoint
+    /// until the next agreement, and the guard starts again.
     pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.interference = *mission.interference();

@@ -47,8 +47,10 @@ impl Node {
         }
     }
 
-    /// Handles a node's claim to its index (chain position). A claim is sent back to its sender. A claim that comes
-    /// back (echo) is compared with this relay's own. Returns false if signed frames replace claims.
+    /// Handles a claim message from node `from`. Returns false if signed frames replace claims.
+    ///
+    /// A claim of that node to its own node number is sent back to it as an echo. An echo shows a claim to this
+    /// relay's node number; it is compared with this relay's own claim.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -82,9 +84,9 @@ impl Node {
         Some((side, to, Message::Claim(claim)))
     }
 
-    /// Returns the destination of a due claim to this relay's index, and marks the claim as sent.
+    /// Returns the destination of a due claim to this relay's node number, and marks the claim as sent.
     ///
-    /// Claims go to the two neighbours in turn. On a shared channel without neighbours the destination is this
+    /// Claims go to the two neighbours in turn. Without neighbours, on a shared channel, they are addressed to this
     /// relay's own number.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
@@ -97,7 +99,8 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if all sessions with other nodes must be restarted under that number.
+    /// Returns the new claim number if the authentication sessions must be restarted. New nonces then count up from
+    /// it.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
@@ -106,10 +109,10 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns true if a handshake accompanies `message`.
+    /// Returns true if a handshake must be sent after `message`.
     ///
-    /// It does with each lease renewal, on a shared channel. Another relay with the same index then detects this one
-    /// even if the chain sends nothing else.
+    /// On a shared channel this is so once in each lease renewal. From the handshake another node with the same
+    /// number detects this relay, even if the chain sends nothing else.
     pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
         let renews = match message {
             Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
@@ -123,20 +126,20 @@ impl Node {
         self.duplicate.rival(claim)
     }
 
-    /// Returns true while this relay is passive, because another node uses its index.
+    /// Returns true while this relay is passive, because another node uses its node number.
     pub(crate) const fn is_passive(&self) -> bool {
         self.duplicate.is_passive()
     }
 
-    /// Handles the report that the other relay with this relay's index has been removed.
+    /// Handles the report that the other node with this relay's node number has been removed.
     pub(crate) fn clear_duplicate(&mut self, now: Instant) {
         if self.duplicate.clear(now, &self.member.settings) {
             self.become_active(now);
         }
     }
 
-    /// Makes this relay active again, as after a restart. Its view, lease and proposal may be those of the other node
-    /// by now.
+    /// Makes this relay active again, as after a restart. It leaves its view, because the other node with its number
+    /// may have changed that view meanwhile.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

@@ -11,7 +11,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 use crate::wire::upload::UPLOAD;
 
-/// Mission state that a hello reports.
+/// Mission fields of a hello: the newest mission, and how far the chain uses or refuses it.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -77,7 +77,7 @@ impl Node {
         }
     }
 
-    /// Returns the state of the stored mission, or of a newer one that was refused.
+    /// Returns the mission fields of a hello, for the stored mission or a newer one that was refused.
     fn mission_state(&self) -> MissionState {
         let (active, latest) = (self.member.active, self.layers.update.latest());
         if let Some(refused) = self.layers.update.refused_mission(active) {
@@ -98,10 +98,11 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay could be inserted between node `other` (at `side`) and its neighbour.
+    /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`. Node `other`
+    /// is at `side`.
     ///
-    /// This relay and the neighbour of `other` must receive each other, or a nearer linked neighbour of this relay is
-    /// inserted with it.
+    /// This relay and that neighbour must receive each other. Otherwise this relay must be linked to a node nearer
+    /// than that neighbour, and this node is inserted together with this relay.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -122,7 +123,7 @@ impl Node {
     }
 
     /// Returns the number of relays that a neighbour reaches through this relay, including this one. `far` is the
-    /// side that faces away from that neighbour.
+    /// side of this relay that is away from that neighbour.
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.
@@ -133,7 +134,8 @@ impl Node {
         }
     }
 
-    /// Returns the number of relays on `side` that are connected to this relay, as counted last.
+    /// Returns the number of relays that are connected to this relay on `side`. It is known from the last view
+    /// proposal.
     pub(super) fn relays_on(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;
@@ -152,7 +154,7 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a hello from node `from` at `side`, whose loaded mission is this relay's.
+    /// Handles a hello from node `from` at `side`. Both have loaded the same mission before flight.
     pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let known = self.layers.view.latest_view();
@@ -208,7 +210,7 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records if node `from` receives this relay, and reports the node if it repeatedly does not.
+    /// Records with `heard` if node `from` receives this relay. Reports the node if it repeatedly does not.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -221,7 +223,7 @@ impl Node {
         }
     }
 
-    /// Considers node `from` as the new neighbour on `side`; one-way links are ignored.
+    /// Selects node `from` as the new neighbour on `side` if it is a better one. One-way links are ignored.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);
@@ -253,7 +255,7 @@ impl Node {
                 .update
                 .record_hello_number(side, hello.offer_number, now);
             layers.update.reset_offers(side);
-            self.steering.link(side, Some(from));
+            self.steering.set_neighbour(side, Some(from));
             if tells {
                 self.raise_node_event(NodeEvent::Back, side, from);
             }
@@ -262,7 +264,8 @@ impl Node {
         }
     }
 
-    /// Handles the neighbour's report if it has selected this relay as its own neighbour (`mutual`).
+    /// Records if the neighbour at `side` has selected this relay as its own neighbour (`mutual`). If it has so now,
+    /// outstanding messages are sent again.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

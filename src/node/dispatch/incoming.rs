@@ -14,8 +14,8 @@ use crate::wire::message::Message;
 use crate::wire::upload::UPLOAD;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`. Returns false if that node may not send it. Work: at
-    /// most the positions for 16 target SIRs.
+    /// Handles an intact message from node `from` at `side`. Returns false if node `from` may not send such a
+    /// message. Work: at most the positions for 16 target SIRs.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,
@@ -77,10 +77,10 @@ impl Node {
         true
     }
 
-    /// Returns true if `message` belongs to the current mission, and to the current view if it needs one.
+    /// Returns true if `message` belongs to the current mission, and to the current view if necessary.
     ///
-    /// Any other message is counted and answered by a hello. A pass of another view also triggers a request for a new
-    /// view.
+    /// Any other message is counted and answered by a hello. A pass message of another view also makes this relay
+    /// request a new view.
     fn is_of_this_view(&mut self, now: Instant, side: Side, from: u16, message: &Message) -> bool {
         let Some(digest) = message.digest() else {
             return true;
@@ -111,7 +111,8 @@ impl Node {
         known
     }
 
-    /// Returns true if `from` measures its positions along the same line: between the same Tx and Rx sites.
+    /// Returns true if node `from` uses the same x axis, between the same positions of Tx and Rx. Otherwise the
+    /// message is counted.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.layers.update.line_digest(&self.member);
         if !same && self.layers.neighbours.at(side).latest_mission.is_some() {
@@ -203,8 +204,8 @@ impl Node {
         self.apply(now, effects);
     }
 
-    /// Records that the neighbour at `side` was alive at time `at` or later. It has replied to a message that was
-    /// sent at that time.
+    /// Records that the neighbour at `side` was alive at time `at` or later. It has replied to a message sent at that
+    /// time.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {
@@ -215,8 +216,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles an authentic frame of node `from` at `side`. After the `first` one of a session, messages that the
-    /// node could not verify before are sent again.
+    /// Handles a valid signed frame of node `from` at `side`. If it is the `first` one of a session, messages that
+    /// the node could not verify before are sent again.
     pub(crate) fn on_authentic(&mut self, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
@@ -233,7 +234,7 @@ impl Node {
         }
     }
 
-    /// Handles a handshake of node `from` at `side` that leaves open if the node receives this relay.
+    /// Handles a handshake of node `from` at `side` that does not prove that the node receives this relay.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {
@@ -241,7 +242,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake in the name of node `from` at `side` that is signed with another key.
+    /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. Reports
+    /// it.
     pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -254,13 +256,13 @@ impl Node {
         }
     }
 
-    /// Records that node `from` at `side` signs with this relay's key.
+    /// Records that node `from` at `side` signs with the same key as this relay.
     pub(crate) fn on_key_match(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         self.layers.neighbours.at_mut(side).on_key_match(distance);
     }
 
-    /// Reports that node `from` at `side` uses an older epoch than before.
+    /// Reports that node `from` at `side` signs with an older epoch (start counter) than before.
     pub(crate) fn on_epoch_went_back(&mut self, side: Side, from: u16) {
         self.raise_node_event(NodeEvent::Epoch, side, from);
     }
@@ -276,7 +278,8 @@ impl Node {
         Side::back(self.member.mission.heading())
     }
 
-    /// Returns the side of node `sender` if it is a neighbour, a candidate, or an accepted ground station.
+    /// Returns the side of node `sender`. `None` unless it is a neighbour, a possible neighbour, or a ground station
+    /// that may upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
@@ -293,7 +296,8 @@ impl Node {
         })
     }
 
-    /// Returns the side of `node` if it is a ground station that this relay may receive.
+    /// Returns the side of `node` if it is Tx or Rx, and this relay accepts its messages; else `None`. Tx and Rx are
+    /// the ground stations.
     pub(super) fn ground_side(&self, node: u16) -> Option<Side> {
         let (own, all) = (self.member.node, self.member.all);
         let most = match self.member.settings.wiring {
@@ -308,13 +312,13 @@ impl Node {
         }
     }
 
-    /// Returns true on a shared channel, on which other nodes than the neighbours can be received.
+    /// Returns true on a shared channel. There a relay receives many nodes, and has to select its neighbours.
     pub(super) fn searches(&self) -> bool {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` received at port `through`. An index received at both ports is used by two
-    /// nodes.
+    /// Handles a frame of node `from` received at port `through`. If the node is already received at the other port,
+    /// two nodes use the same number, which is reported.
     pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

@@ -51,7 +51,7 @@ mod timers;
 #[cfg(test)]
 mod tests;
 
-/// Claim to a node's index that is to be repeated to its sender: side, destination node and claim.
+/// Claim to a node number that must be sent back to its sender: side, destination node, and claim.
 pub(crate) type Echo = (Side, u16, Claim);
 
 #[derive(Clone, Debug)]
@@ -61,9 +61,9 @@ pub(crate) struct Node {
     pub(super) steering: Steering,
     pub(super) duplicate: IndexClaims,
     pub(super) no_quorum_timer: NoQuorumTimer,
-    /// Claim to a node's index that was received and is to be repeated to its sender.
+    /// Received claim to a node number that must be sent back to its sender; `None` if there is none.
     pub(super) echo: Option<Echo>,
-    /// Side to which this relay sends the next claim to its index.
+    /// Side to which this relay sends the next claim to its node number.
     pub(super) claim_side: Side,
     /// Votes on views (acceptor state) that the firmware has confirmed as stored.
     persisted: ViewRecord,
@@ -75,9 +75,10 @@ fn seed_of(identity: Identity, seed: u32) -> u32 {
 }
 
 impl Node {
-    /// Creates a relay with valid `identity` and `settings`; [`begin`](Self::begin) starts it.
+    /// Creates a relay with valid `identity` and `settings`. It does nothing until [`begin`](Self::begin).
     ///
-    /// The value consists of plain numbers only, so that it is written in place.
+    /// The value consists of plain numbers only, so that the compiler can write it in place, without a copy on the
+    /// stack.
     pub(crate) fn new(
         mission: &Mission,
         identity: Identity,
@@ -207,7 +208,7 @@ impl Node {
         }
     }
 
-    /// Replaces the interference of the active mission by the new estimate.
+    /// Replaces the interference in the active mission by the current estimate, and reports it.
     fn apply_estimate(&mut self) {
         let estimate = self.layers.round.sensing().estimate();
         let Member {
@@ -244,7 +245,8 @@ impl Node {
         &self.member
     }
 
-    /// Returns the geographic sites of Tx and Rx of the active mission, if it has its own.
+    /// Returns the positions of Tx and Rx that the active mission has of its own. `None` if the configured positions
+    /// apply.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.layers.update.sites()
     }
@@ -265,7 +267,7 @@ impl Node {
         &mut self.telemetry.stats
     }
 
-    /// Returns the votes on views (acceptor state) if they differ from those that are stored.
+    /// Returns the current votes on views (acceptor state) if they are not stored yet; else `None`.
     pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
         let record = self.view_record();
         (record != self.persisted).then_some(record)
@@ -302,7 +304,8 @@ impl Node {
         }
     }
 
-    /// Starts the search for the target SIR again. It has an effect only at the leader, outside a view change.
+    /// Starts the search for the best target SIR again. Has an effect only at the leader, and not during a view
+    /// change.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
         let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
@@ -324,8 +327,8 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Returns the state that a protocol layer receives. It borrows only `member`, so that each layer can be borrowed
-    /// mutably meanwhile.
+    /// Returns the state that is passed to a protocol layer. It borrows only `member`, so that the layers can be
+    /// borrowed mutably at the same time.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {
@@ -337,14 +340,15 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` comes too early: it leaves out relays soon to be linked. Its
-    /// sender was linked a moment ago, and the proposal has visited fewer relays than the last one.
+    /// Returns true if a view proposal from `side` is too early, because it would leave out relays. These are about
+    /// to be linked: the proposal's sender has just been linked, and the proposal has visited fewer relays than the
+    /// last one.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
-    /// Schedules outstanding messages again, because the next relay can be reached again.
+    /// Schedules all messages whose reply is outstanding again. Called when the next relay can be reached again.
     pub(super) fn resend(&mut self) {
         self.view.resend();
         self.round.resend();
@@ -356,19 +360,19 @@ impl Layers {
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True once the expiry of a lease has been reported since the last view.
+    /// True if the expiry of a lease has been reported already in this view.
     pub(super) lapse_reported: bool,
-    /// True once a missing quorum has been reported since the last view.
+    /// True if a missing quorum has been reported already since the last accepted view.
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time for which a part of the chain without a quorum first keeps its links, in `dead_after`.
+/// Wait before relays without a quorum drop their links for the first time, in units of `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time for which a part of the chain without a quorum later keeps its links, in `dead_after`.
+/// Wait before relays without a quorum drop their links again, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
-/// Timer after which a part of the chain without a quorum drops its links and searches again.
+/// Timer after which relays without a quorum drop their links and search for neighbours again.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NoQuorumTimer {
     /// Expiry of the timer; `None` while there is a quorum.
@@ -388,7 +392,7 @@ impl NoQuorumTimer {
 }
 
 impl Node {
-    /// Starts the timer for dropping links if this part of the chain has no quorum, else stops it.
+    /// Starts the timer for dropping links if there is no quorum on a shared channel, else stops it.
     pub(super) fn update_no_quorum_timer(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
             self.no_quorum_timer = NoQuorumTimer::NONE;
@@ -409,7 +413,7 @@ impl Node {
         settings.dead_after.times(times).max(pass)
     }
 
-    /// Drops the links to both neighbours if there has been no quorum for too long.
+    /// Drops the links to both neighbours if there has been no quorum for too long (timer expired).
     pub(super) fn drop_links_if_expired(&mut self, now: Instant) {
         if self.no_quorum_timer.at.is_none_or(|at| now < at) {
             return;

@@ -12,8 +12,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// Handles a message from the ground station at `side`. Returns false if a ground station may not send this kind
-    /// of message.
+    /// Handles a message from the ground station at `side`, Tx or Rx. Returns false if a ground station may not send
+    /// this kind of message.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,
@@ -56,7 +56,8 @@ impl Node {
         true
     }
 
-    /// Returns the pending hello or requested upload for the ground station at `side`, and its node number.
+    /// Returns the next message for the ground station at `side`, and the station's node number. The message is a
+    /// hello, or the uploaded mission that the station has requested; `None` if neither is pending.
     pub(super) fn next_report(&mut self, now: Instant, side: Side) -> Option<(u16, Message)> {
         let to = match side {
             Side::Upstream => 0,
@@ -81,7 +82,8 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `offer_number` is that of a recent hello of this relay. Otherwise counts the offer as stale.
+    /// Returns true if `offer_number` is the number of a recent hello of this relay. Otherwise counts the offer as
+    /// stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers
@@ -93,10 +95,11 @@ impl Node {
         asked
     }
 
-    /// Handles an offer of a mission from node `from` at `side`, whose loaded mission is this relay's.
+    /// Handles an offer of a mission from node `from` at `side`. Both have loaded the same mission before flight.
     ///
-    /// This relay answers an offer in time only if it then has that mission or a newer one, or refuses it. Any other
-    /// answer would trigger the same offer again.
+    /// An offer that repeats no recent number is answered by a hello, which the next offer can answer. After any
+    /// other offer a hello is sent only if this relay has stored or refused the mission, or has a newer one.
+    /// Otherwise the hello would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -123,8 +126,8 @@ impl Node {
         }
     }
 
-    /// Stores `upload` if it is newer than the stored mission. A mission without a valid line on earth, or beyond the
-    /// geofence, is refused, counted and reported once.
+    /// Stores `upload` if it is newer than the stored mission. Refuses it, counts it, and reports it once if it does
+    /// not fit the line from Tx to Rx or the geofence.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
             Offered::Stored => self.on_stored(now),
@@ -171,7 +174,8 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles the report of the neighbour at `side` that it, or a relay beyond it, has refused a mission.
+    /// Handles a neighbour's report that the mission `refused` is refused. That neighbour refuses it, or a relay
+    /// beyond.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
         if !is_held || !accepts_uploads(&self.member) {
@@ -187,8 +191,8 @@ impl Node {
         }
     }
 
-    /// Compares the mission that the neighbour `from` at `side` holds with this relay's newest one. If the
-    /// neighbour's is older, schedules an offer; if it is newer, a hello that requests an offer.
+    /// Compares `holds`, the mission that node `from` at `side` has stored, with this relay's newest one. If `holds`
+    /// is older, schedules an offer; if it is newer, a hello that requests an offer.
     pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;
@@ -214,8 +218,8 @@ impl Node {
         }
     }
 
-    /// Returns the pending offer to the neighbour at `side`. An offer must answer a recent hello; if there is none, a
-    /// hello that requests one is returned instead.
+    /// Returns the pending mission offer to the neighbour at `side`. An offer must answer a recent hello; without
+    /// one, a hello that requests a hello is returned instead.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

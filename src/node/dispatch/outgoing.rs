@@ -6,7 +6,7 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 impl Node {
-    /// Returns the next message with its side and its destination node; call it until it returns `None`.
+    /// Returns the next message, with the side and the node to send it to. Call it until it returns `None`.
     pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         if self.member.settings.auth.is_none()
             && let Some(claim) = self.next_claim()
@@ -51,7 +51,8 @@ impl Node {
         ))
     }
 
-    /// Returns the next message of a view change, a lease renewal or an agreement on positions.
+    /// Returns the next message of a view change, a lease renewal or an agreement on positions. It comes with its
+    /// side and its destination.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {

@@ -9,7 +9,8 @@ use crate::side::Side;
 use crate::time::Instant;
 
 impl Node {
-    /// Returns the agreed position or, without a quorum, the position by `Settings::without_quorum`.
+    /// Returns the agreed position, changed as `Settings::without_quorum` requires if there is no quorum. `None`
+    /// before the first agreement.
     fn wanted_place(&self) -> Option<Placement> {
         let agreed = self.layers.round.agreed_place()?;
         Some(if self.layers.view.has_no_quorum() {
@@ -30,8 +31,7 @@ impl Node {
         self.steer(now);
     }
 
-    /// Handles the control state of the drone: `flown` is true while it flies to the setpoints. Returns true if the
-    /// guard did not know this.
+    /// Records if the drone follows the setpoints now (`flown`). Returns true if that is a change.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.steering.handle_control(now, flown);
         if is_news {
@@ -40,8 +40,8 @@ impl Node {
         is_news
     }
 
-    /// Handles the report that the lost relays at `side` are not in the air any more. The report does not concern the
-    /// present members of the view.
+    /// Handles the report that the lost relays at `side` have left the air. It does not concern relays that are
+    /// members of the view.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
         let Member { index, mission, .. } = &self.member;
         let in_view = match side {
@@ -57,7 +57,7 @@ impl Node {
         self.layers.round.agreed_place()
     }
 
-    /// Returns the current setpoint; `None` while the relay is passive.
+    /// Returns the current setpoint. `None` before the first agreement, and while the relay is passive.
     pub(crate) fn setpoint(&self) -> Option<Placement> {
         if self.is_passive() {
             return None;
@@ -65,7 +65,8 @@ impl Node {
         self.steering.setpoint(self.wanted_place())
     }
 
-    /// Returns the position of the next node at `side`: the agreed one of a relay, or an end of the line. `None` while unknown.
+    /// Returns the position of the next node at `side`: a relay's agreed position, or that of Tx or Rx. `None` if it
+    /// is unknown.
     pub(crate) fn place_toward(&self, side: Side) -> Option<Placement> {
         if !self.layers.neighbours.at(side).has_no_peer() {
             return self.steering.neighbour_place(side);

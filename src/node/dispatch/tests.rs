@@ -36,7 +36,7 @@ pub(super) fn upload_to(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Returns relay 2 of 3 as a node for the tests, with a key if it `signs`.
+/// Returns relay 2 of a chain of 3; with an authentication key if `signs`.
 pub(super) fn relay(signs: bool) -> Node {
     relay_of(base(), 2, signs)
 }
@@ -78,7 +78,8 @@ pub(super) fn sent_messages(node: &mut Node) -> heapless::Vec<(u16, Message), 8>
     said
 }
 
-/// Returns a hello of a neighbour that has selected relay 2.
+/// Returns a hello of a node that has selected relay 2 as its neighbour. `holds` is the newest mission that it has
+/// stored.
 pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
         mission: node.member.digest,
@@ -100,7 +101,7 @@ pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
 
 const LENGTH: usize = Upload::LENGTH;
 
-/// Identifier of the first view (agreed set of members) that relay 1 proposes.
+/// Identifier of the first view that relay 1 proposes: view number 1, proposer 1.
 const FIRST: ViewId = ViewId::from_bits(1 << 10 | 1);
 
 fn proposal(mission_id: MissionId) -> Message {
@@ -119,7 +120,7 @@ fn proposal(mission_id: MissionId) -> Message {
     })
 }
 
-/// Returns an offer that answers a hello which `node` sends at `NOW`.
+/// Returns a valid mission offer to `node`. It repeats the number of a hello that `node` sends at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
     let offer_number = node.layers.update.next_offer_number(NOW, &node.member);
     Message::Offer {
@@ -128,7 +129,7 @@ fn offer(node: &mut Node, upload: Upload) -> Message {
     }
 }
 
-/// Returns an offer to a node whose last hello had the number `offer_number`.
+/// Returns a mission offer that answers the hello with the number `offer_number`.
 fn offered(upload: Upload, offer_number: u16) -> Message {
     Message::Offer {
         upload,
@@ -276,7 +277,8 @@ fn an_offer_for_other_relays_is_refused() {
     );
 }
 
-/// Checks that offers and hellos between two nodes end if only one node has selected the other one.
+/// Checks that an offer of a node that is not this relay's neighbour is answered by one hello only. Offers and hellos
+/// between the two would otherwise never end.
 #[test]
 fn an_offer_of_an_unselected_node_is_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();
@@ -307,7 +309,8 @@ fn an_offer_of_an_unselected_node_is_answered_once() {
     );
 }
 
-/// Checks that an offer that arrives too late only triggers a hello. An offer that answers that hello is accepted.
+/// Checks that an offer that arrives too late is answered by a hello only. A new offer that answers that hello is
+/// accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
     let late = |seconds: u64| {
@@ -367,7 +370,7 @@ fn a_stored_upload_does_not_contain_the_offer_number() {
     assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
 }
 
-/// Returns a hello of node 1, which receives the nodes in `hears`.
+/// Returns a hello of node 1. `hears` is the bit set of the nodes that it receives.
 fn hello_of(node: &Node, hears: u8) -> Message {
     let Message::Hello(hello) = hello(node, node.layers.update.latest()) else {
         unreachable!();

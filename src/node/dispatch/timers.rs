@@ -9,7 +9,7 @@ use crate::side::Side;
 use crate::time::Instant;
 
 impl Node {
-    /// Handles expired timers, each protocol layer once. Work: at most one portion of a long computation.
+    /// Handles the expired timers of all protocol layers. Work: at most one step of a long computation.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         if self.duplicate.handle_timeout(now, &self.member.settings) {
             self.become_active(now);
@@ -84,7 +84,7 @@ impl Node {
         let lost = neighbour.handle_timeout(now, settings, dead, searches, asking);
         let ends = neighbour.has_no_peer() && !ended;
         self.steering
-            .link(side, Some(neighbour.node()).filter(|node| *node != 0));
+            .set_neighbour(side, Some(neighbour.node()).filter(|node| *node != 0));
         if lost {
             self.raise_node_event(NodeEvent::Lost, side, node);
         }
@@ -109,15 +109,15 @@ impl Node {
         }
     }
 
-    /// Returns true while this relay computes by the joint method, as all relays of its view do.
+    /// Returns true while this relay computes its solution of the chain by the joint method.
     fn is_solving(&self, now: Instant) -> bool {
         self.layers
             .round
             .is_solving(&self.layers.context(now, &self.member))
     }
 
-    /// Restarts the timers for neighbours and for the first pass, after a computation by the joint method. During the
-    /// computation these timers do not count.
+    /// Restarts the timers for silent neighbours and the first pass, after the joint method's computation. They must
+    /// not expire because of the time that all relays spend computing.
     fn on_solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);
@@ -128,12 +128,13 @@ impl Node {
         }
     }
 
-    /// Returns true if no pass along the chain was received and no view was requested since the start.
+    /// Returns true if, since its start, this relay has received no pass and requested no view.
     fn awaits_first(&self) -> bool {
         self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }
 
-    /// Starts the timer for the first pass (message along the chain). When it expires, the relay requests a view.
+    /// Starts the timer for the first pass along the chain. If no pass arrives before it expires, the relay requests
+    /// a view.
     pub(super) fn await_first(&mut self, now: Instant) {
         let (settings, all) = (&self.member.settings, self.member.all);
         let there_and_back = settings.hop_time.times(2 * u32::from(all));

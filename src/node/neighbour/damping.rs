@@ -23,22 +23,22 @@ use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum number of doublings of the time for which a flapping link is not used (hold-down).
+/// Maximum number of times that the hold-down of a link doubles. During the hold-down a flapping link is not used.
 const MAX_DOUBLINGS: u8 = 3;
 
-/// Longest time for which a flapping link is not used (hold-down), in units of `dead_after`.
+/// Maximum hold-down of a link, in units of `dead_after`. During the hold-down a flapping link is not used.
 const MAX_HOLD_DOWN: u32 = 6;
 
-/// Maximum number of losses after which a link does not count as flapping yet.
+/// Number of recent losses up to which a link does not yet count as flapping.
 const MAX_FORGIVEN: u8 = 2;
 
-/// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
+/// Minimum time between the last two losses of a link that flaps slowly, in units of `dead_after`.
 const SLOW_INTERVAL: u32 = 10;
 
-/// Time after the last loss at which losses are forgotten, in units of `dead_after`.
+/// Time without a loss after which a link's earlier losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
-/// Node from which frames have been received, with the times of the first and the last one.
+/// Node that is received without a gap, with the times of the first and the last frame.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     distance: u16,
@@ -47,8 +47,8 @@ struct Heard {
 }
 
 impl Heard {
-    /// Returns the record after a frame at `now` from the node at `distance`. A silence of more than `gap`, or
-    /// another node, starts the record again.
+    /// Returns `known` updated by a frame at `now` from the node at `distance`. It starts again with this frame after
+    /// a silence of more than `gap`, or if `known` is of another node.
     fn updated(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
             Some(known) if known.distance == distance && now.since(known.last) <= gap => {
@@ -64,7 +64,7 @@ impl Heard {
     }
 }
 
-/// Losses of the link to one node, from which a flapping link is recognised.
+/// Losses of the link to one node. A link with many recent losses counts as flapping, and is not used for a while.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     /// Time at which the link was lost last.
@@ -92,7 +92,7 @@ impl Link {
         }
     }
 
-    /// Returns the number of losses of the link, or 0 if the last one was long ago.
+    /// Returns the number of losses of the link; 0 if the last loss was long ago.
     #[inline(never)] // called from many places
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
         if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
@@ -102,7 +102,8 @@ impl Link {
         }
     }
 
-    /// Returns true if the link may not be used yet (hold-down), because it was lost repeatedly.
+    /// Returns true while the link must not be used (hold-down), because it was lost repeatedly. The hold-down ends
+    /// once the node has been received without a gap for long enough.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(MAX_FORGIVEN + 1) else {
             return false;
@@ -112,7 +113,7 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link after `losses` earlier losses. The loss itself counts if `counted` is true.
+    /// Records a loss of the link, whose loss count was `losses` before. The count grows only if `counted` is true.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -129,10 +130,10 @@ impl Link {
     }
 }
 
-/// Losses of the links to the nodes on one side, nearest node first.
+/// Losses of the links to the four nearest nodes on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that may be selected as neighbour once it has been heard for long enough.
+    /// Node that may be selected as the neighbour once it has been received for long enough.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -145,7 +146,8 @@ impl Damping {
         }
     }
 
-    /// Starts the record of losses at `now`, in place. A copy would need more stack than any other start-up step.
+    /// Forgets all losses, at `now`, the relay's start. It works in place, because a copy would need more stack than
+    /// any other step of the start.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);
@@ -160,9 +162,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the link to the node `distance` relays away. `counts` is false if the channel loses many
-    /// frames; the loss then counts only if the link flapped before. The link inherits the losses of a flapping link
-    /// on this side, because both cross the same gap in the chain.
+    /// Records the loss of the link to the node `distance` relays away. On a channel that loses many frames (`counts`
+    /// is false) only the loss of a flapping link counts. If another link on this side flaps, this link takes over
+    /// its loss count, because all links of a side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -178,9 +180,9 @@ impl Damping {
         }
     }
 
-    /// Records a frame from the node `distance` relays away. While the side has no neighbour, `searching_since` is
-    /// the start of the search. The link to a candidate that has answered the search, and then was silent for longer
-    /// than `gap`, counts as lost.
+    /// Records a frame from the node `distance` relays away, and detects losses by the silence before it.
+    /// `searching_since` is the start of the search, `None` if this side has a neighbour. During a search, a link
+    /// counts as lost if its node has answered and then was silent for longer than `gap`.
     pub(super) fn record_hello(
         &mut self,
         distance: u16,
@@ -210,15 +212,15 @@ impl Damping {
         link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered the search for a neighbour, which began at `since`. False until the
-    /// search has lasted for `probe_after`.
+    /// Returns true if no node has answered the search for a neighbour, which began at `since`. It returns false
+    /// until `probe_after` has passed.
     fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the number of losses of every link to that of the link that was lost last. The cause is the same,
-    /// because all links cross the same gap in the chain.
+    /// Raises the loss count of every link on this side to that of the link that was lost last. All links of a side
+    /// cross the same gap in the chain, so they were lost together. Higher counts stay.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
@@ -232,14 +234,14 @@ impl Damping {
         }
     }
 
-    /// Returns true if the link to the node `distance` relays away is held down: not used, as it flaps.
+    /// Returns true while the link to the node `distance` relays away must not be used, because it flaps.
     pub(super) fn is_held_down(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let link = self.link(distance);
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if a link on this side flaps slowly, so that its next loss should be noticed early. Such a link
-    /// was lost more than [`MAX_FORGIVEN`] times, and stays up for long each time.
+    /// Returns true if a link on this side flaps slowly: it was lost repeatedly, at long intervals. Its next loss
+    /// should then be noticed early.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -247,25 +249,27 @@ impl Damping {
         self.links.iter().any(is_slow)
     }
 
-    /// Returns true if the last loss of the link to the node `distance` relays away was an outage.
+    /// Returns true if the last loss of the link to the node `distance` relays away was an outage. After an outage no
+    /// frame of the node was received for more than `dead_after`.
     pub(super) fn was_down(&self, distance: u16) -> bool {
         self.link(distance).is_some_and(|link| link.was_down)
     }
 
-    /// Returns the nodes whose flapping links are not used (held down), as a bit mask. Bit 0 is the nearest node.
+    /// Returns the nodes whose links are in hold-down, as a bit mask. Their links flap and are not used; bit 0 is the
+    /// nearest node.
     pub(super) fn held_down_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         (1..=CANDIDATES)
             .filter(|distance| self.is_held_down(*distance, now, settings))
             .fold(0, |held, distance| held | mask(distance))
     }
 
-    /// Forgets the node that was a candidate for the neighbour.
+    /// Forgets the node that was about to be selected as the neighbour.
     pub(super) const fn clear(&mut self) {
         self.candidate = None;
     }
 
-    /// Records that the candidate `distance` relays away is heard now. Returns true if it has been heard long enough
-    /// without a gap: for `probe_after`, or for `more` if that is longer.
+    /// Records a frame of the candidate `distance` relays away. Returns true if the candidate has been received
+    /// without a gap for `probe_after`, or for `more` if that is longer.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,
@@ -300,13 +304,14 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// Returns the record of a side without losses, the time 1 000 s, and the default settings.
+    /// Returns a test's start: a side without losses, the current time (1 000 s), and the default settings.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())
     }
 
-    /// Simulates an outage of 40 s of the link to the nearest node; the nodes at `heard` answer the search.
+    /// Simulates a loss of the link to the nearest node for 40 s. The nodes at the distances `heard` answer the
+    /// search meanwhile.
     fn outage(side: &mut Damping, now: &mut Instant, heard: &[u16], settings: &Settings) {
         let search = *now;
         side.record_loss(1, true, search, settings);

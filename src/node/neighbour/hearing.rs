@@ -6,18 +6,18 @@ use crate::time::{Duration, Instant};
 /// Number of nearest nodes on one side that may become the neighbour and are sent hellos.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Interval after which a report about the same node is repeated.
+/// Minimum interval between two reports about the same node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// Numbers of consecutive occurrences of an event, for each of the nearest nodes, nearest first.
+/// Numbers of times in a row that an event has occurred, for each of the four nearest nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
 impl ConsecutiveCounts {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// Counts an event of the node `distance` relays away, or resets its count if `occurred` is false. Returns true
-    /// if the event is exactly number `most` in a row.
+    /// Counts an event of the node `distance` relays away; resets the count if `occurred` is false. Returns true if
+    /// the count reaches `most` now.
     pub(super) fn count(&mut self, distance: u16, occurred: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {
@@ -41,7 +41,7 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Limiter of reports about nodes on one side: one report a minute for each node.
+/// Limiter of reports about nodes on one side: at most one report a minute for each node.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ReportLimiter {
     since: Instant,
@@ -54,7 +54,8 @@ impl ReportLimiter {
         nodes: 0,
     };
 
-    /// Returns true if the node `distance` relays away has not been reported in this minute. Marks it as reported.
+    /// Returns true if the node `distance` relays away may be reported now, and marks it as reported. It may be
+    /// reported once a minute.
     pub(super) fn should_report(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
             *self = Self {
@@ -68,7 +69,8 @@ impl ReportLimiter {
     }
 }
 
-/// Returns the bit of the node `distance` relays away, 1 to 4, in a mask of nodes; else 0.
+/// Returns the bit of the node `distance` relays away in a mask of nodes. 0 if it is not one of the four nearest
+/// nodes.
 pub(super) const fn mask(distance: u16) -> u8 {
     if distance >= 1 && distance <= CANDIDATES {
         1 << (distance - 1)
@@ -91,7 +93,8 @@ impl Hearing {
         self.now |= mask(distance);
     }
 
-    /// Returns the nodes received in the last one to two `probe_after`, as a bit mask.
+    /// Returns the nodes received recently, as a bit mask; bit 0 is the nearest node. A node counts for one to two
+    /// times `probe_after`.
     pub(super) fn recent(mut self, now: Instant, settings: &Settings) -> u8 {
         self.age(now, settings);
         self.now | self.before
@@ -110,8 +113,8 @@ impl Hearing {
     }
 }
 
-/// Pending hellos to the nearest nodes on one side, as bit masks: all, and those that want an answer. Bit 0 is the
-/// nearest node.
+/// Pending hellos to the four nearest nodes on one side, as bit masks; bit 0 is the nearest node. One mask has all
+/// pending hellos, the other those that request an answer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     due: u8,
@@ -136,8 +139,8 @@ impl Hellos {
         self.reply = 0x0F;
     }
 
-    /// Returns the distance of the nearest node with a pending hello, in relays. The second value is true if the
-    /// hello requests an answer.
+    /// Returns the distance, in relays, of the nearest node with a pending hello, and marks it as sent. The second
+    /// value is true if the hello requests an answer. `None` if no hello is pending.
     pub(super) fn poll(&mut self) -> Option<(u16, bool)> {
         let distance = (1..=CANDIDATES).find(|distance| self.due & mask(*distance) != 0)?;
         let bit = mask(distance);

@@ -18,36 +18,36 @@ use crate::node::context::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Minimum number of unanswered heartbeat requests (questions) before a neighbour is lost.
+/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor on the longest recent run of unanswered heartbeat requests. A neighbour is lost only after a run that is
-/// this factor longer.
+/// Factor that tells a lost neighbour from lost frames. A neighbour counts as lost only after three times as many
+/// unanswered requests as in the longest recent run.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between heartbeat requests to a silent neighbour. It is the round trip through a chain of
-/// `all` relays, which share one channel, or less: sixteen or more requests fit before `dead_after`.
+/// Returns the interval between heartbeat requests to a silent neighbour. It is the round trip through `all` relays,
+/// which share one channel, but short enough for sixteen requests between `probe_after` and `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
 
 /// Returns the interval between heartbeat requests while many relays have no agreement yet.
 ///
-/// The relays share one channel, so the interval is longer than usual: three or more requests fit before
-/// `dead_after`.
+/// It is longer than usual, because all of them search on one channel, but short enough for three requests between
+/// `probe_after` and `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
 
-/// Returns the time between `probe_after` and `dead_after`, µs.
+/// Returns `dead_after` minus `probe_after`, in microseconds.
 const fn waiting(settings: &Settings) -> u64 {
     let dead = settings.dead_after.as_micros();
     dead.saturating_sub(settings.probe_after.as_micros())
 }
 
-/// Returns `number` / 3, rounded down, by divisions of 32 bits.
+/// Returns `number` / 3, rounded down, by 32-bit divisions.
 ///
-/// The compiler's division of 64 bits would add 0.9 KB to an image.
+/// The compiler's 64-bit division would add 0.9 KB to a firmware image.
 fn third(number: u64) -> u64 {
     let [a, b, c, d, e, f, g, h] = number.to_le_bytes();
     let low = u32::from_le_bytes([a, b, c, d]);
@@ -58,7 +58,7 @@ fn third(number: u64) -> u64 {
     u64::from(high / 3) << 32 | u64::from(rest)
 }
 
-/// Returns the round trip through a chain of `all` relays, but at most `most_micros`, in microseconds.
+/// Returns the round trip through a chain of `all` relays, limited to `most_micros` microseconds.
 #[inline(never)] // called from both
 fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     let least = waiting(settings) / 64 + 1;
@@ -67,38 +67,39 @@ fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     Duration::from_micros(micros)
 }
 
-/// Returns the silence after which a heartbeat is requested. It is `Settings::probe_after`, or the round trip through
-/// a chain of `all` relays if that is longer.
+/// Returns the silence of a neighbour after which a heartbeat is requested. It is `Settings::probe_after`, or the
+/// round trip through a chain of `all` relays if that is longer.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Number of past heartbeat requests whose answers are accepted.
+/// Number of the last heartbeat requests to which an answer is accepted.
 const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Time of the neighbour's last sign of life, or of this relay's start.
+    /// Time of the neighbour's last sign of life; at first the time of this relay's start.
     last_sign: Instant,
     lost: bool,
-    /// True once a frame of the neighbour has been received since the start or its last loss.
+    /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.
     was_received: bool,
-    /// Number of the last heartbeat request (question) to the neighbour, 0 before any.
+    /// Number of the last heartbeat request to the neighbour, 0 before any.
     request_number: u16,
     /// Times of the last heartbeat requests, latest first.
     request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour's last sign of life.
     unanswered: u16,
-    /// Recent maximum of `unanswered` at an answer, which shows how bad the channel is. It starts at [`MIN_REQUESTS`],
-    /// so that a channel that is not known yet counts as a bad one, and decays with each answer.
+    /// Longest recent run of unanswered heartbeat requests that ended with an answer. It shows how many frames the
+    /// channel loses. It starts at [`MIN_REQUESTS`], so that an unknown channel counts as a bad one, and decays with
+    /// each answer.
     longest: u16,
 }
 
 /// Result of the check of a neighbour's silence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Silence {
-    /// True if the neighbour is lost from this moment on.
+    /// True if the neighbour has become lost by this check.
     pub(crate) lost: bool,
     /// Time of the next check, later than now.
     pub(crate) next_check: Instant,
@@ -123,9 +124,9 @@ impl Liveness {
         }
     }
 
-    /// Starts again with another node as neighbour, and keeps the longest run of unanswered requests. The run that
-    /// has just ended counts: it was too short to prove a loss if the previous node is alive. If the link `was_down`,
-    /// the last run measures an outage and is dropped. If the link `flaps` slowly, all runs are dropped.
+    /// Starts again with another node as the neighbour. It keeps the longest run of unanswered requests, which
+    /// describes the channel. The unanswered requests to the previous node count as a run, unless the link
+    /// `was_down`, because then they measure an outage. If the link `flaps` slowly, all runs are dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS
@@ -145,22 +146,22 @@ impl Liveness {
         self.last_sign
     }
 
-    /// Returns true if the neighbour has been heard and is not lost.
+    /// Returns true if the neighbour has been received and is not lost.
     pub(crate) const fn is_present(&self) -> bool {
         self.was_received && !self.lost
     }
 
-    /// Returns true if the neighbour is lost and has not been received again.
+    /// Returns true if the neighbour is lost and nothing has been received from it since.
     pub(crate) const fn is_silent(&self) -> bool {
         self.lost && !self.was_received
     }
 
-    /// Returns the longest silence that lost frames alone plausibly cause, with a request every `tick`.
+    /// Returns the longest silence that lost frames alone can explain, with one request every `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }
 
-    /// Returns true if few frames were lost on the channel recently.
+    /// Returns true if the channel has lost few frames recently.
     pub(crate) const fn loses_few_frames(&self) -> bool {
         self.longest <= MIN_REQUESTS
     }
@@ -170,7 +171,7 @@ impl Liveness {
         self.was_received = true;
     }
 
-    /// Records that the neighbour was alive at time `at`. Returns true if it had been lost until now.
+    /// Records that the neighbour was alive at time `at`. Returns true if it was lost until now.
     pub(crate) fn record_sign_of_life(&mut self, at: Instant) -> bool {
         self.last_sign = self.last_sign.max(at);
         self.was_received = true;
@@ -180,7 +181,7 @@ impl Liveness {
         core::mem::take(&mut self.lost)
     }
 
-    /// Records a heartbeat request (question) sent at `now`, and returns its number.
+    /// Records a heartbeat request that is sent at `now`, and returns its number.
     pub(crate) const fn next_request(&mut self, now: Instant) -> u16 {
         self.request_number = match self.request_number.wrapping_add(1) {
             0 => 1,
@@ -192,7 +193,7 @@ impl Liveness {
         self.request_number
     }
 
-    /// Returns the time at which heartbeat request `number` was sent, if it is one of the last four.
+    /// Returns the time at which the heartbeat request `number` was sent. `None` unless it is one of the last four.
     pub(crate) fn requested_at(&self, number: u16) -> Option<Instant> {
         if number == 0 || self.request_number == 0 {
             return None;
@@ -201,8 +202,7 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`, unless the neighbour is lost. Returns true if it
-    /// is not lost.
+    /// Measures the neighbour's silence from `now` on, unless the neighbour is lost. Returns true if it is not lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.last_sign = now;
@@ -210,8 +210,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks the neighbour's silence at `now`, and returns the result. The neighbour is not lost before a silence of
-    /// `dead`; `tick` is the time to the next check.
+    /// Checks at `now` if the neighbour is lost. It is not lost before a silence of `dead`. `tick` is the time to the
+    /// next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

@@ -32,7 +32,8 @@ impl Neighbours {
         downstream: Neighbour::NONE,
     };
 
-    /// Starts both sides of node `node`, in a chain of `all` relays, at time `now`.
+    /// Starts both sides of relay `node` at `now`. The first neighbours are the relays with the next node numbers, in
+    /// a chain of `all` relays.
     pub(crate) fn begin(
         &mut self,
         node: u16,
@@ -75,20 +76,20 @@ impl Neighbours {
         self.upstream.has_changed(now) || self.downstream.has_changed(now)
     }
 
-    /// Leaves the view: neither side has an agreed neighbour until the next agreement.
+    /// Leaves the view. Until the next view, no side has a neighbour that belongs to a view.
     pub(crate) const fn leave(&mut self) {
         self.upstream.leave();
         self.downstream.leave();
     }
 
-    /// Records on both sides that a view proposal was refused.
+    /// Records on both sides that a view proposal was refused with the current neighbours.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();
     }
 
-    /// Returns the next pending heartbeat as (side, destination, number of its question, answered number). The last
-    /// is the number of the neighbour's question that it answers. A number is 0 for none.
+    /// Returns the next pending heartbeat: its side, its destination, and two numbers; 0 means none. The first number
+    /// is that of a request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

@@ -38,9 +38,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// Linked: this relay has selected a node, which has selected this relay by its last report.
+    /// Linked: this relay and a node have selected each other as neighbours, by the node's last report.
     Linked,
-    /// Pairing: this relay has selected a node that has not, or no longer, selected this relay.
+    /// Pairing: this relay has selected a node, which has not, or no longer, selected this relay.
     Pairing {
         since: Instant,
     },
@@ -55,15 +55,15 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time until which the return of a node causes no request for a new view. Meanwhile its neighbour on the far
-    /// side may select it, too.
+    /// Time before which a newly selected node causes no request for a new view. Another relay, on the far side of
+    /// that node, may be about to select the node, too, and one view change for both is enough.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Node whose link was dropped because of a missing quorum, until another is selected; 0 for none.
+    /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
     dropped: u16,
-    /// Node farther away that the selected node has replaced as neighbour; 0 for none.
+    /// Previous neighbour, if the selected node has replaced it as the nearer one; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
@@ -71,21 +71,21 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
-    /// Node that each node on this side has selected as its neighbour toward this relay; 0 for none. The nearest node
-    /// is first.
+    /// Node that each of the four nearest nodes on this side has selected on its side toward this relay. 0 for none;
+    /// the nearest node is first.
     pub(super) selection: [u16; CANDIDATES as usize],
     /// Time of the last frame from a node on this side that is not selected.
     unselected_at: Option<Instant>,
     /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
-    /// Number of consecutive reports that this relay is not received, for each node on this side.
+    /// Number of consecutive hellos that do not list this relay as received, for each node on this side.
     pub(super) not_received: ConsecutiveCounts,
-    /// Nodes that were reported to the firmware as found since another node was linked or lost. Bit 0 is the nearest
-    /// node.
+    /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Reports go to the firmware;
+    /// bit 0 is the nearest node.
     reported_found: u8,
     /// Limiter of reports about nodes on this side that have another mission.
     pub(super) mismatches: ReportLimiter,
-    /// Numbers of consecutive handshakes in each node's name that were signed with another key.
+    /// Number of consecutive handshakes signed with another key, for each node on this side.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
@@ -93,15 +93,15 @@ pub(crate) struct Neighbour {
     patience: Duration,
     jitter: Jitter,
     pub(super) heartbeat: PendingHeartbeat,
-    /// Newest mission that the selected node has reported to hold; `None` if it has not.
+    /// Newest mission that the selected node has reported to have stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
-    /// Time of the next check of the neighbour's silence, or of the next step of the search.
+    /// Time of the next check of the neighbour's silence, or of the next hellos of the search.
     check_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
 
 impl Neighbour {
-    /// State of a side before the relay starts: all zeros. Any other value would be copied from flash.
+    /// State of a side before the relay starts. It is all zeros, because any other value would be copied from flash.
     pub(super) const NONE: Self = Self {
         node: 0,
         agreed: AgreedNodes::on(0),
@@ -130,7 +130,8 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts this side of the relay at `now`, with the neighbour `node`, 0 for none.
+    /// Starts this side of the relay at `now`. The node `node` is the neighbour that the mission configures; 0 for
+    /// none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -175,13 +176,12 @@ impl Neighbour {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true for a short time after a lost node was selected again. It then causes no request for a new view
-    /// yet.
+    /// Returns true for a short time after a node was selected. In that time it causes no request for a new view.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
 
-    /// Returns true if the selected node has been heard and is not lost.
+    /// Returns true if the selected node has been received and is not lost.
     pub(crate) const fn is_present(&self) -> bool {
         self.liveness.is_present()
     }
@@ -191,7 +191,7 @@ impl Neighbour {
         self.liveness.is_silent()
     }
 
-    /// Records that the neighbour was alive at time `at`. Returns true if it had been lost until now.
+    /// Records that the neighbour was alive at time `at`. Returns true if it was lost until now.
     pub(crate) fn record_sign_of_life(&mut self, now: Instant, at: Instant) -> bool {
         let back = self.liveness.record_sign_of_life(at);
         if self.is_mutual() {
@@ -205,7 +205,8 @@ impl Neighbour {
         back
     }
 
-    /// Returns true if this relay and a node have selected each other, by the last report of that node.
+    /// Returns true if this relay and the selected node have selected each other. The node's last report shows its
+    /// selection.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }
@@ -225,15 +226,15 @@ impl Neighbour {
         true
     }
 
-    /// Returns true if the selected node has not been reported as found yet, and marks it as reported.
+    /// Returns true if the selected node must be reported as found now, and marks it as reported.
     pub(crate) const fn should_report_found(&mut self) -> bool {
         let before = self.reported_found;
         self.reported_found |= mask(self.distance);
         self.reported_found != before
     }
 
-    /// Restarts the measurement of the silence of a neighbour in the same view at `now`. Returns true if there is
-    /// such a neighbour and it is not lost.
+    /// Measures the neighbour's silence from `now` on, if the neighbour is linked and a member of the view. Returns
+    /// true if so, and if the neighbour is not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -244,7 +245,7 @@ impl Neighbour {
         excused
     }
 
-    /// Returns true if the check of the neighbour's silence, or the next step of the search, is due.
+    /// Returns true if it is time to check the neighbour's silence, or to send the search's next hellos.
     pub(crate) fn is_due(&self, now: Instant) -> bool {
         self.check_at.is_some_and(|at| at <= now)
     }
@@ -253,9 +254,9 @@ impl Neighbour {
         self.check_at
     }
 
-    /// Handles the timer of this side; returns true if the neighbour is lost from now on. It is not lost before a
-    /// silence of `dead`. `can_search` is true if other nodes can be received here. `interval` replaces the usual
-    /// interval between heartbeat requests.
+    /// Handles the timer of this side. Returns true if the neighbour has become lost, which needs a silence of `dead`
+    /// or more. `can_search` is true on a shared channel, where other nodes can take its place. `interval` replaces
+    /// the usual interval between heartbeat requests.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -325,10 +326,10 @@ impl Neighbour {
         lost
     }
 
-    /// Returns the silence of a node after which the link to it counts as down.
+    /// Returns the silence of a node after which the link to it counts as lost.
     ///
-    /// Without a neighbour, and with no node received recently, hellos are sent only every `dead_after`. A few lost
-    /// frames then cause a silence that is several times as long, so the result is the maximum duration of a lease.
+    /// It is `dead_after`; but a side that receives no node sends hellos only every `dead_after`. A few lost frames
+    /// then cause a silence several times as long, so the limit is the maximum duration of a lease.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
         if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
             longest_lease(settings)
@@ -342,7 +343,7 @@ impl Neighbour {
             .is_some_and(|near| now.since(near) <= settings.dead_after)
     }
 
-    /// Records a frame of a node that is not selected. If this side has no neighbour, it sends its next hellos soon.
+    /// Records a frame of a node that is not selected. A side without a neighbour then sends its next hellos soon.
     pub(crate) fn record_unselected(&mut self, now: Instant, settings: &Settings) {
         if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
             self.check_at = Some(now + self.tick);
@@ -350,8 +351,8 @@ impl Neighbour {
         self.unselected_at = Some(now);
     }
 
-    /// Returns the start of the search while this side has no neighbour, else `None`. During the search this side
-    /// sends hellos to all candidates.
+    /// Returns the start of the search while this side has no neighbour; else `None`. In a search this side sends
+    /// hellos to the four nearest nodes.
     pub(super) const fn searching_since(&self) -> Option<Instant> {
         match self.state {
             NeighbourState::NoPeer | NeighbourState::Searching { .. } => Some(self.searches_since),
@@ -367,12 +368,13 @@ impl Neighbour {
         self.hellos.schedule_all();
     }
 
-    /// Returns true if `node` was given up for want of a quorum and no other node has been selected since.
+    /// Returns true if the link to `node` was dropped for want of a quorum. It returns false once another node has
+    /// been selected.
     const fn was_dropped(&self, node: u16) -> bool {
         node != 0 && self.dropped == node
     }
 
-    /// Drops the selected node and searches again, because this part of the chain has no quorum.
+    /// Drops the selected node and searches again, because the relays that can be reached have no quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -384,8 +386,8 @@ impl Neighbour {
         }
     }
 
-    /// Decides if the candidate, which has sent a hello, is selected as the neighbour; returns true if so. The
-    /// candidate receives this relay, and has selected this relay or none.
+    /// Selects `candidate`, which has sent a hello, as the neighbour if it is better; returns true if so. The
+    /// candidate receives this relay, and has selected this relay, no node, or a node farther away.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
@@ -446,7 +448,7 @@ impl Neighbour {
     }
 }
 
-/// Candidate for the neighbour on one side: a node that is not selected and receives this relay.
+/// Candidate for the neighbour on one side: an unselected node that receives this relay.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "four things that its hello says"
@@ -454,7 +456,7 @@ impl Neighbour {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub(crate) node: u16,
-    /// Distance of the node, in relays along the chain.
+    /// Distance of the candidate, in relays along the chain: 1 for the next node number.
     pub(crate) distance: u16,
     /// True if the candidate is toward Rx, false if it is toward Tx.
     pub(crate) downstream: bool,
@@ -462,28 +464,29 @@ pub(crate) struct Candidate {
     pub(crate) pairs: bool,
     /// True if the candidate is nearer than the selected node.
     pub(crate) nearer: bool,
-    /// True if the candidate has reported that it can be inserted between this relay and its neighbour.
+    /// True if the candidate can be inserted between this relay and the selected node, by its own report.
     pub(crate) ready: bool,
-    /// True if the chain through the candidate has more relays than the one through the selected node.
+    /// True if more relays can be reached through the candidate than through the selected node.
     pub(crate) longer: bool,
 }
 
 impl Candidate {
-    /// Returns the number of nodes between the candidate and the next node, which is lost. The wait before a
-    /// selection grows with it, because one of these nodes may still be heard.
+    /// Returns the number of nodes between the candidate and the lost next node. This relay waits longer for each of
+    /// them before it selects the candidate, because a nearer node may still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
 
-    /// Returns true if the candidate is to replace the selected node.
+    /// Returns true if the candidate should replace the selected node. A nearer candidate must be `ready`, a farther
+    /// one must lead to more relays.
     pub(super) const fn is_better(self) -> bool {
         if self.nearer { self.ready } else { self.longer }
     }
 }
 
 impl Neighbour {
-    /// Returns true if the neighbour has changed since the last decision on a view proposal. The change must be
-    /// certain: the search is over, or the new neighbour is linked.
+    /// Returns true if the neighbour is another one than at the last decision on a view proposal. The change must be
+    /// certain: the search has ended without success, or the new neighbour is linked.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
@@ -494,42 +497,42 @@ impl Neighbour {
         self.node == self.agreed.node()
     }
 
-    /// Records the origin of a view proposal: the neighbour on this side, or `Itself`. `Itself` means that this relay
-    /// proposed, and that no relay precedes it.
+    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. If this relay has
+    /// proposed, no relay precedes it on this side.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// Records that the view proposal received from this side was granted.
+    /// Records that a view proposal was granted. Its sender becomes the neighbour on this side in the view.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
 
-    /// Leaves the view: this side has no neighbour in the agreed view any more.
+    /// Leaves the view: this side has no neighbour in an agreed view any more.
     pub(crate) const fn leave(&mut self) {
         self.agreed.agree(0);
     }
 
-    /// Records that a view proposal was refused. No new view is requested until the neighbour changes.
+    /// Records that a view proposal was refused. This side then requests no new view until its neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that a view proposal was granted. If the chain `ends` here, this side then has no neighbour in the
-    /// view; else the proposal was forwarded to it.
+    /// Records that a view proposal was granted, on the side to which it was forwarded. If the chain `ends` at this
+    /// relay, this side has no neighbour in the view.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Neighbours on one side according to the decisions on views; 0 for none.
+/// Neighbours on one side that the last view decisions are based on; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
-    /// Neighbour in the agreed view (agreed set of members).
+    /// Neighbour in the agreed view (agreed members of the chain).
     in_view: u16,
-    /// Neighbour at the last view proposal that was granted or refused.
+    /// Neighbour at the last decision on a view proposal, granted or refused.
     counted: u16,
-    /// Node that sent the last view proposal.
+    /// Node from which the last view proposal was received; 0 if this relay made it.
     proposer: u16,
 }
 
@@ -557,7 +560,7 @@ impl AgreedNodes {
         };
     }
 
-    /// Records that the view proposal received from this side was granted.
+    /// Records that a view proposal was granted, and that its sender is the neighbour on this side.
     pub(super) const fn agree_with_proposer(&mut self) {
         self.agree(self.proposer);
     }
@@ -576,9 +579,9 @@ impl AgreedNodes {
 /// Pending heartbeat to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PendingHeartbeat {
-    /// True if a heartbeat request (question) to the neighbour is pending.
+    /// True if a heartbeat request to the neighbour is pending.
     pub(super) request: bool,
-    /// Number of the neighbour's heartbeat request that is to be answered, 0 for none.
+    /// Number of the neighbour's heartbeat request that must be answered, 0 for none.
     pub(super) reply: u16,
 }
 
@@ -589,17 +592,17 @@ impl PendingHeartbeat {
     };
 }
 
-/// Number of consecutive hellos without reception of this relay after which their sender is reported.
+/// Number of consecutive hellos that do not list this relay as received before a node is reported.
 ///
-/// Fewer may be due to a lost answer or two.
+/// Fewer may be due to a lost frame or two.
 const NOT_RECEIVED: u8 = 8;
 
 /// Number of consecutive handshakes of a node with another key after which the node is reported.
 const FORGED: u8 = 3;
 
 impl Neighbour {
-    /// Returns true if this relay and the node `distance` relays away receive each other. The link must not be held
-    /// down because it flaps.
+    /// Returns true if this relay and the node `distance` relays away receive each other. A link that is held down
+    /// because it flaps does not count.
     pub(crate) fn is_two_way(&self, distance: u16, now: Instant, settings: &Settings) -> bool {
         let held = self.damping.held_down_nodes(now, settings);
         let is_in = |nodes: u8| mask(distance) & nodes != 0;
@@ -621,8 +624,8 @@ impl Neighbour {
 
     /// Records a hello of the node `distance` relays away.
     ///
-    /// `neighbour` is the node that the sender has selected toward this relay. `hears` is true if the sender receives
-    /// this relay.
+    /// `neighbour` is the node that the sender has selected on its side toward this relay. `hears` is true if the
+    /// sender receives this relay.
     pub(crate) fn record_hello(
         &mut self,
         distance: u16,
@@ -642,13 +645,14 @@ impl Neighbour {
         }
     }
 
-    /// Returns the neighbour that the node `distance` relays away has selected toward this relay. 0 for none.
+    /// Returns the node that the node `distance` relays away has selected on its side toward this relay. 0 for none.
     pub(crate) fn selected_by(&self, distance: u16) -> u16 {
         let known = self.selection.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` relays away. `taken` is true if that is the selected node.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if this node is the selected
+    /// neighbour.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -665,22 +669,22 @@ impl Neighbour {
         }
     }
 
-    /// Returns the nodes received recently whose links are in use or usable, as a bit mask. Links that flap (held
-    /// down) are left out. Bit 0 is the nearest node.
+    /// Returns the nodes received recently, as a bit mask; bit 0 is the nearest node. Nodes whose links are held
+    /// down, because they flap, are left out.
     pub(crate) fn received_nodes(&self, now: Instant, settings: &Settings) -> u8 {
         let held = self.damping.held_down_nodes(now, settings);
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Counts the reports of the node `distance` relays away that it does not receive this relay. Returns true at
-    /// exactly [`NOT_RECEIVED`] such reports in a row.
+    /// Records with `received` if the node `distance` relays away receives this relay. Returns true at exactly
+    /// [`NOT_RECEIVED`] reports in a row that it does not.
     pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
         self.not_received.count(distance, !received, NOT_RECEIVED)
     }
 
-    /// Returns true if the node `distance` relays away has to be reported for having another mission.
+    /// Returns true if the mission mismatch of the node `distance` relays away must be reported now.
     ///
-    /// At most once a minute for each node.
+    /// It is reported at most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.mismatches.should_report(distance, now)
     }
@@ -691,27 +695,28 @@ impl Neighbour {
         self.forged.count(distance, true, FORGED)
     }
 
-    /// Resets the count of handshakes with another key: the node `distance` relays away has the right key.
+    /// Resets the count of handshakes with another key. The node `distance` relays away has used the right key.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
     }
 }
 
 impl Neighbour {
-    /// Records the number of the neighbour's heartbeat request, 0 for none; a heartbeat will answer it.
+    /// Records the number of a heartbeat request of the neighbour, 0 for none. The next heartbeat answers it.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.heartbeat.reply = number;
         }
     }
 
-    /// Returns the time at which the answered heartbeat request `number` was sent; `None` if it is unknown.
+    /// Returns the time at which this relay sent the heartbeat request `number`, which was answered now. `None` if
+    /// the request is too old.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat as (destination, number of its question, answered number). The last is the
-    /// number of the neighbour's question that it answers. A number is 0 for none.
+    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is that of a
+    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {
@@ -730,8 +735,8 @@ impl Neighbour {
         self.hellos.schedule(distance, ask);
     }
 
-    /// Returns the distance of the nearest node with a pending hello, in relays. The second value is true if the
-    /// hello requests an answer.
+    /// Returns the distance, in relays, of the nearest node with a pending hello, and marks it as sent. The second
+    /// value is true if the hello requests an answer. `None` if no hello is pending.
     pub(crate) fn poll_hello(&mut self) -> Option<(u16, bool)> {
         self.hellos.poll()
     }

@@ -22,9 +22,11 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 
-/// Maximum number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. A call also completes
-/// the row of the search grid, up to 24 positions more.
-pub(super) const PLACES_AT_ONCE: u16 = 600;
+/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2.
+///
+/// The second value is for traffic in both directions. A call also completes the current altitude, which is at most
+/// 24 or 194 positions more.
+pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 /// True if the feature `altitude` (joint method) is on. Without it the code of the joint method is unreachable.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
@@ -46,44 +48,48 @@ pub(super) enum PassKind {
 pub(super) struct JointPlace {
     /// Lateral offset and altitude of the position.
     pub(super) cross_section: CrossSection,
-    /// Largest x that this relay may take, m, so that the later relays can still keep the separation.
+    /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
+    /// used in an interference field.
     pub(super) end_m: f32,
-    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of it to help the next
-    /// hop.
+    /// True if every relay takes its farthest x (a plain pass). False if relays may stop short of that x to help the
+    /// next hop.
     pub(super) plain: bool,
 }
 
-/// State of one relay in the placement algorithms: current pass, own position, task of the leader.
+/// State of one relay in the placement algorithms: current pass, own position, and the leader's task.
 #[derive(Clone, Debug)]
 pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True from the moment this relay starts a pass along the chain until that start is reported.
+    /// True once this relay has started a pass along the chain, until the statistics count that start.
     pub(super) began: bool,
     /// Configured altitude and power of this relay.
     pub(super) profile: Profile,
-    /// Profiles (altitude and power) of the relays of this view, for the joint method.
+    /// Profiles (altitude and power) of the relays of this view, collected for the joint method.
     pub(super) seats: Seats,
     /// Position that the joint method has computed for this relay in this view; `None` before.
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude of the agreed position.
     pub(super) cross_section: CrossSection,
-    /// Neighbour toward Rx as the end of the next hop, as last reported.
+    /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. Algorithm 2 uses it as
+    /// the end of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Meter of the interference at the agreed position; used with a known field of interference along x.
+    /// Meter of the interference at the agreed position. Used only if the interference is a field (a known
+    /// distribution along x).
     pub(super) meter: Meter,
-    /// Measurements of the interferer, and the chain's estimate of it.
+    /// Measurements of the unknown interferer, and the chain's estimate of it.
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
-    /// Upper bound of the target SIR that any chain could meet; known at the leader only.
+    /// Upper bound of the worst hop's SIR for any positions at the configured altitudes, linear. Known at the leader
+    /// only.
     pub(super) bound: Option<f32>,
 }
 
 impl Computation {
-    /// Creates the state of the placement algorithms after a start. `number` seeds the pass numbers of the leader,
-    /// which has work to do at once.
+    /// Creates the state of the placement algorithms after a start. The leader is in the phase `Planning`, and counts
+    /// its passes from `number`.
     pub(crate) const fn new(
         leader: bool,
         number: u16,
@@ -109,7 +115,7 @@ impl Computation {
         }
     }
 
-    /// Returns true until this relay has its first task, pass along the chain, or agreed position.
+    /// Returns true until this relay has started a task, taken part in a pass, or agreed on a position.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::Idle) && self.agreed_place.is_none()
@@ -130,7 +136,7 @@ impl Computation {
         self.after = None;
     }
 
-    /// Starts the leader's search for the target SIR again: Algorithm 1 or 4 at the configured altitudes.
+    /// Starts the leader's search for the best target SIR again, from its first step.
     pub(crate) fn restart(&mut self) {
         self.task.clear();
         // A new solution makes the leader try the same targets as the first time.
@@ -144,7 +150,7 @@ impl Computation {
         self.state.answer();
     }
 
-    /// Starts a new view, in which no pass along the chain has been received yet.
+    /// Starts a new view, in which no pass along the chain has been received yet. `leads` is true at its leader.
     pub(crate) fn renew(&mut self, leads: bool) {
         self.task.clear();
         self.after = None;
@@ -154,7 +160,7 @@ impl Computation {
         self.state.renew(leads);
     }
 
-    /// Sets the agreed position to `place`, and the agreed lateral offset and altitude to `cross_section`.
+    /// Sets the agreed position to `place`, and its lateral offset and altitude to `cross_section`.
     #[inline(never)]
     pub(super) fn agree_on(&mut self, place: Placement, cross_section: CrossSection) {
         self.agreed_place = Some(place);
@@ -196,8 +202,8 @@ impl Computation {
         }
     }
 
-    /// Returns the message of the current pass along the chain, for the next relay. `None` if its result is known or
-    /// this relay still computes.
+    /// Returns the message of the current pass along the chain, for the next relay. `None` if the pass has ended, or
+    /// if this relay still computes.
     pub(crate) fn onward(&self, context: &Context<'_>) -> Option<Message> {
         if self.state.phase() != Phase::Waiting {
             return None;
@@ -231,7 +237,7 @@ impl Computation {
         }
     }
 
-    /// Returns true if relays compute before they forward the current pass along the chain.
+    /// Returns true if each relay computes for long before it forwards the current pass along the chain.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
@@ -240,7 +246,7 @@ impl Computation {
         }
     }
 
-    /// Returns the result of the pass for the previous relay; `None` until it is known.
+    /// Returns the reply to the previous relay, with the result of the pass. `None` until the result is known.
     pub(crate) fn back(&self, context: &Context<'_>) -> Option<Message> {
         if !self.state.is_answered() {
             return None;
@@ -325,14 +331,14 @@ pub(crate) enum LeaderTask {
     Idle,
     /// Prediction of the chain's target SIR from the mission; the first sweep of targets starts there.
     Predicting(Planner),
-    /// Computation of the chain by the joint method, which every relay runs.
+    /// Solution of the whole chain by the joint method. Every relay computes it for itself.
     Solving(ChainSolver),
     /// Search for the highest feasible target SIR, by sweeps with fixed lateral offsets and altitudes.
     Searching {
         search: Search,
-        /// True if no other algorithm follows the search for the target SIR.
+        /// True if the method of the settings ends with this search, and no other algorithm follows.
         last: bool,
-        /// True for a search at the configured altitudes, after a search at those of the joint method failed.
+        /// True for a search at the configured altitudes, after the one at the joint method's altitudes failed.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.
@@ -368,8 +374,8 @@ impl Rounds {
         self.done
     }
 
-    /// Records the result of a pass of Algorithm 2; returns true if it was the last one. `any` is true if a relay has
-    /// moved; `sir` is the SIR of the chain's worst hop, linear.
+    /// Records the result of a pass of Algorithm 2; returns true if it was the last pass. `any` is true if a relay
+    /// has moved; `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
         let idle = match self.turn {
@@ -410,8 +416,8 @@ impl LeaderTask {
         }
     }
 
-    /// Starts a search for the highest target SIR. `last` is true if no other algorithm follows; `given` if the
-    /// configured altitudes are used because those of the joint method failed.
+    /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
+    /// true if the configured altitudes are used because those of the joint method failed.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -426,16 +432,16 @@ impl LeaderTask {
 }
 
 /// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs. If the
-/// interference is a field that varies along x, a call computes only a part of one hop.
+/// interference is a field that varies along x, a call predicts only a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A hop costs twice as
-/// much if the interference is a field (known along x) than with an interferer.
+/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A hop in an
+/// interference field costs twice as much as with an interferer.
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Computation {
-    /// Continues the leader's computation before a pass. Returns true if the pass can start, and `Infeasible` if
-    /// there is no feasible target SIR.
+    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, and the
+    /// error `Infeasible` if no target SIR is feasible.
     pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
         if self.must_distribute(context) || self.must_gather(context) {
             return Ok(true);
@@ -500,8 +506,8 @@ impl Computation {
         )
     }
 
-    /// Starts the search for the highest target SIR. The first sweep tries the targets in `ladder`, if it is given.
-    /// `last` is true if no other algorithm follows.
+    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`, if there
+    /// is one. `last` is true if no other algorithm follows.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,

@@ -24,13 +24,13 @@ impl Computation {
         Seat::of(context.mission(), self.profile, holds)
     }
 
-    /// Returns true if this relay's altitudes or power differ from the profile that all relays share.
+    /// Returns true if this relay's power or altitudes differ from the mission's common profile.
     pub(super) fn has_own_profile(&self, context: &Context<'_>) -> bool {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Returns true if the leader's next pass has to collect the relays' profiles (altitude and power). That is so if
-    /// some differ from the common profile, and not all are known.
+    /// Returns true if the leader's next pass must collect the relays' profiles (altitude and power). It must if a
+    /// relay's profile differs from the common one, and not all profiles are known.
     pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
@@ -135,7 +135,7 @@ impl Computation {
 pub(super) struct Seats {
     /// Number of relays, from Tx on, whose profiles are known. `None` before the first pass that collects profiles.
     pub(super) known: Option<u16>,
-    /// Profile of each relay: the altitude that it must hold, m (0 for none), and its power, W. The power is 0 for a
+    /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it; the power is 0 for a
     /// relay with the mission's common profile.
     own: [[f32; 2]; MOST_SOLVED],
 }
@@ -146,7 +146,7 @@ impl Seats {
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// Returns the profile of relay `index`, or the common profile if the relay has not reported its own.
+    /// Returns the profile of relay `index`: its own if it was collected, else the mission's common one.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);
@@ -162,12 +162,13 @@ impl Seats {
         }
     }
 
-    /// Returns true if the profiles of some, but not of all `relays` are known.
+    /// Returns true if the collection of profiles has begun, but some of the `relays` profiles are missing.
     pub(super) fn is_partial(&self, relays: u16) -> bool {
         self.known.is_some_and(|known| known < relays)
     }
 
-    /// Stores profiles that a pass along `relays` relays has collected. Returns true if all profiles are then known.
+    /// Stores the profiles in `roster`, the result of a pass along `relays` relays. Returns true if all profiles are
+    /// now known.
     pub(super) fn adopt(&mut self, roster: &Roster, relays: u16) -> bool {
         for seat in &roster.seats {
             let at = usize::from(seat.index).wrapping_sub(1);
@@ -188,7 +189,7 @@ impl Computation {
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues this relay's computation by the joint method in advance, while nothing else is to be done.
+    /// Continues this relay's solution by the joint method in advance, while it waits for a pass.
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -210,9 +211,10 @@ impl Computation {
         }
     }
 
-    /// Continues the joint method with the known profiles. Returns the target SIR, linear, once it is complete.
+    /// Continues this relay's solution of the chain by the joint method. Returns the predicted target SIR, linear,
+    /// once it is complete.
     ///
-    /// Without a solution this relay keeps its configured position, and the target is 0.
+    /// If there is no solution, this relay uses its configured lateral offset and altitude, and the target is 0.
     #[inline(never)]
     pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
         let mission = context.mission();
@@ -260,8 +262,8 @@ impl Computation {
         });
     }
 
-    /// Starts the search for the target SIR with the lateral offsets and altitudes of the joint method. The search
-    /// starts around `target`, linear, if that is above 0.
+    /// Starts the search for the highest target SIR, with the joint method's lateral offsets and altitudes. The first
+    /// targets are around `target`, linear, unless it is 0.
     pub(super) fn search_chosen(
         &mut self,
         context: &Context<'_>,

@@ -45,8 +45,8 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// Creates the state of the agreement on positions after a start. `number` seeds the pass numbers of the leader,
-    /// which has work to do at once.
+    /// Creates the state of the agreement on positions after a start. `leads` is true at the leader, which counts its
+    /// passes from `number`.
     pub(crate) const fn new(
         leads: bool,
         number: u16,
@@ -62,7 +62,7 @@ impl Round {
         }
     }
 
-    /// Handles a message of the current mission and view from the neighbour that may send it. Work: at most this
+    /// Handles a message of the current mission and view that comes from the right neighbour. Work: at most this
     /// relay's positions for 16 target SIRs.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
@@ -104,7 +104,7 @@ impl Round {
         }
     }
 
-    /// Handles expired timers of the agreement on positions. Work: at most one portion of a computation.
+    /// Handles expired timers of the agreement on positions. Work: at most one step of a long computation.
     pub(crate) fn handle_timeout(&mut self, context: &Context<'_>) -> Effects {
         let hop_time = context.settings().hop_time;
         let resent = self.circulation.handle_timeout(context.now, hop_time);
@@ -130,7 +130,8 @@ impl Round {
         }
     }
 
-    /// Carries out the action `next`. The effects include changes of the sensing results since `before`.
+    /// Carries out the action `next`. The returned effects include what has changed in the sensing results since
+    /// `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -204,7 +205,7 @@ impl Round {
         self.computation.meter.take(&member.mission, at, sample)
     }
 
-    /// Schedules the next portion of a computation after a pause, so that the caller's loop can run.
+    /// Schedules the next step of a computation after a pause, so that the caller can do other work.
     pub(crate) fn work_soon(&mut self, now: Instant) {
         self.work_at = Some(now + PAUSE);
     }
@@ -214,15 +215,15 @@ impl Round {
         self.proceed(context, Action::Work)
     }
 
-    /// Stops the current pass along the chain, because a new view is proposed.
+    /// Ends the current pass along the chain without a result, because a new view is proposed.
     pub(crate) fn suspend(&mut self) {
         self.computation.suspend();
         self.circulation.cancel();
         self.work_at = None;
     }
 
-    /// Starts a new view at `now`. `leads` is true at the leader; `works` is true if this relay has to compute at
-    /// once.
+    /// Starts a new view at `now`; `leads` is true at the view's leader. `works` is true if this relay must compute
+    /// without waiting for a message, as every relay does in the joint method.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -240,7 +241,7 @@ impl Round {
         self.computation.discard_agreed_place();
     }
 
-    /// Schedules an outstanding pass along the chain again, because the next relay can be reached again.
+    /// Schedules the message of an outstanding pass again. Called when the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
@@ -285,7 +286,7 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true until this relay takes part in its first pass along the chain or its first view.
+    /// Returns true until this relay has taken part in a pass along the chain or in a view.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }
@@ -298,7 +299,7 @@ impl Round {
         self.computation.is_untouched()
     }
 
-    /// Returns the agreed position, before the guard limits it.
+    /// Returns the agreed position. The guard may limit the setpoint on the way there.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
     }

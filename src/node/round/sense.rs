@@ -28,17 +28,18 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
-/// Maximum interval between passes that collect measurements, as a multiple of [`Listen::every`].
+/// Maximum interval between two passes that collect measurements, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// Number of sensing passes without a change of the estimate, after which their interval doubles. A sensing pass is a
+/// Number of sensing passes without a change of the estimate after which their interval doubles. A sensing pass is a
 /// message along the chain that collects measurements.
 const PATIENCE: u8 = 4;
 
-/// Number of passes that collect measurements per `Listen::every` in the search for a faulty relay.
+/// Number of sensing passes per `Listen::every` in the leader's search for a faulty sensor. A sensing pass is a
+/// message along the chain that collects measurements.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Number of consecutive measurements without interference after which the receiver may be faulty.
+/// Number of consecutive measurements at or below the noise after which a relay's sensor may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
@@ -57,7 +58,8 @@ impl Computation {
                 .is_some_and(|sensor| !sensor.is_distributed)
     }
 
-    /// Returns true at a leader that may start a pass that collects measurements: no other pass is due.
+    /// Returns true at a leader that may start a sensing pass, which collects measurements. The chain must have
+    /// agreed, or have no feasible target.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::is_sensing_enabled(context) && context.leads() && settled
@@ -74,7 +76,7 @@ impl Computation {
         }
     }
 
-    /// Starts a pass along the chain that collects the measurements of all relays, at the leader.
+    /// Starts a sensing pass at the leader: a message along the chain that collects all measurements.
     pub(super) fn begin_sense(&mut self, context: &Context<'_>) -> Action {
         let Some(sensor) = self.sensing.sensor_mut() else {
             return Action::Nothing;
@@ -181,7 +183,7 @@ impl Computation {
             return Action::Stale;
         };
         if holds {
-            self.state.settle();
+            self.state.hold();
         } else {
             self.state.answer();
         }
@@ -204,8 +206,8 @@ impl Computation {
         Action::Work
     }
 
-    /// Continues the leader's search for a faulty relay with the result of a pass. Returns true if the search goes
-    /// on; the pass then does not change the estimate.
+    /// Continues the leader's search for the relay with a faulty sensor, with the result of a sensing pass. Returns
+    /// true if the search needs another pass; the estimate then stays as it is.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -223,7 +225,8 @@ impl Computation {
         next == Next::Again
     }
 
-    /// Reviews the interference estimate with the result of a pass; returns true if it has changed.
+    /// Computes a new interference estimate from the result of a sensing pass. Returns true if the estimate has
+    /// changed and must be distributed.
     fn review_estimate(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -269,11 +272,11 @@ impl Computation {
         true
     }
 
-    /// Checks this relay's receiver against the sums of the measurements of all other relays.
+    /// Checks this relay's sensor by comparison with the measurements of all other relays.
     ///
-    /// An excluded relay checks if its measurements fit again. A relay with an absurd measurement excludes itself. A
-    /// relay that measures nothing where the others expect interference is marked as deaf. Unless it is newly
-    /// excluded, it adds its own sums.
+    /// A relay whose measurement is absurd excludes itself. A relay that measures nothing where the others expect
+    /// interference is marked as deaf. A relay that excluded itself earlier checks if its measurements fit again.
+    /// Unless it excludes itself now, it adds its own sums to the result.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,
@@ -321,49 +324,50 @@ pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 /// Maximum distance of a measurement from Tx in each coordinate, in units of the distance Tx to Rx.
 const FARTHEST: f32 = 100.0;
 
-/// Sensing state of a relay: one element with the feature `sensing`, empty without it.
+/// Sensing state of a relay. It has one element with the feature `sensing`, none without it.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing([SensorState; SENSING as usize]);
 
-/// Measurements of a relay, its interference estimate, and its knowledge of faulty receivers.
+/// Measurements of a relay, its interference estimate, and its knowledge of faulty sensors.
 #[expect(clippy::struct_excessive_bools, reason = "each for itself")]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SensorState {
     pub(super) listener: Listener,
     pub(super) estimate: NumberedEstimate,
-    /// Interference that the ground transmitter has reported to this relay.
+    /// Average of the interference power that Tx, on the ground, has reported to this relay.
     pub(super) transmitter: Average,
-    /// Interference that the ground receiver has reported to this relay.
+    /// Average of the interference power that Rx, on the ground, has reported to this relay.
     pub(super) receiver: Average,
-    /// True while this relay excludes its own measurements, because they do not fit the other measurements.
+    /// True while this relay does not report its measurements, because they contradict the others.
     pub(super) off: bool,
-    /// Node whose measurements the last pass that collects measurements left out; 0 for none.
+    /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
+    /// measurements.
     pub(super) left_out: u16,
-    /// Node whose measurements are known to be faulty; 0 for none.
+    /// Node with a faulty sensor, as found by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
-    /// Search for the relay with faulty measurements, at the leader only.
+    /// Leader's search for the relay with a faulty sensor, by leaving out one relay after the other.
     pub(super) trial: Trial,
-    /// Ground stations (transmitter, receiver) whose measurements do not fit; known at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements do not fit those of the relays; at the leader only.
     pub(super) ends: EndsOff,
-    /// True if the last measurements were inconsistent, and the faulty relay could not be identified.
+    /// True if the last measurements contradict each other, and the faulty sensor was not found.
     pub(super) contradicted: bool,
-    /// True if this relay measures nothing although the others' measurements predict interference here.
+    /// True if this relay measures nothing where the other relays' measurements predict interference.
     pub(super) deaf: bool,
-    /// Number of consecutive measurements of this relay at or below the receiver's noise.
+    /// Number of consecutive measurements of this relay that were at or below the receiver's noise.
     pub(super) silent: u8,
     /// Position of the last measurement at or below the receiver's noise.
     pub(super) silent_at: Placement,
-    /// True if the relays of the view have received the estimate; at the leader only.
+    /// True once the relays of the view have received the current estimate; at the leader only.
     pub(super) is_distributed: bool,
-    /// Amount of measurements, and expected error, at the time when the present estimate was adopted.
+    /// Amount and expected error of the measurements from which the current estimate was made.
     pub(super) known: Knowledge,
-    /// Reason why the last collected measurements gave no estimate; `None` if they did.
+    /// Reason why the last collected measurements gave no estimate; `None` if they gave one.
     pub(super) unfit: Option<Unfit>,
-    /// Interval between passes that collect measurements, as a multiple of `Listen::every`.
+    /// Interval between sensing passes, as a multiple of `Listen::every`. A sensing pass collects measurements.
     pub(super) wait: u32,
-    /// Number of consecutive passes with measurements that did not change the estimate.
+    /// Number of consecutive sensing passes that did not change the estimate, modulo [`PATIENCE`].
     pub(super) kept: u8,
-    /// Time of the next pass that collects measurements; `None` while none is scheduled.
+    /// Time of the next sensing pass, which collects measurements; `None` if none is scheduled.
     pub(super) at: Option<Instant>,
 }
 
@@ -413,7 +417,7 @@ impl Sensing {
         sensors.first_mut()
     }
 
-    /// Starts a new view: the leader distributes its estimate before the first agreement.
+    /// Starts a new view, in which the leader distributes its estimate before the first agreement.
     pub(super) const fn renew(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
             sensor.is_distributed = false;
@@ -440,7 +444,7 @@ impl Sensing {
         self.sensor()?.at
     }
 
-    /// Returns true if the timer of the next sensing pass has expired, and stops the timer.
+    /// Returns true if the next sensing pass, which collects measurements, is due. Stops its timer.
     pub(super) fn poll_due(&mut self, now: Instant) -> bool {
         self.sensor_mut()
             .is_some_and(|sensor| sensor.at.take_if(|at| *at <= now).is_some())
@@ -453,7 +457,8 @@ impl Sensing {
         }
     }
 
-    /// Returns the reason why the last collected measurements gave no estimate; leader only.
+    /// Returns the reason why the last measurements gave no estimate. `None` if they gave one, and at other relays
+    /// than the leader.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
         match self.sensor() {
             Some(sensor) => sensor.unfit,
@@ -461,7 +466,8 @@ impl Sensing {
         }
     }
 
-    /// Returns the interference that the ground station at `side` has reported, W; `None` without a report.
+    /// Returns the mean interference power that the ground station at `side` has reported, W. `None` without a
+    /// report.
     pub(crate) fn level_w(&self, side: Side) -> Option<f32> {
         let sensor = self.sensor()?;
         let level_w = match side {
@@ -488,8 +494,8 @@ impl Sensing {
 }
 
 impl SensorState {
-    /// Returns the interference at a ground station, from its `average`. The weight of the value fades with its age
-    /// at `now`.
+    /// Returns the interference level at a ground station at time `now`, from the station's `average`. Its weight
+    /// decreases with the age of the last report.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {
@@ -533,14 +539,14 @@ impl SensorState {
     }
 }
 
-/// State of a pass that collects measurements (sensing pass), at one relay.
+/// State of one relay in a sensing pass, a message along the chain that collects measurements.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums of the measurements of earlier relays, as received from the previous relay.
+    /// Sums of measurements as received from the previous relay: those of all earlier relays of the pass.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the relays hold positions that were agreed on with the present interference estimate.
+    /// True if the positions were agreed on with the current estimate. The chain then need not agree again.
     pub(super) holds: bool,
 }
 
@@ -549,15 +555,15 @@ pub(super) struct Sense {
 pub(super) struct Findings {
     pub(super) estimate: NumberedEstimate,
     pub(super) unfit: Option<Unfit>,
-    /// Node whose measurements do not fit, as of the last pass; 0 for none.
+    /// Node with a faulty sensor, as of the last sensing pass; 0 for none.
     pub(super) off: u16,
     pub(super) ends: EndsOff,
     pub(super) deaf: bool,
 }
 
 impl Findings {
-    /// Returns what has changed since `before`. In the result, faulty node 0 stands for the ground transmitter, and
-    /// node `all` + 1 for the ground receiver.
+    /// Returns the changes from `before` to these findings. A faulty ground station is node 0 (Tx) or node `all` + 1
+    /// (Rx), where `all` is the number of relays.
     #[inline(never)] // called from several places
     pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
         let off = if self.off != before.off && self.off != 0 {

@@ -26,7 +26,7 @@ pub enum Phase {
     Idle,
     /// The leader computes the targets of its next pass.
     Planning,
-    /// A message along the chain (pass or view proposal) has been forwarded; its result is not known yet.
+    /// Waiting: a pass or view proposal has been forwarded, and its result is not known yet.
     Waiting,
     /// The last pass (message along the chain) has completed without an agreement.
     Answered,
@@ -36,21 +36,21 @@ pub enum Phase {
     Infeasible,
     /// A new view (set of members) is proposed; passes wait for its decision.
     ViewChange,
-    /// Missing quorum: too few relays are reachable, and this part of the chain holds its positions.
+    /// Missing quorum: too few relays are reachable. They keep their positions.
     NoQuorum,
 }
 
-/// Action that a relay takes next, after a message or a portion of work.
+/// Action of a relay after a received message or a step of its computation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
     Nothing,
-    /// Count a stale message.
+    /// Ignore the message, and count it as stale.
     Stale,
-    /// Discard the pending messages, and continue the computation after a pause.
+    /// Drop the outstanding message, and continue the computation after a pause.
     Work,
-    /// Continue the computation after a pause; pending messages stay.
+    /// Continue the computation after a pause. An outstanding message stays.
     Think,
-    /// Forward the pass along the chain, with retransmission.
+    /// Forward the pass to the next relay, and retransmit it until there is a reply.
     Forward,
     /// Reply to a duplicate of the current pass.
     Repeat,
@@ -59,7 +59,7 @@ pub(crate) enum Action {
         /// True if the chain has agreed on its positions.
         agreed: bool,
     },
-    /// Complete the pass along the chain at the leader, which has no next one to start.
+    /// Complete the pass at the leader, which starts no other pass now.
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
@@ -67,18 +67,18 @@ pub(crate) enum Action {
     Foreign,
 }
 
-/// Classification of a received pass along the chain, by its number and its content.
+/// Class of a received pass message, by its number and its content: new, duplicate, late or foreign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Foreign pass: from a restarted leader, or one after passes that this relay has missed.
+    /// Foreign pass: its leader has restarted, or this relay has missed passes before it.
     Foreign,
 }
 
 impl Arrival {
-    /// Returns the action for a pass along the chain that is not new; `None` for a new one.
+    /// Returns the action for a pass message that is not new; `None` for a new one, which is handled.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -89,12 +89,12 @@ impl Arrival {
     }
 }
 
-/// Maximum number by which a late pass may be behind the current one. A pass farther behind, or ahead of the next
-/// one, is foreign: its leader has restarted, or this relay has missed passes.
+/// Maximum number of passes by which a late pass message may be behind the current pass. A pass farther behind, or
+/// ahead of the next one, is foreign: its leader has restarted, or this relay has missed passes.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of pass numbers: the first pass of a view, or of a leader's start, has a multiple of it. No other pass
-/// has. A relay thus recognises a first pass, which it can join without knowing earlier ones.
+/// Divisor of the numbers of first passes. The first pass of a view, or after a leader's start, has a multiple of 64
+/// as its number; no other pass has. A relay can join a first pass without knowledge of earlier passes.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.
@@ -102,8 +102,8 @@ const INCARNATION: u16 = 64;
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass along the chain was started or received in this view. In the view loaded before flight,
-    /// passes since the relay's start count.
+    /// True once a pass has been started or received in this view. In the view loaded before flight, passes since
+    /// this relay's start count.
     begun: bool,
     late_messages: LateMessages,
 }
@@ -139,7 +139,7 @@ impl RoundState {
         self.phase = Phase::Answered;
     }
 
-    pub(crate) const fn settle(&mut self) {
+    pub(crate) const fn hold(&mut self) {
         self.phase = Phase::Holding;
     }
 
@@ -157,7 +157,7 @@ impl RoundState {
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Increments the number for a new pass along the chain, at the leader.
+    /// Sets the number of a new pass along the chain, which the leader starts.
     pub(crate) const fn begin(&mut self) {
         self.number = if self.begun {
             self.next()
@@ -183,8 +183,8 @@ impl RoundState {
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a received pass along the chain by its `number`. `same` is true if its content equals that of the
-    /// current pass.
+    /// Classifies a received pass message by its `number`. `same` is true if its content equals that of the current
+    /// pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
             // A relay that has missed the first pass cannot join later ones; it requests a new view.
@@ -203,7 +203,7 @@ impl RoundState {
         }
     }
 
-    /// Counts a late pass along the chain; too many in a row are classified as foreign.
+    /// Counts a late pass message. Too many in a row are foreign, because their leader has restarted.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign
@@ -217,14 +217,14 @@ impl RoundState {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Returns true if the result of a pass has arrived since `before`, an earlier state of this relay. That is so if
-    /// the pass is still the current one, and is not awaited any more.
+    /// Returns true if the result of the current pass has arrived since the state `before`.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number
     }
 
-    /// Returns true if a next pass has been received since the state `before`, which had sent a result.
+    /// Returns true if a new pass was received after the state `before`. In that state the result of its pass was
+    /// known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }
@@ -240,7 +240,7 @@ mod tests {
     use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
     use crate::node::circulation::SUSPICIOUS;
 
-    /// Returns the state of a relay whose last pass has the number 200.
+    /// Returns the state of a relay that has accepted a pass with the number 200.
     fn begun() -> RoundState {
         let mut state = RoundState::new(Phase::Idle, 0);
         state.accept(200);

@@ -13,7 +13,7 @@ use crate::settings::Method;
 use crate::wire::message::{Sweep, SweepVerdict};
 
 impl Computation {
-    /// Handles a sweep from the previous relay: a message that tries several target SIRs along the chain.
+    /// Handles a sweep from the previous relay: a pass along the chain that tries several target SIRs.
     pub(crate) fn on_sweep(&mut self, context: &Context<'_>, sweep: &Sweep) -> Action {
         let behind = Behind {
             relay: sweep.relay,
@@ -45,8 +45,8 @@ impl Computation {
         )
     }
 
-    /// Starts this relay's part in a sweep of target SIRs. `from` are the farthest x that the previous relay can take
-    /// for each target (its reaches), m.
+    /// Starts this relay's computation in a sweep, a pass along the chain that tries target SIRs. `from` has the
+    /// farthest x of the previous node for each target, m.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,
@@ -68,7 +68,7 @@ impl Computation {
         self.continue_sweep(context)
     }
 
-    /// Continues this relay's part in a sweep of target SIRs by one portion of work.
+    /// Continues this relay's computation in a sweep of target SIRs by one step.
     pub(super) fn continue_sweep(&mut self, context: &Context<'_>) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         if ALTITUDE && is_chosen && self.chosen.is_none() {
@@ -89,21 +89,21 @@ impl Computation {
         }
     }
 
-    /// Handles a verdict, the result of a sweep of target SIRs, from the next relay.
+    /// Handles a verdict, the reply with the result of a sweep, from the next relay.
     pub(crate) fn on_verdict(&mut self, context: &Context<'_>, answer: &SweepVerdict) -> Action {
         let is_chosen = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.chosen);
         let link = self.link(context, is_chosen);
         if let PassKind::Sweep(sweep_pass) = &mut self.pass
             && self.state.is_awaited(answer.number)
-            && sweep_pass.apply_verdict(link, answer)
+            && sweep_pass.apply_sweep_verdict(link, answer)
         {
             return self.conclude_sweep(context);
         }
         Action::Stale
     }
 
-    /// Handles the known result of a sweep of target SIRs. If a target is committed, agrees on this relay's position
-    /// for it, else continues the search.
+    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay agrees on its position for
+    /// it. Otherwise the leader continues its search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;
@@ -150,9 +150,9 @@ impl Computation {
         Action::Work
     }
 
-    /// Completes the agreement on a target SIR, unless another algorithm of the leader follows.
+    /// Completes the agreement on a target SIR, unless the leader continues with another algorithm.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
-        self.state.settle();
+        self.state.hold();
         if let LeaderTask::Searching { last: false, .. } = self.task {
             match context.settings().method {
                 Method::Adjust(adjust) if ADJUST => {
@@ -176,23 +176,23 @@ impl Computation {
 #[derive(Clone, Debug)]
 pub(crate) struct SweepPass {
     pub(crate) ladder: Ladder,
-    /// Checksum of the received sweep, see [`fingerprint`].
+    /// Checksum of the previous relay's data in the sweep, to recognise duplicates; see [`fingerprint`].
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
     pub(crate) chosen: bool,
-    /// True if a later relay of this sweep has an altitude or power that differs from the common profile.
+    /// True if a later relay of this pass has another power or fixed altitude than the common profile.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x that the previous relay can take for each target SIR (its reaches), m.
+    /// Farthest x at which the previous node meets each target SIR, m.
     from: PerTarget,
-    /// Farthest x that this relay can take for each target SIR (its reaches), m.
+    /// Farthest x at which this relay meets each target SIR, m.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
     /// x that this relay takes for the committed target, m; `None` without a committed target.
     place: Option<f32>,
-    /// x that the previous relay must take for the committed target, m; `None` for its farthest x.
+    /// Required x of the previous relay for the committed target, m. `None` if that relay takes its farthest x.
     required_x_m: Option<f32>,
 }
 
@@ -216,8 +216,8 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep received from the relay `behind`, which is `None` if the previous node is Tx or Rx. `from` are
-    /// the farthest x that the previous node can take for each target (its reaches), m.
+    /// Starts a sweep with the data of the previous node. `behind` describes the previous relay, `None` if the
+    /// previous node is Tx or Rx; `from` has its farthest x for each target, m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -229,8 +229,8 @@ impl SweepPass {
         self.required_x_m = None;
     }
 
-    /// Computes a portion of this relay's farthest x for each target, and at the last relay the verdict. The verdict
-    /// states which target is committed. Returns true when all are computed.
+    /// Continues the computation of this relay's farthest x for each target. The last relay also decides the verdict,
+    /// which says if a target is committed. Returns true when the computation is complete.
     ///
     /// Work: at most 16 targets; in a field of interference 128 of its points, or one target.
     pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
@@ -243,14 +243,14 @@ impl SweepPass {
                 .committed()
                 .zip(self.committed_before())
                 .and_then(|((target, reach), from_m)| Some(link.ending(target, from_m, reach)?.1));
-            self.settle(&link, place);
+            self.store_position(&link, place);
         }
         self.done
     }
 
     /// Accepts a verdict, the result of a sweep, if this relay has a position for the committed target. Returns true
     /// if the verdict was accepted.
-    pub(crate) fn apply_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
+    pub(crate) fn apply_sweep_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
         let link = self.link(link);
         let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
         let met = |target: u8| {
@@ -273,13 +273,13 @@ impl SweepPass {
         self.verdict = verdict.clone();
         self.own = answer.own;
         let place = self.committed().and_then(position);
-        self.settle(&link, place);
+        self.store_position(&link, place);
         true
     }
 
-    /// Stores this relay's position `place` for the committed target SIR. Derives the position that the previous
-    /// relay must take; if there is no suitable one, the commitment is revoked.
-    fn settle(&mut self, link: &Link<'_>, place: Option<f32>) {
+    /// Stores `place`, this relay's x for the committed target SIR, m. Derives the required x of the previous relay;
+    /// if there is no suitable one, the commitment is revoked.
+    fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
         }
@@ -302,7 +302,7 @@ impl SweepPass {
         }
     }
 
-    /// Returns the committed target SIR, and the farthest x that this relay can take for it, m.
+    /// Returns the committed target SIR, and this relay's farthest x for it, m. `None` if no target is committed.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((
@@ -311,12 +311,12 @@ impl SweepPass {
         ))
     }
 
-    /// Returns the farthest x that the previous relay can take for the committed target, m.
+    /// Returns the previous node's farthest x for the committed target, m. `None` if no target is committed.
     fn committed_before(&self) -> Option<f32> {
         self.from.get(usize::from(self.verdict.commit?)).copied()
     }
 
-    /// Returns this relay's agreed position, m along x, and the committed target SIR.
+    /// Returns this relay's agreed x, m, and the committed target SIR. `None` if no target is committed.
     pub(crate) fn agreed(&self) -> Option<(f32, f32)> {
         Some((self.place?, self.committed()?.0))
     }
@@ -338,8 +338,8 @@ impl SweepPass {
     }
 }
 
-/// Returns a checksum of the previous relay's data in a sweep, by which a duplicate is recognised. It differs if the
-/// previous relay has restarted with other data.
+/// Returns a checksum of the previous relay's data in a sweep. It distinguishes a duplicate from a sweep that a
+/// restarted relay sends with other data.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {

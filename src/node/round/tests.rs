@@ -20,7 +20,7 @@ use std::vec::Vec;
 
 const RELAYS: u16 = 3;
 
-/// Test chain of three relays with one target SIR per sweep. Its clock advances by 1 ms per step.
+/// Chain of three relays for the tests, with one target SIR per sweep. Its clock advances by 1 ms with each call.
 struct Line {
     members: [Member; RELAYS as usize],
     rounds: [Round; RELAYS as usize],
@@ -87,7 +87,7 @@ impl Line {
     }
 }
 
-/// Exchanges all messages until `ends` returns true for a message; returns the messages.
+/// Delivers all messages between the relays until `ends` returns true for one; returns them all.
 fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
     let mut all = Vec::new();
     for _ in 0..100_000 {
@@ -109,8 +109,8 @@ fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Mess
     panic!("it does not end: {all:?}");
 }
 
-/// Checks that a leader that holds its position after collecting measurements awaits no reply. It schedules no
-/// retransmission.
+/// Checks that a leader that keeps its position after a sensing pass schedules no retransmission. A sensing pass
+/// collects measurements along the chain.
 #[test]
 #[cfg(feature = "sensing")]
 fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
@@ -128,8 +128,8 @@ fn a_leader_that_goes_on_holding_after_a_sensing_pass_awaits_nothing() {
     assert_eq!(line.rounds[0].circulation.next_timeout(), None);
 }
 
-/// Checks that a relay that still searches for its position does not forward the token. The token of Algorithm 2
-/// reports the position that the relay finds.
+/// Checks that a relay that still searches for its position does not forward the token of Algorithm 2. The token must
+/// report the position that the relay finds.
 #[test]
 #[cfg(feature = "adjust")]
 fn a_relay_that_still_searches_hands_on_no_token() {

@@ -42,7 +42,7 @@ impl Computation {
         self.take_turn(context, TurnPass::new(token.turn, token.sir, Some(before)))
     }
 
-    /// Starts this relay's turn in Algorithm 2, in which it may move.
+    /// Starts this relay's turn in Algorithm 2, in which it may move to a better position.
     pub(super) fn take_turn(&mut self, context: &Context<'_>, mut turn_pass: TurnPass) -> Action {
         self.state.wait();
         let mut searching = false;
@@ -68,12 +68,14 @@ impl Computation {
         }
     }
 
-    /// Continues the search for a better position in this relay's turn, by one portion of work.
+    /// Continues the search for a better position in this relay's turn by one step.
     pub(super) fn continue_turn(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Turn(turn_pass) = &mut self.pass else {
             return Action::Stale;
         };
-        match turn_pass.step(PLACES_AT_ONCE) {
+        let [one_way, both_ways] = PLACES_AT_ONCE;
+        let is_one_way = !(context.mission().reverse() > 0.0);
+        match turn_pass.step(if is_one_way { one_way } else { both_ways }) {
             Poll::Pending => Action::Work,
             Poll::Ready(None) => self.forward_turn(context),
             Poll::Ready(Some(place)) => {
@@ -90,7 +92,7 @@ impl Computation {
         self.conclude_turn(context, f32::MAX)
     }
 
-    /// Handles the result of Algorithm 2's pass, received from the next relay.
+    /// Handles the reply to the token of Algorithm 2, received from the next relay.
     pub(crate) fn on_moved(&mut self, context: &Context<'_>, moved: &Moved) -> Action {
         if let PassKind::Turn(turn_pass) = &mut self.pass
             && !turn_pass.is_searching()
@@ -104,8 +106,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Completes this relay's turn in Algorithm 2. `worst` is the worst SIR of the hops from the next relay to Rx,
-    /// linear.
+    /// Completes this relay's turn in Algorithm 2. `worst` is the worst SIR of the hops between the next relay and
+    /// Rx, linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,
@@ -128,7 +130,7 @@ impl Computation {
             self.target = Some(turn_pass.sir);
         }
         if stop {
-            self.state.settle();
+            self.state.hold();
         } else {
             self.state.answer();
         }
@@ -142,19 +144,19 @@ impl Computation {
     }
 }
 
-/// State of Algorithm 2's pass at one relay.
+/// State of one relay in a pass of the token of Algorithm 2.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
     /// Action of this pass of Algorithm 2: look, move or stop.
     pub(crate) turn: AdjustStep,
     /// SIR of the chain before this pass of Algorithm 2, linear.
     pub(crate) sir: f32,
-    /// Relay before this one as the start of its hop; `None` for Tx.
+    /// Position and power of the previous relay, from which the hop to this relay starts; `None` for Tx.
     before: Option<HopEnd>,
     search: Option<LocalSearch>,
-    /// True if this relay or a later relay has moved in this pass of Algorithm 2.
+    /// True if this relay or a later relay has moved in this pass of the token.
     pub(crate) any: bool,
-    /// Worst SIR of the hops from this relay to Rx, linear.
+    /// Worst SIR of the hops between this relay and Rx, linear.
     pub(crate) worst: f32,
 }
 
@@ -170,8 +172,8 @@ impl TurnPass {
         }
     }
 
-    /// Starts a search for a better position around `at`, within the altitudes `band`, m. Returns false if relays do
-    /// not move in this pass of Algorithm 2.
+    /// Starts a search for a better position around `at`. `band` has the lowest and the highest altitude, m. Returns
+    /// false if relays do not move in this pass.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
@@ -179,9 +181,10 @@ impl TurnPass {
         self.search.is_some()
     }
 
-    /// Continues the search for a better position, by `budget` evaluations and the rest of a grid row.
+    /// Continues the search: evaluates `budget` positions, and then the rest of the last grid row.
     ///
-    /// The result is ready at the end of the search: the better position, or `None` if there is none.
+    /// Returns `Ready` at the end of the search: with a position that is better than the relay's present one, or with
+    /// `None` if there is none.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);

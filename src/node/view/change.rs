@@ -28,17 +28,18 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum number of views by which one message may advance the latest known view.
+/// Maximum number of views by which one message may advance the latest known view number. One message thus cannot use
+/// up all numbers.
 const MAX_ADVANCE: u32 = 4096;
 
-/// State of the view change (agreement on the chain's members) at one relay.
+/// State of one relay in view changes, by which the relays agree on the members of the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    /// Circulation of the view proposal along the chain; `Outstanding` while its decision is awaited.
+    /// Progress of the view proposal along the chain: `Outstanding` while its decision is awaited.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
-    /// Identifier of the latest view that this relay has heard of.
+    /// Identifier of the latest view that this relay knows to be proposed or agreed on.
     pub(super) newest: ViewId,
     pub(crate) request: ViewRequest,
     /// True if the last decision refused a view because of a missing quorum.
@@ -47,8 +48,8 @@ pub(crate) struct ViewChange {
 }
 
 impl ViewChange {
-    /// Creates the state of the view change (agreement on members) in a chain of `relays` relays. `initial_leader` is
-    /// the node number of the first leader.
+    /// Creates the state of view changes for a chain of `relays` relays. `initial_leader` is the node number of the
+    /// leader before any view change.
     pub(crate) const fn new(relays: u16, initial_leader: u16, seed: u32) -> Self {
         Self {
             electorate: Electorate::new(relays, initial_leader),
@@ -61,18 +62,19 @@ impl ViewChange {
         }
     }
 
-    /// Returns the votes on views (acceptor state) to persist; `base` is the digest of the loaded mission.
+    /// Returns the votes on views (acceptor state) for storage. `base` is the digest of the mission loaded before
+    /// flight.
     pub(crate) const fn record(&self, base: u16) -> ViewRecord {
         ViewRecord::new(base, self.electorate)
     }
 
-    /// Returns true until the first view-change message since start-up is sent or received.
+    /// Returns true until this relay sends or receives its first view-change message since the start.
     pub(crate) fn is_untouched(&self) -> bool {
         self.proposed.is_none() && self.newest == self.electorate.promised()
     }
 
-    /// Restores the stored votes on views after a start, and requests a view. `untouched` is true if no other layer
-    /// has started. Returns an error if this relay has already started, or has another mission.
+    /// Restores the stored votes on views after a start, and requests a view. `untouched` is true if the agreement on
+    /// positions has not started. Returns an error if this relay has already started, or has loaded another mission.
     pub(crate) fn resume(
         &mut self,
         now: Instant,
@@ -100,8 +102,9 @@ impl ViewChange {
         self.newest
     }
 
-    /// Records that another relay knows `view`, but advances the latest view by at most [`MAX_ADVANCE`]. One message
-    /// could otherwise use up all view numbers. A relay that was away for long repeats its view often enough.
+    /// Records that another relay knows `view`. The latest known view advances by at most [`MAX_ADVANCE`] numbers,
+    /// because one message could otherwise use up all of them. A relay that was away for long catches up, because it
+    /// receives `view` repeatedly.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
@@ -109,8 +112,8 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members of `view` have accepted it: positions were agreed on in that view. Any other view
-    /// than the one that this relay accepted last is ignored.
+    /// Records that all members of `view` have accepted it, which a pass in that view shows. Ignored unless `view` is
+    /// the one that this relay has accepted last.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -134,12 +137,12 @@ impl ViewChange {
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
     }
 
-    /// Returns true while this relay's part of the chain has no quorum.
+    /// Returns true while too few relays can be reached for a quorum: the last proposal was refused.
     pub(crate) const fn has_no_quorum(&self) -> bool {
         self.refused
     }
 
-    /// Requests a view later than `proposal`, whose decision cannot arrive any more.
+    /// Requests a view later than `proposal`, because the decision on `proposal` cannot arrive any more.
     pub(super) fn request_later_view(&mut self, context: &Context<'_>, proposal: ViewId) {
         if self.newest <= proposal
             && let Some(later) = proposal.next_by(context.member.node)
@@ -149,14 +152,15 @@ impl ViewChange {
         self.request.request_now(context.now);
     }
 
-    /// Drops the outstanding view proposal and requests a view, as after a restart with the stored votes.
+    /// Drops the last view proposal and requests a view, as after a restart with the stored votes.
     pub(crate) fn leave(&mut self, now: Instant) {
         self.proposed = None;
         self.circulation.withdraw();
         self.request.request_now(now);
     }
 
-    /// Handles a view proposal or a decision from a neighbour, for a mission that this relay holds.
+    /// Handles a view proposal or a decision from a neighbour. This relay has stored the mission of the proposed
+    /// view.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let all = context.member.all;
         match message {
@@ -210,8 +214,8 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on a view proposal that `place` relays have forwarded, and returns the effects. `None` if this relay has
-    /// promised a later one. `received` are the votes so far, `None` at the proposer.
+    /// Votes on the proposed `view`, which `place` relays have voted on before. `received` has their votes, `None` at
+    /// the proposer. Returns the effects, `None` if this relay has promised a later view.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -250,7 +254,8 @@ impl ViewChange {
         })
     }
 
-    /// Decides the outstanding view proposal: the chain ends here, so every reachable relay has voted.
+    /// Decides the outstanding view proposal, because this relay is the last one that can be reached. All reachable
+    /// relays have voted on it.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
         let Some(proposed) = self.outstanding() else {
             return Effects::NONE;
@@ -281,10 +286,10 @@ impl ViewChange {
             accepted,
             usable_in,
         };
-        self.apply_verdict(context, verdict)
+        self.apply_view_verdict(context, verdict)
     }
 
-    /// Schedules another view proposal after a refusal, because unreachable relays may return.
+    /// Schedules another view proposal after a refusal, because more relays may be reachable then.
     pub(super) fn retry_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
         self.request.request_after_refusal(context.now, wait);
@@ -307,13 +312,13 @@ impl ViewChange {
                     accepted: decision.accepted,
                     usable_in: decision.usable_in,
                 };
-                self.apply_verdict(context, verdict)
+                self.apply_view_verdict(context, verdict)
             }
             _ => Effects::STALE,
         }
     }
 
-    fn apply_verdict(&mut self, context: &Context<'_>, verdict: ViewVerdict) -> Effects {
+    fn apply_view_verdict(&mut self, context: &Context<'_>, verdict: ViewVerdict) -> Effects {
         let ViewVerdict {
             reached,
             base,
@@ -368,7 +373,7 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Schedules the outstanding view proposal again, because the next relay has become reachable.
+    /// Schedules the outstanding view proposal again. Called when the next relay can be reached again.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
@@ -414,8 +419,8 @@ impl ViewChange {
         })
     }
 
-    /// Handles a reply that a message is in progress. Returns true if message `number` is the outstanding view
-    /// proposal.
+    /// Handles the next relay's reply that message `number` is in progress. Returns true if that is the outstanding
+    /// view proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .outstanding()
@@ -429,8 +434,8 @@ impl ViewChange {
 }
 
 impl ViewChange {
-    /// Handles the timers of retransmissions and of view requests. `leads` is true if this relay has no neighbour
-    /// toward the leader, `fresh` if nothing was received since the start.
+    /// Handles the timers of retransmissions and view requests. `leads` is true if this relay has no neighbour toward
+    /// the leader. `fresh` is true if it has not taken part in any pass or view since its start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -447,7 +452,7 @@ impl ViewChange {
         Effects { resent, ..effects }
     }
 
-    /// Requests a view from the neighbour toward the leader, or proposes one if this relay leads.
+    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads.
     fn request_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
         let settings = &context.member.settings;
         if !self.request.poll_due(context.now, fresh, settings) {
@@ -494,18 +499,18 @@ impl ViewChange {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     pub(crate) view: ViewId,
-    /// Identifier of the mission that the proposed view is to fly.
+    /// Identifier of the mission of the proposed view.
     pub(crate) mission_id: MissionId,
-    /// Rank of this relay on the way of the proposal: 1 for the proposer.
+    /// Position of this relay on the proposal's path: 1 for the proposer.
     pub(crate) rank: u16,
     /// Votes on the proposal, including that of this relay.
     pub(super) poll: Poll,
-    /// Node to which the proposal was forwarded; `None` before. It is sent to no second node, because two different
-    /// views with the same identifier would then be possible.
+    /// Node to which the proposal was forwarded; `None` before. It is never sent to a second node, because two
+    /// different views with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decided view follows. Before the decision: newest view that is known to be agreed on.
+    /// View that the decided view replaces. Before the decision, the newest view known to be agreed on.
     pub(crate) base: View,
-    /// Number of relays that the proposal has reached; known once the proposal is decided.
+    /// Number of relays that the proposal has reached; 0 until the decision is known.
     pub(super) reached: u16,
     /// View that the decision accepted; `None` before the decision and without a quorum.
     pub(super) accepted: Option<View>,
@@ -521,7 +526,7 @@ pub(super) struct ViewVerdict {
     pub(super) usable_in: u16,
 }
 
-/// State of this relay's request for a new view, and the time at which it is repeated.
+/// Request of this relay for a new view, and the timer that repeats the request.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewRequest {
     pending: bool,
@@ -530,12 +535,12 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive view proposals that were refused.
     refusals: u8,
-    /// Earliest time of the next view request after a refusal, if anything changes; else `None`.
+    /// Earliest time of the next view request after a refusal, if anything has changed. `None` without a refusal.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
 
-/// Maximum number of times that consecutive refusals of a view double the wait before a new request.
+/// Maximum number of times that the wait before a new view request doubles after consecutive refusals.
 const DOUBLINGS: u8 = 3;
 
 impl ViewRequest {
@@ -554,8 +559,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, and repeats the request until a view is accepted. After a refusal the request waits; a call
-    /// then shortens the wait, because something has changed.
+    /// Requests a view, and repeats the request until a view is decided. If a request waits after a refusal, this
+    /// call shortens the wait, because something has changed.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);
@@ -576,7 +581,7 @@ impl ViewRequest {
         self.at = Some(now + PAUSE);
     }
 
-    /// Repeats a pending view request at once, because the neighbours are now certain.
+    /// Repeats a pending view request at once. Called when the search for a neighbour has ended.
     pub(crate) fn repeat_now(&mut self, now: Instant) {
         if self.pending {
             self.request_now(now);
@@ -594,14 +599,14 @@ impl ViewRequest {
         self.refusals = self.refusals.saturating_add(1);
     }
 
-    /// Ends the view request, because a view has been decided.
+    /// Ends the view request, because a view has been decided or refused.
     pub(super) const fn stop(&mut self) {
         self.pending = false;
         self.at = None;
         self.not_before = None;
     }
 
-    /// Starts the timer for the first pass: if none is received by `at`, a view is requested.
+    /// Starts the timer for the first pass along the chain. If no pass is received by `at`, a view is requested.
     pub(crate) const fn await_first(&mut self, at: Instant) {
         self.at = Some(at);
     }
@@ -611,8 +616,8 @@ impl ViewRequest {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer; returns true if a view request is due. It is due while a request is pending, or if
-    /// nothing was received since the start (`fresh`).
+    /// Handles the expired timer. Returns true if a view request must be sent: one is pending, or this relay is
+    /// `fresh` (no pass or view since its start).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {
@@ -627,7 +632,7 @@ impl ViewRequest {
         true
     }
 
-    /// Returns the wait until the next view request. The wait doubles with each call, up to `probe_after`.
+    /// Returns the wait until the next view request. It doubles with each call, up to `probe_after`.
     fn patience(&mut self, settings: &Settings) -> Duration {
         let wait = settings.hop_time.times(8 << self.tries.min(12));
         self.tries = self.tries.saturating_add(1);

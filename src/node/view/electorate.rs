@@ -42,7 +42,7 @@ use crate::node::context::{OtherLeases, tenths};
 use crate::view::{View, ViewId};
 use crate::wire::message::{Poll, Successor};
 
-/// Number of view proposals without a known decision for which a relay remembers its vote.
+/// Number of view proposals with an unknown decision for which a relay remembers its vote.
 pub(super) const VOTES: usize = 8;
 
 /// Acceptor state of one relay: its promises and votes on views, as in Paxos.
@@ -50,14 +50,15 @@ pub(super) const VOTES: usize = 8;
 pub(crate) struct Electorate {
     /// Newest view that is known to be agreed on.
     pub(super) agreed: View,
-    /// True if this relay is a member of the newest agreed view, `agreed`.
+    /// True if this relay is a member of the view `agreed`, so that it has a vote.
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// View that this relay has accepted last, while it is not known to be agreed on.
+    /// View that this relay has accepted last. `None` once it is known to be agreed on.
     pub(super) accepted: Option<Successor>,
-    /// View proposals with this relay's vote that may still become views, latest first.
+    /// View proposals that this relay has voted on and that may still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
-    /// Leader of the initial view, which breaks a tie: of two equal halves, the one with this node decides.
+    /// Node number of the leader before any view change. Of two halves of the initial view, the one with this node
+    /// has the quorum.
     pub(super) initial_leader: u16,
 }
 
@@ -77,7 +78,7 @@ impl Electorate {
         }
     }
 
-    /// Returns the latest view proposal that this relay has promised: it accepts no earlier one.
+    /// Returns the latest view proposal that this relay has promised, as in Paxos. It accepts no earlier one.
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
     }
@@ -88,8 +89,8 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on the view proposal `proposal`, and returns the votes including this one. `None` if this relay has
-    /// promised `proposal`, or a later one, before. `received` are the votes so far (`None` at the proposer),
+    /// Votes on the view `proposal`, and returns the votes so far, including this one. `None` if this relay has
+    /// promised `proposal`, or a later view, before. `received` has the earlier votes (`None` at the proposer),
     /// `other_leases` the remaining leases of other relays.
     pub(crate) fn vote(
         &mut self,
@@ -138,7 +139,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of `node`, this relay, would alone be no quorum for `proposal`. No vote is cast.
+    /// Returns true if the vote of `node`, this relay, is not enough for a quorum on `proposal`. Casts no vote.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -151,8 +152,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view proposal `proposal`. If the list is full, the older half of the votes is kept and
-    /// a newer one is dropped: later proposals decide again on a view that relays have accepted.
+    /// Records the vote on the view `proposal` in the list of votes. If the list is full, one of its newer votes is
+    /// dropped, and the older half stays.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -162,7 +163,7 @@ impl Electorate {
         }
     }
 
-    /// Records that `view` is known to be agreed on. An accepted view and older votes are dropped.
+    /// Records that `view` is known to be agreed on. Votes on earlier proposals and the accepted view are dropped.
     fn learn(&mut self, view: View) {
         self.member = self.voted.contains(&view.id);
         self.agreed = view;
@@ -170,7 +171,7 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Removes the votes on proposals for which `is_decided` returns true: they can no longer become views.
+    /// Removes the votes on proposals for which `is_decided` returns true. These can no longer become views.
     fn forget(&mut self, is_decided: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
         let voted = self.voted.iter().filter(|voted| !is_decided(**voted));
@@ -180,8 +181,8 @@ impl Electorate {
         self.voted = kept;
     }
 
-    /// Accepts the decision on `proposal`, unless a later one was promised; returns true if accepted. `view` is the
-    /// decided view, which follows `base`; `None` for a refusal.
+    /// Accepts the decision on `proposal`; returns false if a later proposal was promised. `view` is the decided
+    /// view, which replaces `base`; `None` for a refusal.
     pub(crate) fn accept(&mut self, proposal: ViewId, base: View, view: Option<View>) -> bool {
         if proposal != self.promised || base.id < self.agreed.id {
             return false;
@@ -206,23 +207,23 @@ impl Electorate {
         }
     }
 
-    /// Returns true if this relay has accepted `view`, and does not know that it is agreed on.
+    /// Returns true if this relay has accepted `view`, but does not know yet that it is agreed on.
     pub(crate) fn awaits(&self, view: ViewId) -> bool {
         self.accepted
             .is_some_and(|accepted| accepted.view.id == view)
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. It is at most `most`; an
-/// unknown time counts as `most`.
+/// Returns the time until positions of the next view may be used, in tenths of a second. The maximum is `most`, which
+/// also stands for an unknown time.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
     poll.earlier_lease_left.max(lease_left).min(most)
 }
 
-/// Returns the decision on the view proposal `proposal`; `None` without a quorum. The proposal has reached `relays`
-/// of the mission's `all` relays, and collected the votes `poll`.
+/// Returns the decided view for `proposal`; `None` without a quorum. The proposal has reached `relays` of the
+/// mission's `all` relays, with the votes `poll`.
 pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Option<View> {
     let whole = View {
         id: proposal,
@@ -242,14 +243,14 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
-    /// Disables the quorum rule, to test the model check. Every decision then counts as agreed on, and every relay
-    /// votes.
+    /// Disables the quorum rule, so that a test can show that the model check finds the fault. Every decision counts
+    /// as agreed on, and every relay votes.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;
     }
 
-    /// Returns true if this relay has voted for `proposal`, which may still become a view.
+    /// Returns true if this relay has voted on `proposal`, which may still become a view.
     pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
         self.voted.contains(&proposal)
     }

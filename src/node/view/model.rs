@@ -38,10 +38,10 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
-/// Checks the view change for every order of events in a chain of `relays` relays. The numbers of cuts, proposals and
-/// reboots are limited.
+/// Checks the view change for every order of events in a chain of `relays` relays. The numbers of link cuts,
+/// proposals and reboots are limited.
 ///
-/// `heals` also checks in every state that a healed chain agrees on a view.
+/// `heals` also checks in every state that the chain agrees on a view once all links are restored.
 fn all_holds(relays: u16, (cuts, proposals, reboots): (u8, u8, u8), heals: bool) {
     Check {
         cuts,
@@ -60,7 +60,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Checks more events than the usual model check; takes some minutes.
+/// Checks more events than the usual test does; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {
@@ -71,8 +71,8 @@ fn chains_of_three_and_four_in_more_states() {
     all_holds(4, (2, 3, 1), false);
 }
 
-/// Checks that the model check finds a fault of the quorum rule. If the votes of all present relays count, two views
-/// are in force at once.
+/// Checks that the model check finds a broken quorum rule. If all reachable relays could vote, two views would be in
+/// force at once.
 #[test]
 fn the_check_finds_the_fault_of_counting_all_votes() {
     for relays in [3, 4] {
@@ -85,7 +85,7 @@ fn the_check_finds_the_fault_of_counting_all_votes() {
     }
 }
 
-/// Checks that the model check finds a missing record: a relay without its votes breaks its promises.
+/// Checks that the model check finds the fault of a relay that restarts without its stored votes.
 #[test]
 fn the_check_finds_the_fault_of_a_lost_record() {
     let check = Check {
@@ -95,10 +95,10 @@ fn the_check_finds_the_fault_of_a_lost_record() {
     assert!(check.search().is_some());
 }
 
-/// View and its number of members, as a sortable pair.
+/// View with its number of members, as a pair that can be sorted.
 pub(super) type SizedView = (ViewId, u16);
 
-/// Content of a frame in the model.
+/// Message in a frame of the model, without mission and times.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) enum Body {
     Proposal {
@@ -129,7 +129,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
-    /// Last accepted view, this relay's rank in it, and the view's number of members.
+    /// Last accepted view, this relay's rank in the view, and the number of its members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -159,25 +159,25 @@ impl core::hash::Hash for RelayState {
     }
 }
 
-/// New view that was decided on: its size, the view that it follows, and the voters.
+/// View that was decided on: with its size, the view that it replaces, and the relays that voted.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) struct DecidedView {
     pub(super) view: SizedView,
     pub(super) follows: ViewId,
-    /// Relays that voted on the proposal, as a bit mask: bit 0 is the first relay.
+    /// Bit mask of the relays that voted on the proposal; bit 0 is the first relay.
     pub(super) members: u8,
 }
 
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Chain {
     pub(super) relays: Vec<RelayState>,
-    /// Part of the partitioned chain in which each relay is: relays with equal numbers reach each other.
+    /// Part number of each relay while links are cut. Relays with equal numbers reach each other.
     pub(super) parts: Vec<u8>,
-    /// Frames in the air, sorted and without duplicates.
+    /// Frames that were sent and may still arrive, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// List of all views that were ever decided on.
+    /// Views that were ever decided on.
     pub(super) decided: Vec<DecidedView>,
-    /// List of all views that were ever agreed on.
+    /// Views that were ever agreed on: all members have accepted them.
     pub(super) agreed: Vec<SizedView>,
     pub(super) cuts: u8,
     pub(super) proposals: u8,
@@ -185,7 +185,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
 }
 
-/// Event that the model check may let happen next.
+/// Event that can happen next in the model.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum ModelEvent {
     Part(usize),
@@ -198,7 +198,7 @@ pub(super) enum ModelEvent {
     Forgets(usize),
 }
 
-/// Inserts `one` into the sorted list `all`, unless the list contains it.
+/// Inserts `one` into the sorted list `all`, unless it is there already.
 pub(super) fn insert_sorted<T: Ord>(all: &mut Vec<T>, one: T) {
     if let Err(at) = all.binary_search(&one) {
         all.insert(at, one);
@@ -293,7 +293,8 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Every present relay votes; the quorum is half of the newest view that any present relay knows.
+    /// Broken rule, for a test: every reachable relay votes. The quorum is half of the newest view that any of them
+    /// knows.
     Everybody,
 }
 
@@ -307,11 +308,11 @@ pub(super) struct Check {
     pub(super) proposals: u8,
     pub(super) reboots: u8,
     pub(super) losses: u8,
-    /// True to check in every state that a healed chain agrees on a view.
+    /// True to check in every state that the chain agrees on a view once all links are restored.
     pub(super) heals: bool,
 }
 
-/// Returns all ways to divide `relays` relays into parts, as the part number of each relay.
+/// Returns all ways to divide `relays` relays into parts. Each way is a list with the part number of each relay.
 pub(super) fn partitions(relays: usize) -> Vec<Vec<u8>> {
     let mut all = vec![vec![]];
     for _ in 0..relays {
@@ -366,7 +367,7 @@ impl Check {
         }
     }
 
-    /// Returns the relays that have voted on the view proposal `proposal`, as a bit mask.
+    /// Returns the bit mask of the relays that have voted on the view `proposal`; bit 0 is the first relay.
     pub(super) fn voters(chain: &Chain, proposal: ViewId) -> u8 {
         let voters = chain.relays.iter().zip(0..);
         let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
@@ -378,7 +379,7 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// Sends the pending messages of relay `at`, and records a decision contained in `effects`.
+    /// Adds the pending messages of relay `at` to the frames under way. Records the decision in `effects`, if any.
     pub(super) fn apply_effects(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
@@ -515,7 +516,8 @@ impl Check {
 }
 
 impl Check {
-    /// Returns true if the agreed views are one sequence: each follows another, no two follow the same one.
+    /// Returns true if the agreed views form one sequence. Each one replaces another agreed view, and no two replace
+    /// the same one.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {
             let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
@@ -540,7 +542,8 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each relay's agreed view is truly agreed on, with no more members than its size.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, no more
+    /// relays may count as members of such a view than it has.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
             || chain.relays.iter().all(|unit| {
@@ -556,11 +559,11 @@ impl Check {
     }
 }
 
-/// Maximum number of proposals that a healed chain may need to agree on a view.
+/// Maximum number of proposals that a chain may need to agree on a view once its links are restored.
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {
-    /// Delivers all frames among the relays in the bit mask `there`, until nothing changes any more.
+    /// Delivers all frames between the relays in the bit mask `there`, until nothing changes any more.
     pub(super) fn drain(&self, chain: &mut Chain, there: u8) {
         loop {
             let before = chain.clone();
@@ -579,7 +582,7 @@ impl Check {
     }
 
     /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. They must
-    /// also be a quorum of every view decided on since then.
+    /// also be a quorum of every view decided on after it.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.relays.len()).filter(known);
@@ -596,9 +599,9 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals until the relays in the bit mask `there` agree on one view. It is a view of
-    /// all these relays. Links between them are restored, all others are cut. Without a quorum the number is 0;
-    /// `None` if [`MAX_PROPOSALS`] are not enough.
+    /// Returns the number of proposals until the relays in the bit mask `there` agree on one view. The view has all
+    /// these relays as members. Links between them are restored, all other links are cut. `Some(0)` if they are no
+    /// quorum; `None` if [`MAX_PROPOSALS`] are not enough.
     pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {
@@ -633,7 +636,7 @@ impl Check {
         None
     }
 
-    /// Returns true if every set of relays that is a quorum agrees on one view once its links are restored.
+    /// Returns true if every set of relays that is a quorum agrees on a view once its links are restored.
     pub(super) fn is_alive(&self, chain: &Chain) -> bool {
         let all = ((1_u16 << chain.relays.len()) - 1) as u8;
         (1..=all).all(|there| {
@@ -644,7 +647,7 @@ impl Check {
     }
 }
 
-/// Safety property that the model check verifies: each agreed view follows the one before.
+/// Name of the safety property that the model check verifies: agreed views form one sequence.
 pub(super) const ONE_CHAIN: &str = "agreed views follow each other one by one";
 
 impl Model for Check {
@@ -734,7 +737,7 @@ impl Model for Check {
     }
 }
 
-/// Property that the model check found violated, and the events that lead there.
+/// Property that the model check has found violated, and the events that lead to the violation.
 pub(super) struct Counterexample {
     pub(super) what: &'static str,
     pub(super) how: String,

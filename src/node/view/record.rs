@@ -5,7 +5,7 @@ use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::message::Successor;
 
-/// Number of the stored record's format.
+/// Version of the stored record's format, in its first byte.
 const FORMAT: u32 = 1;
 
 /// Acceptor state that must survive a reboot in flight.
@@ -24,7 +24,7 @@ const FORMAT: u32 = 1;
 pub struct ViewRecord {
     /// Digest of the mission that was loaded before flight.
     base: u16,
-    /// Votes on views (acceptor state), checked; its `initial_leader` is not stored.
+    /// Votes on views (acceptor state). The field `initial_leader` is 0, because it is not stored.
     electorate: Electorate,
 }
 
@@ -33,7 +33,7 @@ pub struct ViewRecord {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RecordError {
-    /// Record error: the record belongs to a relay that was loaded with another mission.
+    /// Record error: the relay that wrote the record had loaded another mission.
     Base,
     /// Record error: the relay has already started, so that its votes cannot be restored.
     Begun,
@@ -52,8 +52,8 @@ impl core::fmt::Display for RecordError {
 
 impl core::error::Error for RecordError {}
 
-/// Writer of numbers of one, two or four bytes, least significant byte first. Its two functions need a third of the
-/// flash that an iterator over all bytes would need.
+/// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash that an
+/// iterator over all bytes would need.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -109,7 +109,7 @@ impl Reader<'_> {
 }
 
 impl ViewRecord {
-    /// Length of a record, bytes.
+    /// Length of a stored record, bytes.
     pub const LENGTH: usize = 25 + 4 * VOTES;
 
     pub(crate) const fn new(base: u16, electorate: Electorate) -> Self {
@@ -122,8 +122,8 @@ impl ViewRecord {
         }
     }
 
-    /// Returns the votes on views (acceptor state) in the record, if it is of this mission, else `None`. Its digest
-    /// must then be `base`, and its number of relays `relays`. `initial_leader` is the mission's leader.
+    /// Returns the votes on views (acceptor state) in the record; `None` if it is of another mission. The loaded
+    /// mission has the digest `base`, `relays` relays and the leader `initial_leader`.
     pub(super) fn electorate(
         &self,
         base: u16,
@@ -191,7 +191,7 @@ impl ViewRecord {
     }
 }
 
-/// Returns the encoding of no successor: the relay has accepted no view that follows `agreed`.
+/// Returns the value that encodes "no accepted view", for a relay whose newest agreed view is `agreed`.
 const fn nothing_after(agreed: View) -> Successor {
     Successor {
         proposal: ViewId::LOADED,
@@ -199,7 +199,7 @@ const fn nothing_after(agreed: View) -> Successor {
     }
 }
 
-/// Returns true if a relay can have reached the state `kept`, so that a record of it is valid.
+/// Returns true if a relay can have the voting state `kept`. A record of any other state is invalid.
 fn is_sound(kept: &Electorate) -> bool {
     let Electorate {
         agreed, promised, ..
@@ -287,7 +287,8 @@ mod tests {
         assert_eq!(ViewRecord::from_bytes(&[0; ViewRecord::LENGTH]), None);
     }
 
-    /// Checks that each accepted record encodes to the same bytes. Every byte is tried with every other value.
+    /// Checks that a record with one changed byte is rejected, or encodes to the same bytes again. Every byte is
+    /// given every other value.
     #[test]
     fn impossible_votes_are_not_read() {
         let mut taken = 0;
@@ -310,7 +311,7 @@ mod tests {
         }
     }
 
-    /// Returns the record of a relay that has just started, in a chain of three.
+    /// Returns the stored votes of a relay that has just started, in a chain of three.
     fn fresh() -> ViewRecord {
         ViewRecord::new(digest(relay(3).mission()), Electorate::new(3, 1))
     }
@@ -338,8 +339,8 @@ mod tests {
         assert_eq!(first.unpersisted(), None);
     }
 
-    /// Checks that relay 2 of three sends nothing before its record is stored. It searches on a shared channel for
-    /// its silent neighbours.
+    /// Checks that a relay sends nothing before its record is stored. It is relay 2 of 3, on a shared channel, with
+    /// silent neighbours.
     #[test]
     fn nothing_is_sent_before_the_record_is_stored() {
         let mission = Mission::try_new(paper(3)).unwrap();

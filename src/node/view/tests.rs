@@ -17,7 +17,8 @@ pub(super) fn id(number: u32, node: u32) -> ViewId {
     ViewId::from_bits(number << 10 | node)
 }
 
-/// Relay under test, in a chain of four. It holds mission 4 and flies the loaded one.
+/// Relay under test, in a chain of four. It has stored a mission of version 4, and flies the one loaded before
+/// flight.
 pub(super) struct Relay {
     pub(super) member: Member,
     pub(super) latest: MissionId,
@@ -57,14 +58,14 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Ends the chain at this relay, so that it decides an outstanding view proposal.
+    /// Makes this relay the last one that can be reached, so that it decides an outstanding view proposal.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
         self.view.decide(&context)
     }
 
-    /// Makes this relay the leader: no relay precedes it, and its request timer expires.
+    /// Makes this relay the leader: no relay precedes it, and its view request is due.
     pub(super) fn leads(&mut self) -> Effects {
         self.view.request.start(self.now);
         self.now = self.view.request.next_timeout().unwrap();
@@ -94,7 +95,7 @@ impl Relay {
         })
     }
 
-    /// Returns a decision on `proposal` that the next relay has sent.
+    /// Returns a decision of the next relay on `proposal`. `view` is the view that it accepts, `None` for a refusal.
     pub(super) fn decision(&self, proposal: ViewId, view: Option<View>) -> Message {
         Message::Decision(Decision {
             mission_id: self.latest,
@@ -191,7 +192,7 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// Checks that a proposal of the same view with another mission counts as another proposal. Its leader has restarted
+/// Checks that a second proposal of the same view, but for another mission, is no duplicate. Its leader has restarted
 /// meanwhile and has received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
@@ -303,8 +304,8 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Checks that a refusal names the agreed view. Otherwise relays near the leader that do not know the newest view are
-/// refused for good.
+/// Checks that a refusal names the agreed view. From it, relays near the leader learn the newest view; otherwise they
+/// would be refused for ever.
 #[test]
 fn a_refusal_names_the_agreed_view() {
     let view = View {
@@ -376,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a decision is ignored if the relay has replaced the proposed mission by a newer one.
+/// Checks that a relay ignores a decision if it has stored a newer mission than the proposed one.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();
@@ -456,8 +457,8 @@ fn a_forwarded_proposal_without_a_next_relay_is_abandoned() {
 
 /// Checks that a relay forwards a view proposal to one node only.
 ///
-/// Otherwise, if only relay 1 has lost relay 2, two views have the same identifier: one with relays 1 to 3 as
-/// members, one with relays 1 and 4.
+/// Otherwise, if only relay 1 has lost relay 2, two views could have the same identifier: one with the members 1 to
+/// 3, one with 1 and 4.
 #[test]
 fn a_proposal_is_forwarded_to_only_one_node() {
     let mut relay = Relay::new(1);
@@ -511,7 +512,8 @@ fn a_leader_proposes_later_views_one_at_a_time() {
     }
 }
 
-/// Checks that a relay that is alone for hours does not use up a view number every five seconds.
+/// Checks that a relay that is alone for hours makes no proposals without a quorum. Each proposal would use up a view
+/// number.
 #[test]
 fn a_refused_lone_leader_proposes_only_with_a_quorum() {
     let mut relay = Relay::second();

@@ -6,51 +6,59 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed moves that an iteration of the joint method tries, in this order.
+/// Fractions of the relays' computed moves that an iteration tries, from the largest to the smallest. The next one is
+/// tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
 /// Initial trust region: limit of a relay's move in one iteration of the joint method. It is a fraction of the
 /// relay's distance from the interferer. It also limits the change of the target, in ln(SIR).
 const TRUST: f32 = 0.5;
 
-/// Trust region (limit of a relay's move) below which an ascent's final target is not predicted.
+/// Minimum trust region at which the final target of an ascent (improvement of one chain) is predicted. A smaller
+/// limit of the relays' moves would distort the prediction.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust region (limit of a relay's move) below which the ascent ends; a fraction like [`TRUST`].
+/// Trust region below which an ascent (improvement of one chain) ends, because it makes no progress. It is a fraction
+/// like [`TRUST`].
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which the slack (spare length at Rx) falls with the target, in D per ln(SIR). The usual rate is
-/// 0.5, since hop lengths vary as 1 / sqrt(SIR). Steps are divided by the rate, so a smaller one is raised to this.
+/// Minimum rate at which the spare length at Rx is assumed to fall with the target, in D per ln(SIR). Steps of the
+/// target are divided by the rate, so that a rate near 0 would make them too long. The usual rate is 0.5, since hop
+/// lengths vary as 1 / sqrt(SIR).
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the limit of an ascent's target after the chain failed at the limit, in ln(SIR).
+/// First amount by which the limit of the target is raised, in ln(SIR). The limit is raised if a chain that meets it
+/// fails the check against the upper bound.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the slack (spare length of the chain at Rx), in units of D. Slack above the cap does not count, so
-/// that it cannot outweigh a penalty.
+/// First cap on the chain's spare length at Rx, in units of D. Spare length above the cap does not count, so that it
+/// cannot outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the slack (spare length of the chain at Rx), in units of D. It is not lowered further.
+/// Cap on the spare length at Rx below which the cap is not lowered any further, in units of D.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Weight of a length that is missing at Rx, relative to spare length, when two chains are compared.
+/// Weight of a missing length when two chains are compared. A metre that a chain falls short of Rx counts as much as
+/// two metres of spare length.
 const SHORT: f32 = 2.0;
 
-/// Gain of the target SIR, in ln(SIR), below which a step counts as idle. Two idle steps in a row end the ascent.
+/// Gain of the target below which an improvement step counts as idle, in ln(SIR). Two idle steps in a row end the
+/// ascent.
 const CLOSE: f32 = 3e-6;
 
-/// Expected gain of the target SIR below which an ascent ends, in ln(SIR).
+/// Expected gain of the target below which the improvement of a chain ends, in ln(SIR).
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected gain of the target, in ln(SIR), below which an ascent's final target can be predicted.
+/// Expected gain of the target below which its final value can be predicted, in ln(SIR). Final is the value at the
+/// end of the ascent, the improvement of one chain.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which an ascent is checked for divergence. It has diverged if its chain is more than
-/// `ASTRAY` D too short; D is the distance from Tx to Rx.
+/// Number of iterations after which an ascent (improvement of one chain) is checked for divergence. It has diverged
+/// if its chain falls short of Rx by more than `ASTRAY` D; D is the distance from Tx to Rx.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Maximum length by which an ascent's chain may fall short of Rx to be worth more work, in D. The search after the
-/// ascent finds a lower target that it meets.
+/// Maximum length by which a chain may fall short of Rx after its ascent, in units of D. A chain that is shorter is
+/// dropped; for the others a lower target is searched that they meet.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -61,9 +69,10 @@ pub(crate) enum AscentStep {
     Try { share: f32, sigma: f32 },
     /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
-    /// Compute the relays' moves again, by a backward pass from the last relay to the first.
+    /// Compute the relays' moves anew for the current chain. This takes a backward pass from the last relay to the
+    /// first.
     Again,
-    /// End the ascent, the improvement of the current trial chain.
+    /// End the ascent: the chain is not improved further.
     Over,
 }
 
@@ -71,21 +80,23 @@ pub(crate) enum AscentStep {
 pub(crate) struct Ascent {
     /// Target SIR of the current chain, in ln(SIR).
     pub(crate) sigma: f32,
-    /// Slack of the current chain: its spare length at Rx for the target `sigma`, m. It is below 0 if the chain is
-    /// too short.
+    /// Slack of the current chain, m: the length by which it could reach beyond Rx at the target `sigma`. It is below
+    /// 0 if the chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Maximum target of the ascent, in ln(SIR), until the chain is checked at its upper bound.
+    /// Limit of the target, in ln(SIR). A chain that meets the limit is checked against the upper bound of all
+    /// chains.
     limit: f32,
-    /// Next increase of `limit`, in ln(SIR), if the chain fails the check at its upper bound.
+    /// Next increase of the target's limit, in ln(SIR). It is made if a chain that meets the limit fails the check
+    /// against the upper bound.
     excess: f32,
-    /// Cap on the slack (spare length of the chain at Rx), in units of D. It is lowered where slack would outweigh a
-    /// penalty.
+    /// Cap on the chain's spare length at Rx, in units of D. It is lowered if relays too near the interferer cause a
+    /// penalty, so that spare length cannot outweigh it.
     spare: f32,
-    /// Penalty for relays too near the interferer: a length subtracted from the chain's slack, m.
+    /// Penalty for relays too near the interferer, m. It is subtracted from the chain's spare length at Rx.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
+    /// Derivative of the chain's spare length at Rx by the target in ln(SIR), m. It is below 0.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
@@ -105,8 +116,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Creates an ascent of a chain with `slack`, its spare length at Rx, m, for the target `sigma`. Targets are in
-    /// ln(SIR), and never fall below `floor`.
+    /// Creates an ascent, which improves a chain. For the target `sigma` the chain has the spare length `slack` at
+    /// Rx, m. Targets are in ln(SIR), and never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -127,7 +138,8 @@ impl Ascent {
         }
     }
 
-    /// Returns the ascent with its target limited to `limit`, in ln(SIR), until the chain is checked there.
+    /// Returns this ascent with a limit of its target, in ln(SIR). A chain that meets the limit is checked against
+    /// the upper bound of all chains.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -140,17 +152,18 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the cap on the slack (spare length at Rx), m: a chain with more is no better.
+    /// Returns the cap on the spare length at Rx, m. A chain with more than that counts as no better.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the slack (spare length at Rx).
+    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the spare length at Rx.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the cap on the slack (spare length at Rx) if a penalty applies; returns true if it did.
+    /// Lowers the cap on the spare length at Rx if relays too near the interferer cause a penalty. Returns true if it
+    /// did.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -159,7 +172,8 @@ impl Ascent {
         true
     }
 
-    /// Continues with `slack`, the chain's spare length at Rx under the lowered cap, m. Returns the next action.
+    /// Continues the ascent after the cap on the spare length was lowered; returns the next action. `slack` is the
+    /// chain's spare length at Rx under the new cap, m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -167,12 +181,13 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the target has risen to its limit, and the current chain meets it.
+    /// Returns true if the target has reached its limit, and the current chain meets that target.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the target's limit after the chain failed the check at its upper bound. Returns the next action.
+    /// Raises the limit of the target, and returns the next action. The chain that met the old limit has failed the
+    /// check against the upper bound.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -184,15 +199,15 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results for one segment (ten relays) to the totals of the backward pass. They are the slack's
-    /// derivative by the target, and the gains expected from the relays' moves.
+    /// Adds the results for one segment (ten relays) to the totals of the backward pass. These are the derivative of
+    /// the spare length at Rx by the target, and the gains expected from the relays' moves.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
         self.square += outlook.square;
     }
 
-    /// Returns the next action after a complete backward pass, which computes the relays' moves.
+    /// Returns the next action after a backward pass, which has computed the moves of all relays.
     pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -213,7 +228,7 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if slack and expected gain are each worth less than `by` of the target, in ln(SIR).
+    /// Returns true if spare length and expected gain each change the target by less than `by`, in ln(SIR).
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -224,13 +239,14 @@ impl Ascent {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if the chain falls short of Rx by so little that it is worth more work.
+    /// Returns true if the chain falls short of Rx by so little that its improvement is continued.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the ascent is predicted to end no higher than the target `sigma`, in ln(SIR). `turn` is its
-    /// next action. The result is false if no prediction is possible.
+    /// Returns true if this ascent is predicted to end no higher than the target `sigma`, in ln(SIR). The ascent
+    /// improves one chain; if it ends no higher than another one, it can be dropped. `turn` is its next action. The
+    /// result is false if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -241,8 +257,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target, in ln(SIR), that the chain should just meet after part of the relays' moves. `share` is
-    /// that part, 0 to 1.
+    /// Returns the target that the chain is expected to just meet after a part of the moves, in ln(SIR). `share` is
+    /// the fraction of the relays' computed moves, 0 to 1.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -261,14 +277,14 @@ impl Ascent {
         }
     }
 
-    /// Returns the merit of a chain: the target that would use up its slack, in ln(SIR). The chain has `slack`, its
-    /// spare length at Rx, m, for the target `sigma`. A missing length counts twice.
+    /// Returns the merit of a chain, in ln(SIR): the target for which no spare length at Rx would be left. For the
+    /// target `sigma` the chain has the spare length `slack`, m. A missing length counts twice.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current one. The trial has `slack`, its spare length at Rx,
-    /// m, for the target `sigma`, in ln(SIR).
+    /// Returns true if a trial chain is better than the current one. The trial has the spare length `slack` at Rx, m,
+    /// for the target `sigma`, in ln(SIR).
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -290,8 +306,8 @@ impl Ascent {
         turn
     }
 
-    /// Makes a successful trial the current chain; returns the next action. The trial had the fraction `share` of the
-    /// moves, and has `slack`, its spare length at Rx, m, for the target `sigma`, in ln(SIR).
+    /// Makes a successful trial the current chain; returns the next action. In the trial the relays made the fraction
+    /// `share` of their moves. It has the spare length `slack` at Rx, m, for the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -310,8 +326,8 @@ impl Ascent {
         }
     }
 
-    /// Continues after the target was raised to `sigma`, as far as the unchanged chain allows. `slack` is the chain's
-    /// spare length for it, m. Returns the next action.
+    /// Continues after a search for the highest target of the unchanged chain; returns the next action. The search
+    /// found `sigma`, in ln(SIR), for which the chain has the spare length `slack` at Rx, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

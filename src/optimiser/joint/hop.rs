@@ -42,8 +42,9 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of a hop's *reach*, the dependent coordinate of its end at maximum length. Its variables are the hop's
-/// start p, the two free coordinates w of its end, and the target in ln(SIR).
+/// Derivatives of the end of a hop of maximum length, with which the joint method computes moves. Such a hop just
+/// meets its target. So one coordinate of its end (the dependent one) follows from the other two, w, from the hop's
+/// start p, and from the target.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -53,18 +54,19 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Mixed second derivatives of the reach (the end's dependent coordinate). There is a row for each free
-    /// coordinate w_i of the end, with the derivatives by the start p.
+    /// Second derivatives of the third coordinate of the hop's end, which depends on w and p. w are the other two
+    /// coordinates of the end, p is the start. There is a row for each coordinate of w, with a value for each
+    /// coordinate of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the reach (the end's dependent coordinate) by the end's free coordinates w. The order is
-    /// w_1 twice, w_1 and w_2, w_2 twice.
+    /// Second derivatives of the third coordinate of the hop's end by the other two, w_1 and w_2. The order is w_1
+    /// w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the reach (the end's dependent coordinate) by the target in ln(SIR), m.
+    /// Derivative of the third coordinate of the hop's end by the target in ln(SIR), m. The other two are fixed.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// Derivatives of a hop whose end does not move with its start or its target: all are 0.
+    /// Derivatives of a hop whose end depends neither on its start nor on its target: all are 0.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -76,9 +78,9 @@ impl Reach {
 
     /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`.
     ///
-    /// In each triple the dependent coordinate of the hop's end is first. `c` is target SIR over gain, and `noise`
-    /// the noise over the interferer's power received at 1 m, 1/m^2. [`Reach::FIXED`] if the end is at the rim of the
-    /// positions that meet the target, where no coordinate depends on the others.
+    /// The points have the dependent coordinate of the hop's end first. `c` is target SIR over gain, and `noise` the
+    /// noise over the interferer's power received at 1 m, 1/m^2. Returns [`Reach::FIXED`] if the end is at the rim of
+    /// the positions that meet the target, where no coordinate depends on the others.
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -127,8 +129,9 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of q(s) = s / (1 + nu s), the inverse interference plus noise. s is the squared
-/// distance from the interferer, m^2, and nu the noise over the interferer's power received at 1 m, 1/m^2.
+/// Derivatives q'(s) and 2 q''(s) of q(s) = s / (1 + nu s), the inverse of interference plus noise. s is the squared
+/// distance from the interferer, m^2, and nu the noise over the interferer's power received at 1 m, 1/m^2; q has the
+/// unit of s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -157,7 +160,7 @@ pub(crate) enum Coordinate {
     H,
 }
 
-/// Position (x, y, h), m, or three other numbers of which each belongs to one coordinate.
+/// Vector with one component for each of the coordinates x, y and h: a position, m, or a derivative.
 pub(crate) type Triple = [f32; 3];
 
 impl Coordinate {
@@ -213,14 +216,16 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition for a hop to meet its target: s + `spare` >= `c` l. s and l are the squared distances of the hop's end
-/// from the interferer and from the sender, m^2. `c` is target SIR over gain, raised for noise.
+/// Condition s + `spare` >= `c` l for a hop to meet its target. s and l are the squared distances of the hop's end
+/// from the interferer and from the sender, m^2. `c` is target SIR over gain; with noise it is larger, and `spare` is
+/// above 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
-    /// Difference `c` - 1, computed without cancellation. `c` is target SIR over gain, raised for noise.
+    /// Difference `c` - 1, computed without cancellation. `c` is target SIR over gain, increased by noise.
     pub(super) e: f32,
-    /// Squared length that is added to s in the condition s + `spare` >= `c` l, m^2; 0 without noise.
+    /// Constant in the condition s + `spare` >= `c` l for a hop to meet its target, m^2; 0 without noise. s and l are
+    /// the squared distances of the hop's end from the interferer and from the sender.
     pub(super) spare: f32,
 }
 
@@ -229,10 +234,11 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the noise-free condition that equals the condition with noise at one distance.
+    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is that of the hop's
+    /// end from the interferer, m^2. The result has the form of a condition without noise.
     ///
-    /// `s` is the squared distance of the hop's end from the interferer, m^2, `noise` the noise over the interferer's
-    /// power received at 1 m, 1/m^2, `c` target SIR over gain, and `e` is c - 1.
+    /// `noise` is the noise over the interferer's power received at 1 m, 1/m^2, `c` is target SIR over gain, and `e`
+    /// is c - 1.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

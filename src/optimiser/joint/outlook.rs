@@ -11,8 +11,8 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: dependence of the chain's slack on one relay's position. The slack is the
-/// chain's spare length at Rx. Later relays are assumed to react optimally.
+/// Value function of the joint method: the chain's spare length at Rx as a function of one position. It is a
+/// quadratic model about the current position of one relay, and assumes that later relays react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack (spare length at Rx) by the relay's x, y and h, m per m.
@@ -56,8 +56,9 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty for a relay too close to the interferer, `weight` `near`^2 / 2. `slope` and `by_target`
-    /// are the derivatives of `near` by the relay's position and by the target in ln(SIR).
+    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the squared
+    /// distance that is missing, m^2; `slope` and `by_target` are its derivatives by the relay's position and by the
+    /// target in ln(SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -71,9 +72,9 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function from the hop's receiver to its sender; returns the receiver's policy. The
-    /// receiver is a relay; `axis` is its dependent coordinate. Its move in the two free coordinates is limited to
-    /// [`low`, `high`], m, relative to its current position.
+    /// Propagates the value function from the receiver of `hop` to its sender; returns the policy. The policy is the
+    /// receiver's move in two coordinates, within [`low`, `high`], m, relative to its current position. Its third
+    /// coordinate, `axis`, then follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -152,24 +153,25 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     sum
 }
 
-/// Policy of a relay in the joint method: its move in one iteration, in the two free coordinates.
+/// Policy of a relay in the joint method: its move in one iteration, in two of its coordinates.
 ///
-/// The third coordinate follows from the maximum length of the hop. The move depends linearly on that of the previous
-/// relay.
+/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on that of
+/// the previous relay.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True to take the larger of two solutions for the relay's dependent coordinate. Given its other two
-    /// coordinates, a hop of maximum length can end at two positions, which differ in this one.
+    /// True to take the larger of two solutions for the relay's third coordinate. A hop of maximum length can end at
+    /// two positions with the same first two coordinates.
     pub(super) rising: bool,
-    /// Move of the two free coordinates if the previous relay has not moved, m.
+    /// Move of the relay in its two free coordinates if the previous relay has not moved, m.
     pub(super) step: [f32; 2],
-    /// Additional move of each free coordinate per metre that the previous relay has moved in x, y and h.
+    /// Additional move of the relay in each free coordinate for a move of the previous relay. It is in m per m that
+    /// the previous relay moves in x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature that a relay's move is divided by, relative to the largest curvature. Smaller curvature is
-/// rounding noise.
+/// Minimum curvature of the value function, relative to the largest one. A relay's move is divided by the curvature,
+/// and a smaller value is only rounding noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
@@ -246,9 +248,10 @@ impl Policy {
         }
     }
 
-    /// Returns the relay's move in its two free coordinates, m, for the fraction `share` of its own step.
+    /// Returns the relay's move in its two free coordinates, m; the third one follows from the hop.
     ///
-    /// `change` is the move of the previous relay in x, y and h, m, to which the relay reacts.
+    /// It is the fraction `share` of the relay's own step, plus the reaction to `change`, the move of the previous
+    /// relay in x, y and h, m.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;

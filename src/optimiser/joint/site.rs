@@ -13,19 +13,21 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::{Sender, in_noise, square};
 
-/// Fraction of the squared maximum hop length that the joint method uses, to stay clear of rounding.
+/// Fraction of the squared maximum length of a hop that the joint method uses. The rest is a margin for rounding
+/// errors.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation in the joint method, so that a small violation of it is harmless.
+/// Factor by which the joint method increases the minimum separation. Its positions may violate the separation
+/// slightly, and the margin makes that harmless.
 pub(super) const MARGIN: f32 = 1.0005;
 
 /// Number of Newton steps to the point at which a hop with noise is linearised (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Number of bisection steps of [`Site::halved`], for a path whose end is out of reach.
+/// Number of bisection steps by which [`Site::halved`] finds the farthest reachable point of a path.
 const HALVINGS: u8 = 12;
 
-/// Relay whose position the joint method computes, with the hop to it.
+/// Relay whose position the joint method computes, with the sender of the hop to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
@@ -68,7 +70,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns this relay without a minimum separation from its sender.
+    /// Returns this relay without the minimum separation from its sender.
     pub(crate) fn unparted(self) -> Self {
         Self {
             apart_m: 0.0,
@@ -76,10 +78,10 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the position at the lateral offset and altitude `wanted` with the largest x for `target`.
+    /// Returns the position of largest x that meets `target` with the lateral offset and altitude `wanted`.
     ///
-    /// The sender is at x = `from_m`. If its hop cannot reach `wanted`, the closest lateral offset and altitude that
-    /// it reaches are taken. `None` if no hop meets the target. The position's x is at most Rx's.
+    /// The sender is at x = `from_m`. If the hop cannot reach `wanted`, the closest lateral offset and altitude that
+    /// it can reach are used. `None` if no hop meets the target. The x is at most that of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -173,8 +175,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest reachable position on a path across the line, by bisection. The path leads from the
-    /// lateral offset and altitude of the sender to those `wanted`.
+    /// Returns the farthest position that the hop reaches on a straight path across the line Tx to Rx. The path leads
+    /// from the sender's lateral offset and altitude to those `wanted`; it is searched by bisection.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -195,10 +197,10 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Returns the relay's new lateral offset and altitude after the fraction `share` of its step.
+    /// Returns the relay's new lateral offset and altitude after a part of its computed move.
     ///
-    /// `policy` gives the step. The sender has moved by `change` and is at `from`; the relay itself is still at
-    /// `nominal`. The hop has to meet `target`.
+    /// `policy` gives the move, of which the fraction `share` is made. The sender has moved by `change` and is at
+    /// `from`; the relay itself is still at `nominal`. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -257,9 +259,10 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns the dependent coordinate of the relay, m, at which the hop from `from` just meets `target`.
+    /// Returns the third coordinate of the relay, m, at which the hop from `from` just meets `target`.
     ///
-    /// `at` are its two free coordinates, m. `None` if no position with these just meets the target.
+    /// `at` are the relay's two free coordinates, m; `policy` says which two. `None` if no position with these just
+    /// meets the target.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {
@@ -288,8 +291,9 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Returns the first coordinate of the end of a hop that just meets its target. `a` and `b` are the other two
-/// coordinates. There may be two solutions: `rising` selects the larger one. `None` if there is none.
+/// Returns the coordinate of a hop's end at which the hop just meets its target, m. The triples have this coordinate
+/// first; `a` and `b` are the other two of the end. There may be two solutions: `rising` selects the larger one.
+/// `None` if there is none.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -315,8 +319,8 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point on the line from `best` to `wanted` at which it leaves a circle. `middle` is the centre, and
-/// `rim` the squared radius, m^2. `None` if `best` is outside.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. `middle` is the circle's centre, and
+/// `rim` its squared radius, m^2. `None` if `best` is outside.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -444,7 +448,8 @@ impl Room {
     }
 }
 
-/// Fraction of the maximum SIR of the first or the last hop that is used as the chain's upper bound.
+/// Factor on the maximum SIR of the first or last hop, which gives the upper bound of the chain's SIR. The margin
+/// leaves the first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
 /// Number of bisection steps for the optimum of a first hop with noise.
@@ -499,10 +504,11 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Returns the slack of the last hop for `target`, m, and the derivatives of the slack.
+/// Returns the spare length of the last hop for `target`, m, and its derivatives.
 ///
-/// The slack is the hop's maximum length less its length. The derivatives are by the position of the last relay,
-/// which is at `at`, with `power_w` watts. `room` has its allowed lateral offsets and altitudes.
+/// The spare length is the hop's maximum length less its length. The derivatives are by the position of the last
+/// relay, which is at `at`, with `power_w` watts. `room` has the lateral offsets and altitudes that it may choose
+/// from.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,
@@ -525,23 +531,24 @@ pub(super) fn tail(
     (slack, outlook)
 }
 
-/// Weight of the penalty for a violated minimum separation, in units of D. It outweighs any gain of spare length at
-/// Rx.
+/// Weight of the penalty for a violated minimum separation, in units of D. It is so large that no gain of spare
+/// length at Rx is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from the end of its allowed range at which a relay counts as at the end, in units of D.
+/// Distance from a limit of its allowed range at which a relay counts as at that limit, in units of D.
 const EDGE: f32 = 2e-6;
 
-/// Relative margin of a hop's squared length up to which the hop counts as fully stretched.
+/// Maximum unused part of a hop's squared length for which the hop counts as fully stretched. It applies to hops that
+/// end at the x of Rx. A hop with a larger unused part does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns how much a relay at `to` is too near the interferer, a weight, and a derivative.
+    /// Returns the squared distance by which a relay at `to` is too near the interferer, m^2, or 0. The second result
+    /// is the weight of the penalty for that, the third the derivative of the squared distance by the target in
+    /// ln(SIR).
     ///
     /// A hop of maximum length that ends near the interferer is short. It violates the minimum separation d_min if
-    /// |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with noise if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2. The
-    /// first result is the missing squared distance, m^2. The derivative is that of this distance by the target in
-    /// ln(SIR).
+    /// |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with noise if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
@@ -556,17 +563,17 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty of a relay at `to` that is too near the interferer. It is a length that is subtracted from
-    /// the chain's spare length at Rx, m.
+    /// Returns the penalty for a relay at `to` that is too near the interferer, m; 0 if it is not. The penalty is
+    /// subtracted from the chain's spare length at Rx.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
     }
 
-    /// Returns the policy of the relay at `to`, and propagates the value function to the one at `from`.
+    /// Computes the policy (the move) of the relay at `to`, and the value function of its sender at `from`.
     ///
-    /// `outlook` is the value function. The relay's move is limited to `trust` times its distance from the
-    /// interferer. Work: some 400 multiplications and two square roots.
+    /// `outlook` is the value function of the relay, and becomes that of the sender. The move is limited to `trust`
+    /// times the relay's distance from the interferer. Work: some 400 multiplications and two square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -620,10 +627,10 @@ impl Site<'_> {
         }
     }
 
-    /// Selects the dependent coordinate of the hop's end, which is computed from the other two.
+    /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// Returns it and the derivative of F by it; F is 0 for a hop of maximum length (see `hop`). The coordinate is
-    /// the one with the steepest slope of those that are not at an end of their allowed range, `low` to `high`.
+    /// It is the one with the steepest slope of those that are not at a limit of their allowed range, `low` to
+    /// `high`. The second result is the derivative by it of F; F is 0 for a hop of maximum length (see `hop`).
     fn axis(
         &self,
         c: f32,

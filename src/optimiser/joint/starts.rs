@@ -14,30 +14,32 @@ use crate::sir::square;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Start {
-    /// Parabola over the line Tx to Rx. In the middle, `aside` and `up` are its lateral offset and height, in units
-    /// of D / 2.
+    /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and height of its middle,
+    /// in units of D / 2.
     Arch { aside: f32, up: f32 },
-    /// Spiral about the interferer: first to a position right above or beside it, then to Rx.
+    /// Initial chain on a spiral about the interferer. It leads from Tx to Rx through a position right above or
+    /// beside the interferer.
     ///
     /// `aside` and `up` are the direction of that position from the interferer; `far` is its distance, relative to
     /// the geometric mean of the distances of Tx and Rx.
     Around { aside: f32, up: f32, far: f32 },
-    /// Parabola as `Arch`, without a minimum separation. Its highest target is found with hops as in the relays'
-    /// messages; a relay may stay short of its farthest position.
+    /// Initial chain on a parabola as `Arch`, computed without a minimum separation. Its highest target is then
+    /// searched with hops computed as by the relays; a relay may stay short of its farthest position.
     Through { aside: f32, up: f32 },
-    /// Parabola to the side, with altitudes interpolated between the relays with a fixed altitude.
+    /// Initial chain for relays of which some have a fixed altitude: a parabola to the side. The altitudes of the
+    /// others are interpolated.
     ///
-    /// `level` is true if the altitude is constant before the first and after the last of those relays, false if it
-    /// goes down to Tx and Rx.
+    /// `level` is true if the altitude is constant before the first and after the last fixed one, false if it goes
+    /// down to Tx and Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Zigzag for relays that do not fit one behind the other with their separation. They alternate between a corner
-    /// of the allowed lateral offsets and altitudes, and a position one separation beside it. The corner is at the
-    /// highest altitude, on the side away from the interferer.
+    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation. The relays
+    /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside
+    /// it. The corner is at the highest altitude, on the side away from the interferer.
     Turns,
-    /// Chain at the lowest altitude, for a target so high that no hop can pass the interferer in one leap.
+    /// Initial chain at the lowest altitude, for a high target. No hop can then pass the interferer in one leap.
     Near,
-    /// Chain with relay 1 at the x of Rx, high above it or far to its side. The others are on the way down from
-    /// there.
+    /// Initial chain with relay 1 at the x of Rx, high above it or far to its side. The lateral offsets and altitudes
+    /// of the other relays lead down from there in equal steps.
     Far,
 }
 
@@ -56,7 +58,8 @@ const ARCHES: [(f32, f32); 7] = [
 /// Number of entries of [`ARCHES`], the first ones, that are also tried without a minimum separation.
 const THROUGH: usize = 3;
 
-/// Initial chains for fixed altitudes: lateral offset in units of D / 2, and true if level at the ends.
+/// Initial chains for relays of which some have a fixed altitude. Each has the lateral offset of its middle, in units
+/// of D / 2, and true if the altitude is level toward Tx and Rx.
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -66,8 +69,8 @@ const HELD: [(f32, bool); 6] = [
     (0.25, true),
 ];
 
-/// Spiral initial chains: `aside`, `up` and `far` of each. They are lateral offset, height and distance of the
-/// intermediate position from the interferer. The distance is relative to the geometric mean of those of Tx and Rx.
+/// Spiral initial chains: `aside`, `up` and `far` of each. These are the direction of an intermediate position from
+/// the interferer (lateral, up), and its distance relative to the geometric mean of the distances of Tx and Rx.
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
     (1.0, 0.0, 1.0),
@@ -80,11 +83,12 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral path about the interferer: the logarithm of the distance changes linearly with the direction.
+/// Spiral path about the interferer. On it the logarithm of the distance from the interferer changes linearly with
+/// the angle.
 struct Way {
     to: Triple,
     angle: f32,
-    /// Increase, over the whole spiral, of the logarithm of the distance from the interferer.
+    /// Logarithm of the distance from the interferer at the end of the spiral, less that at its start.
     rise: f32,
     length: f32,
 }
@@ -106,8 +110,8 @@ impl Way {
         }
     }
 
-    /// Returns the end of a hop from `here` along the spiral, relative to the interferer. The hop is `step` times as
-    /// long as its end's distance from the interferer.
+    /// Returns the end of a hop along the spiral from `here`; both points are relative to the interferer. The hop's
+    /// length is `step` times the distance of its end from the interferer.
     fn after(&self, here: Triple, step: f32) -> Triple {
         let bend = 0.5 * step * self.rise / self.length;
         let share = (step * libm::expf(bend.clamp(-1.0, 1.0)) / self.length).min(1.0);
@@ -122,7 +126,7 @@ impl Way {
     }
 }
 
-/// Minimum length by which the spiral's computation divides, to avoid a division by 0.
+/// Minimum divisor in the computation of a spiral, so that it never divides by 0.
 const SHORTEST: f32 = 1e-6;
 
 /// Maximum tangent of the angle by which one hop of a spiral turns about the interferer.
@@ -297,7 +301,7 @@ impl Seek {
     /// Records the result of the current target; returns true if there is another one to try.
     ///
     /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
-    /// position. `Some(true)`: it is met only if some relays stay short of it.
+    /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),

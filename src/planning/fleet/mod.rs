@@ -37,11 +37,11 @@ pub struct Fewest {
     pub proven: bool,
 }
 
-/// Highest target SIR that any number of relays meets.
+/// Highest target SIR that a chain of any number of relays meets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Most {
-    /// Highest target SIR that is met, linear, to 1e-6 relative.
+    /// Highest target SIR that is met, linear, with a relative error of 1e-6.
     pub target: f32,
     /// Minimum number of relays that meets `target`.
     pub relays: u16,
@@ -50,7 +50,8 @@ pub struct Most {
 /// Lowest target searched by [`Most::of`], as a fraction of the highest possible SIR of the first hop.
 const DEPTH: f32 = 1e-20;
 
-/// Number of bisection steps in [`Most::of`]. Its range of ln(target) is 46 wide, so it is found to 1e-8.
+/// Number of bisection steps in [`Most::of`]. The search covers a range of 46 in ln(target), so the target is found
+/// to 1e-8 relative.
 const HALVINGS: u8 = 32;
 
 impl Fewest {
@@ -130,8 +131,8 @@ impl Mission {
     }
 }
 
-/// Returns the minimum number of relays for `target`. Its field `proven` is true if that is proven without a minimum
-/// separation.
+/// Returns the minimum number of relays for `target`. Its field `proven` is only valid for a mission without a
+/// minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))
@@ -224,8 +225,9 @@ fn required_places(
     settled(&chain, places).is_some() || settled(&plain, places).is_some()
 }
 
-/// Writes positions that meet the target to `places`; `None` if there are none. First each relay's reach, the
-/// farthest x at which its hop meets the target; then, from the last relay back, the x that the next hop requires.
+/// Writes positions that meet the target to `places`; `None` if there are none. It first computes each relay's reach,
+/// the farthest x at which its hop meets the target; then, from the last relay back, the x that the next hop
+/// requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let (slack, mut place) = chain.ends(|index, reach| {
@@ -259,7 +261,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
     }
 }
 
-/// Number of additional relays that are tried if a minimum separation excludes the minimum number.
+/// Number of additional relays that are tried if the minimum separation makes the minimum number fail.
 const MORE: u16 = 32;
 
 #[cfg(feature = "internals")]
@@ -308,12 +310,12 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
         })
 }
 
-/// Returns the highest target SIR that the mission's N relays meet in its field, all with `profile`. It is linear, to
+/// Returns the highest target SIR that the mission's N relays meet, all with `profile`, in a field. It is linear, to
 /// an f32's step.
 ///
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
-/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
-/// each three square roots for every point of the field and relay.
+/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven
+/// field. Work: 48 chains, each three square roots for every point of the field and relay.
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {

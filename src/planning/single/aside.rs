@@ -77,7 +77,7 @@ use crate::place::Placement;
 
 pub use super::edge::EdgeCoordinate;
 
-/// Number of bisection steps in f64: enough for an error far below an f32's step.
+/// Number of bisection steps, in f64: enough for an error far below an f32's step.
 const HALVINGS: u8 = 48;
 
 /// Geometric case of the optimal position of a single relay that may move sideways.
@@ -107,7 +107,7 @@ pub enum AsideCase {
 }
 
 impl AsideCase {
-    /// Number of the case: 1 to 3 without limits, 4 to 6 for edges along x, y and h, then 7 to 10.
+    /// Number of the case, 1 to 10. Cases 1 to 3 are optima without limits, 4 to 6 those on edges along x, y and h.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -125,9 +125,9 @@ impl AsideCase {
 /// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The
 /// position is in [0, D] and in the allowed lateral range.
 ///
-/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64, with noise as many for each. If the
-/// optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral range some 23
-/// 000 more.
+/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64; with noise each of them takes 48
+/// more. If the optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral
+/// range some 23 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
@@ -135,8 +135,8 @@ pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)
 /// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The
 /// position is in [0, D] and in the allowed ranges of altitudes and lateral offsets.
 ///
-/// Work: 48 bisection steps in f64, with noise as many for each. If the optimum without limits is not allowed, some
-/// 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
+/// Work: 48 bisection steps in f64; with noise each of them takes 48 more. If the optimum without limits is not
+/// allowed, some 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }
@@ -217,7 +217,7 @@ fn holds(band: Band, value: f32) -> bool {
     (band.least_m..=band.most_m).contains(&value)
 }
 
-/// Returns the optimal position at one altitude, without limits in x and y, and its case.
+/// Returns the optimal position at `altitude_m`, without limits in x and y, and its case.
 fn without_limits(
     mission: &Mission,
     interferer: &Interferer,
@@ -241,8 +241,8 @@ fn without_limits(
     (place, case)
 }
 
-/// Horizontal plane at one altitude with all that determines both SIRs. In m and m^2: D, interferer (X, Y), h^2, G =
-/// K / A of both gains, noise nu.
+/// Horizontal plane at one altitude, with all numbers that determine both hops' SIRs in it. In m and m^2: D,
+/// interferer (X, Y), h^2, ratio G = K / A of the gains of both hops, noise nu.
 struct Plane {
     d: f64,
     x: f64,
@@ -283,14 +283,14 @@ impl Plane {
         (self.loudest(high), AsideCase::Touching)
     }
 
-    /// Returns SIR_1 / A at (x, y): the SIR of the first hop over its gain.
+    /// Returns SIR_1 / A at (x, y), the SIR of the first hop over its gain.
     fn first(&self, (x, y): (f64, f64)) -> f64 {
         let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// Returns t, which gives the position of the largest SIR of the first hop: -t (X, Y). It is opposite the
-    /// interferer (X, Y) as seen from Tx. `q` is X^2 + Y^2.
+    /// Returns t of the position -t (X, Y) at which the first hop has its largest SIR. The interferer is at (X, Y),
+    /// and Tx at (0, 0), so the position is opposite the interferer as seen from Tx. `q` is X^2 + Y^2.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {
@@ -313,7 +313,8 @@ impl Plane {
         low
     }
 
-    /// Returns the point on the circle of radius `s` about Rx with the first hop's largest SIR, with noise.
+    /// Returns the point on a circle about Rx at which the first hop has its largest SIR, with noise. `s` is the
+    /// radius of the circle, m.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
         let at = |w: f64| (self.d - s * libm::cos(w), s * libm::sin(w));
         // From the point closest to Tx, at 0, to that farthest from the interferer.

@@ -83,7 +83,7 @@ pub enum EdgeCoordinate {
     Upward = 6,
 }
 
-/// Evaluator of both hops of a mission with a single relay, which may be anywhere.
+/// SIRs of both hops of a mission with a single relay, for any position of that relay.
 #[derive(Clone, Copy)]
 pub(super) struct TwoHops<'a> {
     pub(super) mission: &'a Mission,
@@ -105,8 +105,8 @@ impl TwoHops<'_> {
     }
 }
 
-/// Edge of the box in which a relay may be. `free` is the coordinate that varies, within `room`, m; the other two are
-/// those of `through`.
+/// Edge of the box in which a relay may be. On it the coordinate `free` varies within `room`, m, and the other two
+/// are those of `through`.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
     pub(super) free: EdgeCoordinate,
@@ -187,8 +187,8 @@ impl Edge {
         best
     }
 
-    /// Returns the best position on the part of the edge from above `low` to `high`, m. Each SIR only rises or only
-    /// falls there.
+    /// Returns the best position between `low` and `high` on the edge, without `low` itself, m. Each hop's SIR must
+    /// only rise or only fall between the two.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -234,13 +234,13 @@ pub(super) fn narrow(value: f64) -> f32 {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Maximum number of doublings of a coordinate in the search for a point at which a condition fails.
+/// Maximum number of doublings of a coordinate in the search for a point that fails a condition.
 const DOUBLINGS: u8 = 100;
 
-/// Returns the extrema of the first hop's SIR along an edge, with noise, m; missing ones are NaN.
+/// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. Missing ones are NaN.
 ///
-/// The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t - `p`)^2 + `a`, where t varies along the edge.
-/// `noise` is nu.
+/// The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t - `p`)^2 + `a`, where the coordinate t varies
+/// along the edge. `noise` is nu.
 fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     if !(libm::fabs(p) > 0.0) {
         let squared = libm::sqrt((b - a) / noise) - a;
@@ -307,7 +307,8 @@ impl Slope {
     }
 }
 
-/// Returns the last t in [`low`, `high`] at which `holds` is true. It is true at `low` and changes once.
+/// Returns the last t in [`low`, `high`] at which `holds` returns true. It must be true at `low` and become false
+/// once.
 fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..NOISY_HALVINGS {
@@ -335,10 +336,10 @@ fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
 /// Number of lines along x on either side of y = 0 in the search for the best position at one altitude.
 const LINES: u8 = 24;
 
-/// Number of the best lines along x that the search for the best position at one altitude refines.
+/// Number of the best lines along x that are refined. The best position at one altitude is searched on such lines.
 const FOLLOWED: usize = 3;
 
-/// Number of golden-section steps in y about each refined line of the search at one altitude.
+/// Number of golden-section steps in y near each of the best lines along x.
 const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
@@ -406,8 +407,8 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts `new` into the list of the best lines along x, best first, if it is better than one of them. Each has the
-/// SIR of the line, and the y of the lines on either side of it.
+/// Inserts the line `new` into the list of the best lines along x if it is better than one of them. The best one is
+/// first. Each entry has the best SIR on the line, and the y of the lines on either side.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {
@@ -417,9 +418,9 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     }
 }
 
-/// Returns the position in the plane y = `y_m` at which the curves of constant SIR touch. There is one such curve
-/// through it for each hop. `None` if it is outside of [0, D] or of the altitudes `band`, and without noise. Work: 40
-/// bisection steps.
+/// Returns the position in the plane y = `y_m` at which the two hops' curves of constant SIR touch. `None` if it is
+/// outside of [0, D] or of the altitudes `band`, and without noise, where it does not exist. Work: 40 bisection
+/// steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -459,8 +460,8 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane y = y0 with all that determines both SIRs there. In m and m^2: D, interferer's X, (y0 - Y)^2, y0^2,
-/// noise nu, and G = K / A of both gains.
+/// Vertical plane y = y0, with all numbers that determine both hops' SIRs in it. In m and m^2: D, interferer's X, (y0
+/// - Y)^2, y0^2, noise nu, ratio G = K / A of the gains of both hops.
 struct Face {
     d: f64,
     x: f64,
@@ -471,8 +472,8 @@ struct Face {
 }
 
 impl Face {
-    /// Returns the best position for the first hop on a circle about Rx in this plane: x - D, m. `r` is the radius of
-    /// the circle, m.
+    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane, as x - D, m. `r` is the
+    /// radius of the circle, m.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);
@@ -481,8 +482,8 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// Returns the first hop's largest SIR, over its gain, on a circle about Rx in this plane. `r` is the radius of
-    /// the circle, m.
+    /// Returns the first hop's largest SIR on a circle about Rx in this plane, over the hop's gain. `r` is the radius
+    /// of the circle, m.
     fn first(&self, r: f64) -> f64 {
         let (z, gap) = (self.best(r), self.d - self.x);
         let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;

@@ -34,18 +34,18 @@ const HALVINGS: u8 = 40;
 pub struct Found {
     /// Position of the single relay.
     pub place: Placement,
-    /// Smaller one of SIR_1 (hop from Tx) and SIR_2 (hop to Rx), linear.
+    /// SIR of the worse hop, linear: the smaller one of SIR_1 (from Tx) and SIR_2 (to Rx).
     pub sir: f32,
 }
 
 impl Found {
-    /// Returns `self` or `other`, whichever has the higher SIR; `self` if they are equal.
+    /// Returns the better one of `self` and `other`, by its SIR; `self` if both are equal.
     fn or(self, other: Self) -> Self {
         if other.sir > self.sir { other } else { self }
     }
 }
 
-/// Evaluator of both hops of a mission with a single relay above the line, at one altitude.
+/// SIRs of both hops of a mission with a single relay. The relay is above the line Tx to Rx, at one altitude.
 #[derive(Clone, Copy)]
 struct Two<'a> {
     mission: &'a Mission,
@@ -72,8 +72,8 @@ impl Two<'_> {
         }
     }
 
-    /// Returns the position with x in [`low`, `high`] at which SIR_1 falls below SIR_2. These are the SIRs of the
-    /// first and the second hop. The result is the better of the two f32 values of x next to the crossing.
+    /// Returns the position between `low` and `high` at which SIR_1 (first hop) falls below SIR_2 (second). `low` and
+    /// `high` are x, m. The result is the better of the two f32 values of x next to the crossing.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

@@ -79,7 +79,7 @@ use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Extremum, first_hop_turn, square};
 
-/// Case of the optimal x at a given altitude; the first five are Corollary 1's, for X >= 0.
+/// Case of the optimal x at a given altitude. The first five cases are those of Corollary 1, for X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -91,8 +91,8 @@ pub enum PlaceCase {
     Crossing = 2,
     /// Optimum at x = D: the first hop's SIR falls all the way to Rx, and is the higher one even there.
     AboveRx = 3,
-    /// Optimum where both hops have the same SIR, before the minimum of the first hop's. Or at x = D, if the first
-    /// hop's SIR has recovered by then.
+    /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is at x = D
+    /// instead if the first hop's SIR has risen enough beyond its minimum.
     BeforeValley = 4,
     /// Optimum at x = D: the first hop's SIR has a minimum before Rx, and is the higher one even there.
     OverValley = 5,
@@ -192,17 +192,18 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     })
 }
 
-/// Case of the optimal altitude at a given x; the first three are Theorem 2's.
+/// Case of the optimal altitude at a given x. The first three cases are those of Theorem 2.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum AltitudeCase {
-    /// Optimum at the lowest altitude: both hops' SIRs fall with the altitude (x <= Psi^h, or X <= 0).
+    /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises. This is so if X <= 0, or if x <=
+    /// (X^2 + Y^2) / 2X, the paper's Psi^h.
     BothFall = 1,
     /// Optimum at the altitude where the first hop's SIR, rising with altitude, equals the second's.
     Crossing = 2,
     /// Optimum at the lowest altitude, or at the highest one up to which the first hop's SIR rises. The two hops'
-    /// SIRs are equal nowhere between.
+    /// SIRs are equal at no altitude in between.
     End = 3,
     /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,
@@ -260,8 +261,8 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and up to which altitude, m. That altitude
-/// is limited to the allowed range `band`.
+/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and the end of the rise. The end is an
+/// altitude, m, limited to the allowed range `band`.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
@@ -274,8 +275,8 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Location of the optimum in the rectangle of allowed x and altitudes. It is an edge with its case, or the inside.
-/// On a corner it is the first of the edges.
+/// Place of the optimum among the allowed x and altitudes: an edge of their rectangle, or its inside. An edge is
+/// given with its case; an optimum on a corner is on the first of its edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {

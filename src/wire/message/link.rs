@@ -7,7 +7,8 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// Hello message: the sender's state of the chain, view and mission, on the side of the destination.
+/// Hello message: the sender's neighbour, received nodes, connected relays, view and mission. Neighbour and received
+/// nodes are those on the side to which the message is sent.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "seven flags of the wire format"
@@ -19,7 +20,7 @@ pub struct Hello {
     pub mission: u16,
     /// Identifier of the latest view known to the sender.
     pub latest_view: ViewId,
-    /// Neighbour of the sender on the side of the destination; 0 for none.
+    /// Node number of the sender's neighbour on the side to which this message is sent; 0 for none.
     pub neighbour: u16,
     /// True to request a hello in return.
     pub requests_reply: bool,
@@ -27,34 +28,37 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could join between the destination and the destination's neighbour on this side. The sender
-    /// and that neighbour receive each other.
+    /// True if the sender could be inserted between the destination and the destination's neighbour. That is the
+    /// neighbour on the side of the sender; the sender and that neighbour must receive each other.
     pub ready: bool,
-    /// Number of connected relays from the sender on, away from the destination: 1 to 1000. The sender is included.
+    /// Number of connected relays from the sender to the end of the chain away from the destination. It includes the
+    /// sender: 1 to 1000.
     pub behind: u16,
-    /// Bit set of the nodes on the destination's side that the sender receives: 0 to 15. Bit 0 is the nearest.
+    /// Bit set of the nodes that the sender receives, on the side to which this message is sent. Bit i, 0 to 3,
+    /// stands for the node whose number differs from the sender's by i + 1.
     pub hears: u8,
     /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,
-    /// True if the sender flies the mission `latest_mission`.
+    /// True if the sender uses the mission `latest_mission` now.
     pub active: bool,
-    /// True if all relays of the sender's view fly the mission `latest_mission`, an uploaded one.
+    /// True if all relays of the sender's view use `latest_mission`, a mission uploaded in flight.
     pub active_in_view: bool,
-    /// True if a relay refuses the mission `latest_mission`. It is the sender, which flies another mission, or a
-    /// relay beyond it.
+    /// True if the mission `latest_mission` is refused. The sender refuses it, or a relay farther from the
+    /// destination.
     pub refused: bool,
-    /// Number that a mission offer in reply to this hello has to repeat; 0 if the sender accepts no offer.
+    /// Number that the reply to this hello must repeat if it is a mission offer. 0 if the sender accepts no offer.
     pub offer_number: u16,
 }
 
 impl Hello {
-    /// Returns true if node `by`, the sender of this hello, receives node `of`, on the destination's side.
+    /// Returns true if the sender of this hello, node `by`, receives node `of`. False for nodes more than four
+    /// numbers away.
     pub(crate) const fn is_heard(&self, by: u16, of: u16) -> bool {
         let distance = by.abs_diff(of);
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes the fields in the order of FORMAT.md, with seven flags in one byte.
+    /// Encodes the hello into `buffer`; returns its length. The seven flags share one byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let Self {
             requests_reply: ask,
@@ -123,8 +127,8 @@ impl Hello {
     }
 }
 
-/// Claim of the sender to its node number, or the echo of another node's claim. It resolves duplicate node numbers,
-/// and is sent in both directions.
+/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions, so
+/// that two nodes with the same number detect each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
@@ -160,8 +164,8 @@ impl Claim {
     }
 }
 
-/// Encodes a fence message into `buffer`; returns its length. On the wire, the number of the fence's association
-/// (session of two neighbours) is in the place of the pass number.
+/// Encodes a fence message into `buffer`; returns its length. A fence is the limit along x that keeps two neighbours
+/// apart; `mission` is the digest in the message.
 pub(super) fn encode_fence(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
     let pass = PassId::new(fence.association, mission);
     let numbers = [fence.echo, fence.number].map(Word::new);

@@ -23,20 +23,20 @@ use self::parts::{Word, read, tag, write};
 use super::upload::{UPLOAD, Upload};
 use crate::guard::Fence;
 
-/// Maximum length of a sweep message's body, bytes. It has sixteen target SIRs with a measured field or a lateral
+/// Maximum length of a sweep message's body, bytes. It has sixteen target SIRs, and a measured Upsilon or a lateral
 /// offset.
 const SWEEP: usize = 88;
 
-/// Maximum length of a body except for a mission offer, bytes. It is that of measurements, or of a sweep without
-/// `sensing`.
+/// Maximum length of a message body, bytes, without regard to mission offers. The longest message is the one that
+/// collects measurements, or a sweep if the feature `sensing` is off.
 const LONG: usize = if cfg!(feature = "sensing") {
     round::HEARD
 } else {
     SWEEP
 };
 
-/// Maximum length of a body, bytes: that of a mission offer. Without that feature it is that of measurements or a
-/// sweep.
+/// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it
+/// is the collection of measurements, or a sweep.
 #[cfg(feature = "upload")]
 pub const MAX_BODY: usize = if offer::LENGTH > LONG {
     offer::LENGTH
@@ -46,21 +46,22 @@ pub const MAX_BODY: usize = if offer::LENGTH > LONG {
 #[cfg(not(feature = "upload"))]
 pub const MAX_BODY: usize = LONG;
 
-/// Message between neighbours. *Onward* is the direction of a pass: toward Rx, or toward Tx in an interference field.
+/// Message between neighbours. A *pass* is a message that goes along the chain once, and whose result comes back.
+/// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Message to the next relay of a pass: target SIRs, and the sender's reach (farthest x) for each.
+    /// Message to the next relay of a pass: target SIRs, and the sender's farthest x for each target.
     Sweep(Sweep),
     /// Reply to a sweep: its verdict, the result for each target. It acknowledges the sweep of the same number.
     Verdict(SweepVerdict),
-    /// Reply to a repeated pass message: it was received before, and its result is not known yet.
+    /// Reply to a duplicate of a pass message or view proposal that has no result yet.
     Busy {
-        /// Number of the pass along the chain that is in progress.
+        /// Number of the pass in progress; for a view proposal, a 16-bit hash of the proposed view.
         number: u16,
     },
     /// Either direction: heartbeat request, reply, or both.
     Heartbeat {
-        /// Digest of the sender's mission, so that a wrong configuration is detected before take-off.
+        /// Digest of the sender's mission as loaded before flight. It reveals a wrong configuration before take-off.
         mission: u16,
         /// Number of the sender's own heartbeat request, 0 for none.
         request: u16,
@@ -77,7 +78,7 @@ pub enum Message {
     Sensed(Heard),
     /// Message to the next relay of a pass of Algorithm 2: token, whose receiver may move.
     Token(Token),
-    /// Reply to a token: position of the sender and SIRs after the pass.
+    /// Reply to a token: position of the sender, and SIR of the worst hop after the sender.
     Moved(Moved),
     /// Message to the next relay: lease renewal by the view's leader.
     Pulse(Pulse),
@@ -85,16 +86,16 @@ pub enum Message {
     Pulsed(Pulsed),
     /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// Message to the next relay: proposal of a new view, which counts the present relays.
+    /// Message to the next relay: proposal of a new view. It counts the relays that it reaches.
     Proposal(Proposal),
     /// Reply to a proposal: the decision on it.
     Decision(Decision),
-    /// Either direction: limit along the line (fence) that keeps two neighbours apart.
+    /// Either direction: plane across x (fence) that keeps two neighbouring relays apart.
     Fence {
-        /// Digest of the sender's mission as loaded before flight, and of the sites of its uploaded mission. See
-        /// [`digest`](super::digest::digest).
+        /// Digest by which two neighbours check that they have the same x axis. It covers the mission loaded before
+        /// flight, and the Tx and Rx positions of an uploaded mission.
         line_digest: u16,
-        /// State of the fence at the sender.
+        /// Content of the message: the sender's limit of x, its agreed position, and flags.
         fence: Fence,
     },
     /// Either direction, also from the ground: a mission that is newer than the destination's.
@@ -108,7 +109,7 @@ pub enum Message {
     Level {
         /// Digest of the mission that the sender loaded before flight.
         mission: u16,
-        /// Mean received power, W: 1e-30 to 1e6, including the noise of that receiver.
+        /// Mean received interference power, W: 1e-30 to 1e6. It includes the noise of the measuring receiver.
         power_w: f32,
     },
     /// Either direction: claim to the sender's node number, or the echo of another node's claim.
@@ -116,7 +117,8 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest in the message, of a mission, view or line; `None` for a message without one.
+    /// Returns the digest in the message; `None` for a message without one. The receiver uses it to check that both
+    /// nodes have the same mission, view or x axis.
     pub const fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -141,7 +143,7 @@ impl Message {
         }
     }
 
-    /// Returns true for messages of passes and leases, whose digest is that of mission and view.
+    /// Returns true for messages of passes and lease renewals. Their digest identifies mission and view.
     pub(crate) const fn belongs_to_view(&self) -> bool {
         matches!(
             self,
@@ -158,7 +160,7 @@ impl Message {
         )
     }
 
-    /// Returns true for messages of a view change, whose digest is that of the proposed mission.
+    /// Returns true for messages of a view change. Their digest identifies the proposed mission.
     pub(crate) const fn is_view_change(&self) -> bool {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }

@@ -21,7 +21,7 @@ pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
     Ok((upload, answer.number()))
 }
 
-/// Encoding of an uploaded mission for storage: that of an offer message without the number it answers.
+/// Encoding of an uploaded mission for storage: an offer message without its `offer_number`.
 impl Upload {
     /// Length of an encoded upload, bytes: the message tag and the fixed-size fields of the wire format.
     pub const LENGTH: usize = size_of::<u8>() + size_of::<OfferBody>();
@@ -43,19 +43,19 @@ impl Upload {
     }
 }
 
-/// Uploaded mission on the wire: version, base, the numbers in the order of the digest, sites. It is packed, so its
-/// size in memory is that on the wire, from which [`Upload::LENGTH`] is computed.
+/// Uploaded mission on the wire. The struct is packed, so its size in memory is the length on the wire, from which
+/// [`Upload::LENGTH`] is computed.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Version of the upload, and digest of the mission that it replaces.
+    /// Version of the upload, and digest of the mission loaded before flight that the upload replaces.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// SIR needed from Rx to Tx relative to that from Tx to Rx, and the power of Rx, W.
+    /// Required SIR from Rx to Tx, relative to that from Tx to Rx, and transmit power of Rx in W.
     back: [f32; 2],
     /// Positions of Tx and Rx, encoded by [`Sites::to_bytes`]; all 0 if the upload has none.
     sites: SitesBody,

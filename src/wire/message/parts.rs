@@ -8,7 +8,8 @@ use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
-/// Message tags: the first byte of a body, which is the kind of message. Sweeps have three kinds.
+/// Message tags: the first byte of a body, which names the kind of message. `SWEEP`, `MEASURED` and `ASIDE` are all
+/// sweeps.
 pub(super) mod tag {
     pub(crate) const SWEEP: u8 = 0;
     pub(crate) const VERDICT: u8 = 1;
@@ -73,9 +74,9 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Decodes a list of one number per target SIR; returns the list and the remaining bytes. postcard also accepts
-/// longer encodings, with a count padded by empty varint bytes, up to a limit that depends on the width of usize.
-/// They are rejected here, so that all nodes accept the same.
+/// Decodes a list of one number per target SIR; returns the list and the remaining bytes. A list whose count is
+/// padded with empty varint bytes is rejected, although postcard accepts it up to a limit that depends on the width
+/// of usize. So all nodes accept the same lists.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -86,7 +87,8 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum length or x in a message, m. A position is at most 1e6, and the length of the last hop is limited to 1e9.
+/// Maximum length or x in a message, m. It is twice the limit of 1e9 m for the last hop, so a sum of position (at
+/// most 1e6) and hop is always in range.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -136,7 +138,7 @@ pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
 }
 
-/// Returns true if the lateral offset `y_m`, m, is in range.
+/// Returns true if the lateral offset `y_m` is within -1e5 to 1e5 m.
 pub(super) fn is_beside(y_m: f32) -> bool {
     (-1e5..=1e5).contains(&y_m)
 }

@@ -18,7 +18,7 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each.
+/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each target.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, wrapping.
@@ -29,12 +29,13 @@ pub struct Sweep {
     pub ladder: Ladder,
     /// Lateral offset, altitude and power of the sender.
     pub relay: Station,
-    /// True if relays use the joint method's lateral offsets and altitudes, and not the configured ones.
+    /// True if relays use the lateral offsets and altitudes of the joint method. False for the configured ones.
     pub chosen: bool,
-    /// Upsilon = E[1/I] measured by the sender at its position, 1/W. `None` to use the mission's interference field.
+    /// Upsilon = E[1/I] measured by the sender at its position, 1/W. `None` if receivers must use the field, the
+    /// mission's known distribution of interference along x.
     pub measured_per_w: Option<f32>,
-    /// Reach of the sender for each target, the farthest x at which it meets the target, m. Shorter than the ladder
-    /// if the upper targets cannot be met.
+    /// Farthest x at which the sender meets each target SIR, m, from the lowest target. The list ends at the first
+    /// target that cannot be met.
     pub reaches: PerTarget,
 }
 
@@ -42,8 +43,8 @@ pub struct Sweep {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower middle target SIR, or the only one. It is negated for a plain pass, in which every relay takes the
-    /// farthest x that meets the target.
+    /// Lower of the two middle target SIRs, or the only target. A negative sign marks a plain pass, in which every
+    /// relay takes the farthest x that meets the target.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -99,7 +100,8 @@ impl Sweep {
     }
 }
 
-/// Returns the decoded sweep; `None` if a value is out of range. A sweep with a `y_m` belongs to the joint method.
+/// Returns the decoded sweep; `None` if a value is out of range. With a lateral offset `y_m` the sweep belongs to the
+/// joint method.
 fn checked(
     head: SweepHead,
     y_m: Option<f32>,
@@ -138,10 +140,11 @@ pub struct SweepVerdict {
     pub view_digest: u16,
     /// Slack (spare length of the chain) of each target, and the committed target, if any.
     pub verdict: Verdict,
-    /// Position that the destination must take if a target is committed, m along x. `None` for the farthest x that it
-    /// has reported.
+    /// Required x of the destination if a target is committed, m. `None` if the destination must take the farthest x
+    /// that it has reported for this target.
     pub required_x_m: Option<f32>,
-    /// True if the sender, or a later relay of the pass, has a profile other than the mission's common one.
+    /// True if the sender or a later relay of the pass has its own power or its own fixed altitude. They differ from
+    /// the profile that the mission has in common for all relays.
     pub own: bool,
 }
 
@@ -179,13 +182,13 @@ impl SweepVerdict {
     }
 }
 
-/// Maximum number of relay profiles in one message.
+/// Maximum number of relay profiles (altitude and power) in one message.
 pub const MOST_NAMED: usize = 8;
 
 /// Profile of a relay, altitude and power, that differs from the mission's common one.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
-    /// Index in the view of the relay with this profile, from 1 next to Tx.
+    /// Index of the relay among the members of the view, 1 next to Tx.
     pub index: u16,
     /// Fixed altitude of the relay, m; 0 if the relay chooses its altitude.
     pub held_m: f32,
@@ -193,11 +196,11 @@ pub struct OwnSeat {
     pub power_w: f32,
 }
 
-/// List of relay profiles in the order of the relays' indices.
+/// List of relay profiles (altitude and power), by rising index of the relays.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles. In the direction of the pass it has those of the relays up to the sender, in
-/// a reply those of the whole chain.
+/// Message that collects relay profiles, altitude and power. On the way onward it has those of the relays up to the
+/// sender, in the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass along the chain, wrapping.
@@ -206,7 +209,8 @@ pub struct Roster {
     pub view_digest: u16,
     /// Index of the last relay whose profile earlier passes collected; 0 in the first pass.
     pub after: u16,
-    /// Profiles of relays after the index `after`. If the list is full, the next pass collects the other profiles.
+    /// Profiles of relays with an index above `after`. If the list is full, the next pass collects the remaining
+    /// profiles.
     pub seats: OwnSeats,
 }
 
@@ -324,7 +328,7 @@ pub enum AdjustStep {
     Stop,
 }
 
-/// Action of a token on the wire: one byte and three numbers, which are 0 if unused.
+/// Action of a token on the wire: its kind, and three numbers. Numbers that the kind does not use are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct StepBody {
     kind: u8,
@@ -355,7 +359,8 @@ impl StepBody {
         }
     }
 
-    /// Returns the decoded action; `None` if a value is out of range or the encoding is not the only one.
+    /// Returns the decoded action. `None` if a value is out of range, or if a number that the action does not use is
+    /// not 0.
     fn checked(self) -> Option<AdjustStep> {
         let Self {
             kind,
@@ -380,7 +385,7 @@ impl StepBody {
     }
 }
 
-/// Reply to a token of Algorithm 2, sent against its direction.
+/// Reply to a token of Algorithm 2; relays send it back to the leader.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
     /// Number of the pass in which the token was received.
@@ -433,11 +438,11 @@ fn sir_in_range(sir: f32) -> Option<f32> {
     (0.0..=f32::MAX).contains(&sir).then_some(sir)
 }
 
-/// Length of a sensing message's body, bytes: tag, pass, estimate, sums, Rx's level, excluded node.
+/// Length of a sensing message's body, bytes. Tag, pass, estimate, sums, interference level at Rx, and excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: the interference estimate, and the relays' measurements. In the direction of the pass it has
-/// those of the relays up to the sender, in a reply those of the sender and of all later relays.
+/// Sensing message: interference estimate, and sums of measurements. On the way onward the sums are those of the
+/// relays up to the sender, in the reply those of the sender and all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass along the chain, wrapping.
@@ -450,12 +455,12 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements do not fit the others, and are not in `sums`; 0 for none. Used in
-    /// replies.
+    /// Node number of a relay whose measurements contradict the others; 0 for none. They are left out of `sums`. Set
+    /// in replies only.
     pub excluded: u16,
 }
 
-/// Interference estimate on the wire: one byte and four numbers, which are 0 if unused.
+/// Interference estimate on the wire: its number, its kind, and four values. Values that the kind does not use are 0.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct EstimateBody {
     number: Word,
@@ -515,7 +520,7 @@ impl EstimateBody {
     }
 }
 
-/// Measurement sums on the wire, in two arrays, since serde has no longer ones.
+/// Measurement sums on the wire. They are split into two arrays, because serde has no longer arrays.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {

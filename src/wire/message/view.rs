@@ -7,41 +7,42 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// Proposal of a new view, an agreement on the chain's members; relays forward it from one to the next.
+/// Proposal of a new view, an agreement on the chain's members. It goes from relay to relay and collects votes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
-    /// Identifier of the new view's mission, which every relay up to the sender has.
+    /// Identifier of the new view's mission. Every relay up to the sender has stored this mission.
     pub mission_id: MissionId,
     /// Identifier of the proposed view, later than every view known to its proposer.
     pub proposed_view: ViewId,
     /// Number of relays that the proposal has reached, including the sender: 1 to 1000.
     pub place: u16,
-    /// Votes and leases of the relays up to the sender.
+    /// Votes of the relays up to the sender, and their remaining leases.
     pub poll: Poll,
 }
 
-/// Poll of the relays that a proposal has reached: votes and leases of an earlier view.
+/// Votes on a view proposal so far, and remaining leases of earlier views. Every relay on the proposal's path adds
+/// its vote.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
-    /// Newest view that any polled relay knows to be agreed on.
+    /// Newest view that any polled relay knows to be agreed on. Only its members have a vote.
     pub agreed: View,
-    /// Number of polled relays that are members of the view `agreed`: their votes, 0 to 1000.
+    /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of the view `agreed` was polled. With half of the votes, its side then has the quorum.
+    /// True if the proposer of the view `agreed` was polled. Exactly half of the votes are then a quorum, too.
     pub proposer: bool,
-    /// Remaining lease of those members of the view `agreed` that were not polled, in tenths of a second.
+    /// Upper bound of the remaining leases of unpolled members of the view `agreed`, in tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of earlier views have expired, in tenths of a second; 65535 if unknown. Positions of the new
-    /// view may be used only then.
+    /// Time until leases of views before `agreed` have expired, in tenths of a second; 65535 if unknown. Positions of
+    /// the new view may be used only after that time.
     pub earlier_lease_left: u16,
     /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on.
     pub successor: Option<Successor>,
 }
 
 impl Poll {
-    /// Returns a poll without votes yet; `agreed` is the view whose members are polled.
+    /// Returns the state of a poll before any relay has voted. `agreed` is the view whose members vote.
     pub(crate) const fn of(agreed: View) -> Self {
         Self {
             agreed,
@@ -54,13 +55,13 @@ impl Poll {
     }
 }
 
-/// View that a decision accepted, and that may have been agreed on.
+/// View that a polled relay has accepted in an earlier decision, and that may have been agreed on.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
-    /// Identifier of the proposal to which the decision belongs.
+    /// Identifier of the proposal on which the view was decided.
     pub proposal: ViewId,
-    /// Decided view: the proposed one, or one that was found to be decided before.
+    /// Decided view: the proposed one, or an earlier one that the proposal found to be decided already.
     pub view: View,
 }
 
@@ -72,16 +73,17 @@ pub struct Decision {
     pub mission_id: MissionId,
     /// Identifier of the proposed view.
     pub proposed_view: ViewId,
-    /// Position of the sender on the proposal's path, from 1 at the proposer: 1 to 1000.
+    /// Number of relays on the proposal's path from the proposer to the sender, both included: 1 to 1000.
     pub place: u16,
     /// Number of relays that the proposal has reached: 1 to 1000.
     pub reached: u16,
-    /// Newest view that any polled relay knows to be agreed on, which the decision follows.
+    /// Newest view that any polled relay knows to be agreed on. The decided view replaces it.
     pub base: View,
-    /// View to accept: the proposed one, or one that was decided before; `None` without a quorum.
+    /// View to accept: the proposed one, or an earlier one that was found to be decided already. `None` without a
+    /// quorum.
     pub accepted: Option<View>,
-    /// Time until positions of the accepted view may be used, in tenths of a second. Members of the previous view
-    /// that were not polled may have a lease until then.
+    /// Time until positions of the accepted view may be used, in tenths of a second. Until then, members of the
+    /// previous view that were not polled may still have a lease.
     pub usable_in: u16,
 }
 
@@ -169,7 +171,7 @@ impl Proposal {
         )
     }
 
-    /// Decodes a proposal. An agreed or accepted view in it must be earlier than the proposed one.
+    /// Decodes a proposal. Rejects it if the agreed view or the accepted one is not earlier than the proposed view.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(Word::number);
@@ -259,11 +261,12 @@ impl Decision {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulse {
-    /// Number of the renewal, wrapping. When it is sent, all members have taken part in the previous one.
+    /// Number of the renewal, wrapping. The leader sends it only after all members have taken part in the previous
+    /// renewal.
     pub number: u16,
     /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
-    /// Duration of the lease after a member has taken part in a renewal, in tenths of a second: 1 to 65535.
+    /// Duration of the lease, in tenths of a second: 1 to 65535. It starts when a member takes part in a renewal.
     pub lease: u16,
 }
 
@@ -275,7 +278,7 @@ pub struct Pulsed {
     pub number: u16,
     /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
-    /// True if the last relay has received and acknowledged the renewal.
+    /// True if the renewal has reached the last relay of the chain. False if it is still on its way.
     pub done: bool,
 }
 

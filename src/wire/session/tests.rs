@@ -10,7 +10,7 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// Number of table entries, [`PEERS`], as a node number.
+/// Capacity of the session table, [`PEERS`], as a node number.
 const ROOM: u16 = 8;
 
 /// Silence after which a node is forgotten; the value of `Settings::dead_after`.
@@ -33,8 +33,8 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// Returns a frame of the session `from`: a handshake or a `Busy`. `addresses` are the node numbers of its sender and
-/// its receiver.
+/// Returns a frame of the session `from`: a handshake, or a `Busy` message if `handshake` is false. `addresses` are
+/// the node numbers of sender and receiver.
 fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {
@@ -64,8 +64,8 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Exchanges all pending handshakes between two nodes, and returns their number. `ends` has session and number of
-/// each node, `counters` their frame counters.
+/// Exchanges handshakes between two nodes until none is pending; returns their number. `ends` are each node's session
+/// and node number, `counters` their frame counters.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
@@ -93,7 +93,8 @@ fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     }
 }
 
-/// Returns the session of node `node` in epoch `epoch`, after handshakes with node 1's session `own`.
+/// Returns a new session of node `node` in epoch `epoch`. It has exchanged handshakes with `own`, the session of node
+/// 1.
 fn met(own: &mut Session, node: u16, epoch: u32, counters: &mut [u32; 2]) -> Session {
     let mut other = Session::new(Auth { key: KEY, epoch }, 0, GONE);
     other.greet(1);
@@ -119,7 +120,8 @@ fn a_link_is_proven_by_three_handshakes_or_four_if_crossed() {
     }
 }
 
-/// Checks that a lost handshake does no lasting harm. The node without a proof requests again, and receives a reply.
+/// Checks that a lost handshake does no lasting harm. The node that lacks a proof of the other's presence requests it
+/// again.
 #[test]
 fn one_lost_handshake_leaves_both_ends_proven() {
     for lost in 0..4 {
@@ -174,7 +176,8 @@ fn a_handshake_body_contains_the_known_nonces() {
     );
 }
 
-/// Checks that a full table keeps pinned entries and the last used one. Recorded frames are rejected.
+/// Checks that a full session table keeps the pinned entries and the newest one. Recorded frames of a forgotten node
+/// are rejected.
 #[test]
 fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     let mut own = session();
@@ -245,7 +248,7 @@ fn recorded_handshakes_do_not_replace_known_nodes() {
     }
 }
 
-/// Checks that `greet` starts a session again after one node has forgotten the other. Before that, the restarted node
+/// Checks that `greet` restores a session after one of the two nodes has restarted. Before that, the restarted node
 /// cannot verify any frame.
 #[test]
 fn a_handshake_repairs_a_link_known_at_one_end() {
@@ -295,7 +298,8 @@ fn after_the_last_nonce_no_new_node_is_accepted() {
     assert_eq!(own.handshake(2)[..8], [0xFF, 0xFF, 0xFF, 0xFF, 5, 0, 0, 0]);
 }
 
-/// Checks that handshakes of an older or reused epoch are reported once. A replayed recording is not reported.
+/// Checks that a node whose epoch is older than before, or reused, is reported once. Replays of its frames are not
+/// reported.
 #[test]
 fn an_epoch_that_went_back_is_reported_once_a_replay_never() {
     for epoch in [1, 7] {
@@ -333,7 +337,8 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
     }
 }
 
-/// Checks the sender of frames under the relay's own number. Claim numbers, epochs and keys are its own or others.
+/// Checks which frames under the relay's own number reveal another node with that number. Only a handshake with the
+/// same key and no older epoch does.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -377,8 +382,8 @@ fn own_frames_are_recognised() {
     }
 }
 
-/// Checks that of two nodes with one number, the one with the smaller claim learns of the other. Node 1 accepts the
-/// larger claim and shows it to the node with the smaller one.
+/// Checks that two nodes with the same number are detected. Node 1 accepts the one with the larger claim, and its
+/// reply tells the one with the smaller claim about the other.
 #[test]
 fn the_smaller_claim_receives_the_larger_one() {
     const FAR: u32 = 1 << 20;
@@ -422,8 +427,8 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks that the smaller claim is accepted once the node with the larger one is silent. Recordings of the larger
-/// one are rejected until that node itself is received.
+/// Checks that of two nodes with one number, the smaller claim is accepted once the other is silent. Recorded frames
+/// of the node with the larger claim are then rejected, until it sends again.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

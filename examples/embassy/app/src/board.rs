@@ -23,19 +23,20 @@ pub struct Board<F> {
 /// Flash of a board and its layout: offsets of whole erase units that no firmware image occupies.
 #[derive(Debug)]
 pub struct Storage<F> {
-    /// Driver of the flash.
+    /// Driver of the flash memory.
     pub flash: F,
-    /// Offset of the configuration block in the flash, bytes.
+    /// Offset of the configuration block in the flash memory, bytes.
     pub block: u32,
-    /// Two flash sectors that store the epoch, a number that rises at every start.
+    /// Offsets of two flash sectors, which store the epoch, a number that rises at every start.
     pub epochs: [Range<u32>; 2],
-    /// Two flash sectors that store the relay's votes on the chain's membership. One sector is erased in flight when
-    /// both are full. Small sectors are better, because their erasure takes less time.
+    /// Offsets of two flash sectors, which store the relay's votes on the chain's membership. When both are full, one
+    /// of them is erased in flight. Small sectors are better, because their erasure takes less time.
     pub views: [Range<u32>; 2],
 }
 
 impl<F: NorFlash> Board<F> {
-    /// Creates a board and reads the configuration block from its flash. A read error gives a blank block.
+    /// Creates the description of a board, with the configuration block that its flash has. A read error gives a
+    /// blank block.
     pub fn new(seed: u32, mut storage: Storage<F>) -> Self {
         let mut block = [0xFF; LEN];
         if storage.flash.read(storage.block, &mut block).is_err() {
@@ -49,7 +50,7 @@ impl<F: NorFlash> Board<F> {
         }
     }
 
-    /// Sets the cause of the last reset.
+    /// Returns the board's description with the cause of the last reset.
     #[must_use]
     pub fn reset_by(self, reset: Reset) -> Self {
         Self { reset, ..self }

@@ -22,7 +22,7 @@ use crate::votes::Votes;
 /// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// Static storage of the relay and its field points, to save stack.
+/// Static storage of the relay and of its mission's distribution of interference, to save stack.
 #[derive(Debug)]
 pub struct DroneStorage {
     field: config::FieldStorage,
@@ -30,7 +30,7 @@ pub struct DroneStorage {
 }
 
 impl DroneStorage {
-    /// Creates empty storage for a relay and its field points.
+    /// Creates empty storage.
     pub const fn new() -> Self {
         Self {
             field: config::EMPTY,
@@ -54,9 +54,9 @@ pub enum Refused {
     NoFlash,
     /// Signing impossible, because the last possible epoch has been used.
     NoEpoch,
-    /// Sites in the configuration block, but no port to an autopilot.
+    /// Positions of Tx and Rx in the configuration block, but no port to an autopilot.
     NoAutopilot,
-    /// Sites that form no valid line, or whose distance differs from the mission's.
+    /// Positions of Tx and Rx that form no valid line, or whose distance differs from the mission's.
     Course(CourseError),
     /// Settings that the relay rejects, because they need a feature that this build lacks. The joint method for more
     /// than 100 relays is rejected, too.
@@ -66,12 +66,13 @@ pub enum Refused {
 #[derive(Debug)]
 pub(crate) struct Drone<F> {
     pub(crate) relay: &'static mut Relay,
-    /// Store of the relay's votes; `None` if the board has no flash.
+    /// Flash storage of the relay's votes on the chain's membership; `None` without such flash.
     pub(crate) votes: Option<Votes<F>>,
     pub(crate) autopilot: Option<AsyncAutopilot>,
 }
 
-/// Creates the drone of a board, and stores its relay in `storage`. `flies` is true if there is a port to an autopilot.
+/// Starts the drone of `board`, and stores its relay in `storage`. `flies` is true if the board has a port to an
+/// autopilot.
 pub(crate) fn begin<F: NorFlash>(
     storage: &'static mut DroneStorage,
     mut board: Board<F>,

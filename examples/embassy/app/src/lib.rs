@@ -56,7 +56,8 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Size of the receive buffer of an autopilot's UART, bytes. It is larger, because an autopilot sends bursts.
+/// Size of the receive buffer of an autopilot's UART, bytes. It is larger than [`BUFFER`], because an autopilot sends
+/// bursts.
 pub const BURST: usize = 512;
 
 /// Static buffers of a UART driver: [`BUFFER`] bytes to send, `IN` bytes to receive.
@@ -75,17 +76,17 @@ impl<const IN: usize> Buffers<IN> {
         }
     }
 
-    /// Returns the send and the receive buffer. A second call panics.
+    /// Returns the send buffer and the receive buffer. Panics at a second call.
     pub fn take(&'static self) -> (&'static mut [u8], &'static mut [u8]) {
         (self.sent.init([0; BUFFER]), self.received.init([0; IN]))
     }
 }
 
-/// Longest time between two feedings of the watchdog, while the relay's timers are not late.
+/// Time between two feedings of the watchdog. No feeding takes place while the relay's timers are late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Calls `feed` every [`TURN`] for ever, for a drone that does not join the chain. The watchdog then does not restart
-/// its board.
+/// Feeds the watchdog every [`TURN`] by calling `feed`, for a drone that does not join the chain. Its board is then
+/// not restarted.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -95,7 +96,8 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
 
 /// Feeds the watchdog every [`TURN`], unless the relay's timers are late: see [`watchdog::may_feed`].
 ///
-/// It runs in the task of ports and timers, so a hanging turn of that task, a panic or a fault ends the feeding.
+/// It runs in the same task as the ports and timers. If that task hangs, panics or faults, the watchdog is not fed
+/// any more.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     loop {
         let now = EmbassyClock.now().as_micros();
@@ -110,7 +112,7 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     }
 }
 
-/// Runs the relay of `board` on a UART to each neighbour, and on one to the autopilot if there is one.
+/// Runs the relay of `board` on a UART to each neighbour, and on a UART to the autopilot, if any.
 ///
 /// It never completes if the drone joins the chain, and calls the watchdog's `feed` every [`TURN`] while the relay
 /// makes progress.
@@ -164,7 +166,8 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     .await
 }
 
-/// Runs the relay of `board` over the ports that `run` serves. It stores changed votes before it sends.
+/// Runs the relay of `board` on the ports that `run` serves. Changed votes on the chain's membership are stored
+/// before the relay sends.
 async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     store: &'static mut DroneStorage,
     board: Board<F>,

@@ -35,7 +35,7 @@ pub(crate) fn unsigned() {
     warn!("no key: frames are not signed, and anybody in range can forge them");
 }
 
-/// Logs the signing epoch, a number that rises at every start; `is_stored` is true if it was stored.
+/// Logs the signing epoch, a number that rises at every start. `is_stored` is true if the flash has stored it.
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
         info!("frames are signed, epoch {}", epoch);
@@ -53,7 +53,7 @@ pub(crate) fn unguarded() {
     );
 }
 
-/// Logs the length of the line between the sites, m, and the drone's speed limit, m/s.
+/// Logs the length of the line from Tx to Rx, m, and the drone's speed limit, m/s.
 pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
     info!(
         "autopilot: {} m from transmitter to receiver, maximum speed {} m/s",
@@ -67,7 +67,7 @@ pub(crate) fn signs_to_autopilot() {
     );
 }
 
-/// Logs the votes restored after a reboot; `accepted` is true if the relay accepts them.
+/// Logs that votes on the chain's membership were found after a reboot. `accepted` is true if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's membership restored from flash");

@@ -9,7 +9,7 @@ use uav_relay_kept::views::{Views, log as journal};
 use crate::board::Storage;
 use crate::log;
 
-/// Store of the relay's votes in flash.
+/// Flash storage of the relay's votes on the chain's membership.
 #[derive(Debug)]
 pub(crate) struct Votes<F> {
     flash: Nor<F>,

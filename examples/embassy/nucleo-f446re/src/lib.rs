@@ -35,8 +35,8 @@ bind_interrupts!(
     }
 );
 
-/// Creates the description of the board. A flash erase stops its CPU: 0.25 s for 16 KiB, 0.55 s for 64 KiB, twice
-/// that at most.
+/// Creates the description of the board. An erase of a flash sector stops the CPU for 0.25 s (16 KiB) or 0.55 s (64
+/// KiB), twice that at most.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     Board::new(
         seed(),

@@ -24,7 +24,7 @@ pub enum Kind {
     F64,
     /// Boolean in one byte, 00 or 01.
     Bool,
-    /// Digest of a mission, view or line, a u16.
+    /// Digest (u16) of a mission, of a view, or of the line between the surveyed positions of Tx and Rx.
     Digest,
     /// Name of a view (membership of the chain), a u32: its number and its proposer.
     View,

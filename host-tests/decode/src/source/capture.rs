@@ -131,7 +131,9 @@ fn pieces<E>(
     }
 }
 
-/// Converts the time of a packet from the interface's resolution. `read` counts every unit as a nanosecond.
+/// Converts the time stamp of a captured packet, according to the time resolution of its interface.
+///
+/// `read` is the time stamp as the capture library returns it: the library takes every unit for a nanosecond.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

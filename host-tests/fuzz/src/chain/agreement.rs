@@ -4,15 +4,17 @@ use uav_relay::{Phase, Schedule, ViewId};
 
 use super::{Chain, Member};
 
-/// Maximum number of rounds until agreement. It covers 24 rounds of messages along 4 relays, each computed in 65
-/// steps, after a few minutes of probation with a few dozen hellos a second.
+/// Limit of the number of rounds until all relays agree; in a round each relay receives one frame.
+///
+/// It is enough for the slowest agreement: a few minutes of virtual time on probation with frequent hellos, and then
+/// 24 passes of messages along 4 relays.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
     /// Runs the chain without faults until all relays agree in one view (membership of the chain).
     ///
-    /// Panics if they never do, unless the leader finds that no target SIR can be met. A chain that lowers the target
-    /// in fixed steps is not run, because it takes too long.
+    /// Panics if they never do, unless the leader finds that no target SIR can be met. Does nothing if a relay lowers
+    /// the target in fixed steps, because such an agreement takes too long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {

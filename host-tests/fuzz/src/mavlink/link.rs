@@ -25,16 +25,19 @@ const MAX_OPERATIONS: usize = 256;
 /// named values.
 const MAX_FRAMES: usize = 26;
 
-/// Maximum distance of a flight target from the line, m: 5 km, and the error of a flat earth there.
+/// Maximum distance of a flight target from the line Tx-Rx, m: 5 km.
+///
+/// It includes the error of a flat earth at that distance, 40 m.
 const AROUND_M: f64 = 5_040.0;
 
-/// Sites of transmitter and receiver: latitude and longitude in degrees, and m above the sea.
+/// Surveyed position of Tx: latitude and longitude in degrees, height in m above the sea.
 const TX: [f64; 3] = [47.40, 8.54, 420.0];
+/// Surveyed position of Rx: latitude and longitude in degrees, height in m above the sea.
 const RX: [f64; 3] = [47.41, 8.55, 431.0];
 
 const MOVED: [f64; 3] = [47.408, 8.556, 440.0];
 
-/// Lengths of a degree of latitude and of a degree of longitude at the sites, m.
+/// Lengths of a degree of latitude and of a degree of longitude near Tx and Rx, m.
 const DEGREE_M: [f64; 2] = [111_180.0, 75_470.0];
 
 struct Link {

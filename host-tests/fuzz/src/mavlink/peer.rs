@@ -37,7 +37,7 @@ pub(super) struct Peer {
     stamp: u64,
     /// Newest signed frames of the simulated autopilot, for replays.
     history: Vec<Vec<u8>>,
-    /// Clock of the tested link as a time stamp, at the instant `at`.
+    /// Clock of the tested link as a signature time stamp. It was read at the instant in the field `at`.
     time: u64,
     at: Instant,
     /// Senders that the tested link should remember.
@@ -119,7 +119,9 @@ impl Peer {
         self.history.get(at).cloned()
     }
 
-    /// Sets the autopilot's clock: by a day, near the tested link's time, or to the largest stamp.
+    /// Changes the autopilot's clock as `input` chooses.
+    ///
+    /// The new time is a day earlier or later, near the time of the tested link, or the largest time stamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
         const DAY: u64 = 8_640_000_000;
         self.stamp = match input.below(6) {

@@ -82,8 +82,10 @@ pub(super) struct Placed {
 /// Maximum number of frames and noise pieces in a stream. The limit bounds the work, because a stream is read twice.
 const MAX_PARTS: usize = 64;
 
-/// Builds a stream of noise and of intact, damaged and truncated frames. Also returns where the intact ones begin.
-/// Zeros at the end complete any false start of a frame.
+/// Builds a stream of noise and of intact, damaged and truncated frames.
+///
+/// Also returns where the intact frames begin. Zeros follow at the end, so that a parser does not wait for the rest
+/// of a truncated frame.
 pub(super) fn stream(input: &mut Input<'_>) -> (Vec<u8>, Vec<Placed>) {
     let (mut bytes, mut placed) = (Vec::new(), Vec::new());
     for _ in 0..MAX_PARTS {

@@ -9,7 +9,8 @@ const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 /// Path-loss factors of the paper, with and without line of sight.
 const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
 
-/// Sites of Tx and Rx: latitude, longitude (1e-7 degrees), height (mm). They are 1000 m apart to the millimetre.
+/// Surveyed positions of Tx and Rx: latitude, longitude (1e-7 degrees), height (mm). They are 1000 m apart to the
+/// millimetre.
 const SITES: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -50,8 +51,9 @@ impl Body<'_, '_> {
         self.word(answer);
     }
 
-    /// Appends sites of Tx and Rx to an offer, mostly none. Else they are a kilometre apart, as in the paper, or
-    /// arbitrary numbers.
+    /// Appends the surveyed positions of Tx and Rx to an offer, mostly zeros for no positions.
+    ///
+    /// Otherwise they are a kilometre apart, as in the paper, or arbitrary numbers.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -63,7 +65,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends a mission version: that which the tested relay holds, one of the next three, or any.
+    /// Appends a mission version: the newest stored by the tested relay, one of the next three, or any.
     fn version(&mut self) {
         let held = self.state.held.version;
         let version = match self.input.byte() {
@@ -73,7 +75,7 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends a number of relays: that of the loaded mission, or any.
+    /// Appends a number of relays: that of the mission loaded into the tested relay before flight, or any.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.state.relays,
@@ -82,8 +84,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission with another interferer. Relays may have altitudes and lateral positions to choose
-    /// from.
+    /// Appends the paper's mission with another interferer. It permits ranges of altitude and of lateral position.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));

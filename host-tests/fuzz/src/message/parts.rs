@@ -8,21 +8,23 @@ use crate::input::Input;
 /// State of the tested relay that its neighbour may know.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
-    /// Digest of the mission that the tested relay was loaded with.
+    /// Digest of the mission that was loaded into the tested relay before flight.
     pub digest: u16,
-    /// Number of relays in the mission that the tested relay was loaded with.
+    /// Number of relays in the mission that was loaded into the tested relay before flight.
     pub relays: u16,
-    /// Digest of the mission that the tested relay flies.
+    /// Digest of the mission that the tested relay uses now.
     pub flown: u16,
-    /// Newest mission that the tested relay holds, flown or not.
+    /// Version and digest of the newest mission that the tested relay has stored, in use or not.
     pub held: MissionId,
     /// View (agreed membership of the chain) that the tested relay has accepted last.
     pub view: ViewId,
     /// Number of the current pass, a round of messages along the chain.
     pub number: u16,
-    /// Association number in the tested relay's last fence message, 0 for none.
+    /// Session number in the tested relay's last message of its collision guard (a fence); 0 for none.
+    ///
+    /// Each relay draws a random number for the session with its neighbour.
     pub association: u16,
-    /// Offer number in the tested relay's last hello, 0 for none.
+    /// Number in the tested relay's last hello, which a mission offer has to repeat; 0 for none.
     pub offer_number: u16,
     /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
@@ -160,7 +162,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
-    /// Appends a lateral position y, m, within 1e5 or 100 to either side.
+    /// Appends a lateral position y, m. Either up to 100 m or up to 1e5 m on either side of the line is possible.
     pub(super) fn lateral(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));
@@ -181,8 +183,9 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the number of a lease renewal and the digest of mission and view. The number is mostly one of the
-    /// first, the digest rarely wrong.
+    /// Appends the number of a lease renewal, mostly a small one, and a digest.
+    ///
+    /// The digest is that of the mission and the view (membership of the chain), rarely a wrong one.
     pub(super) fn pulse_number(&mut self) {
         self.request_number();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -190,8 +193,10 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission: that held by the tested relay, the loaded one, or another. The other
-    /// one is newer, older or arbitrary.
+    /// Returns version and digest of a mission.
+    ///
+    /// It is the newest mission that the tested relay has stored, the one loaded into the relay before flight, or
+    /// another one, which is newer, older or arbitrary.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {
@@ -215,7 +220,9 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends an association number of a fence message: that of the tested relay, a small number, or any.
+    /// Appends the session number of a fence, a message of the collision guard.
+    ///
+    /// It is that of the tested relay, a small number, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),

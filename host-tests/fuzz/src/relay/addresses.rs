@@ -25,8 +25,9 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
     }
 }
 
-/// Returns the node number that is `more` beyond a neighbour of relay `index`; at least 0. `side` is 0 upstream, 1
-/// downstream.
+/// Returns the number of a node that is too far from relay `index` to be its neighbour, at least 0.
+///
+/// The node is `more` places farther along the chain than the neighbour at `side` (0 upstream, 1 downstream).
 pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {
     let distance = 1 + more as u16;
     if side == 1 {

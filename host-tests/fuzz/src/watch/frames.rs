@@ -22,7 +22,7 @@ pub(super) struct Frames {
     all: u16,
     pub(super) sent: u32,
     pub(super) number: u16,
-    /// Association number in the relay's last fence message.
+    /// Session number in the relay's last message of its collision guard (a fence), 0 for none.
     pub(super) association: u16,
     pub(super) asked: u16,
 }

@@ -116,8 +116,8 @@ pub fn seed(default: u64) -> u64 {
     seed
 }
 
-/// Returns the number of scenes in a random test. It is the environment variable `COUNT`, or `usual` if that is not a
-/// number.
+/// Returns the number of random problems in a test. It is the environment variable `COUNT`, or `usual` if that is not
+/// a number.
 pub fn count(usual: usize) -> usize {
     let count = std::env::var("COUNT").ok();
     count.and_then(|text| text.parse().ok()).unwrap_or(usual)
@@ -173,7 +173,7 @@ fn along(rng: &mut impl Rng, d: f64) -> f64 {
     }
 }
 
-/// Draws the interferer's Y, its offset from the line Tx-Rx, as a fraction of D.
+/// Draws the interferer's distance from the line Tx-Rx, as a fraction of the distance from Tx to Rx.
 fn aside(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..100) {
         0..25 => 0.0,

@@ -95,7 +95,8 @@ impl<'a> Hop<'a> {
     /// Returns the positions, m, at which the SIR changes from rising to falling or back. They ascend and lie within
     /// `low` to `high`, both at or beyond the sender; there are at most two.
     ///
-    /// The SIR is monotone between them. About 60 slope evaluations, with noise 300.
+    /// The SIR is monotone between them. The cost is about 60 evaluations of the slope, with receiver noise about
+    /// 300.
     pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
         let (first, last) = (self.rises(low), self.rises(high));
         let sign = |from: f64, to: f64| bisect(from, to, |x| self.rises(x) == self.rises(from));

@@ -8,7 +8,7 @@
 
 use super::link::{Link, received_w};
 
-/// Cross-section open to relays: ranges of altitude and of lateral position.
+/// Limits of the relays' positions across the line Tx-Rx: ranges of altitude and of lateral position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
     /// Lowest altitude above the ground of Tx, Rx and the interferer, m, > 0.

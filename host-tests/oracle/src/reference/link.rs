@@ -47,7 +47,7 @@ pub fn path_loss_factor(carrier_hz: f64, excess: f64) -> f64 {
 
 impl Link {
     /// Returns the paper's multi-hop scenario with `n` relays of 1 W at 20 m. Tx and interferer have 80 W, the
-    /// interferer is at (500, 400) m, and D is 1 km.
+    /// interferer is at (500, 400) m, and Rx is 1 km from Tx.
     pub fn paper(n: usize) -> Self {
         let mu_los = path_loss_factor(2e9, 10_f64.powf(0.01));
         Self {

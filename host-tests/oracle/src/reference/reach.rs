@@ -4,11 +4,10 @@ use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
 
 impl Link {
-    /// Returns the farthest position, m, from `from_x` to D at which relay `k` meets `target`. `k` is within 1 to N;
-    /// `target` is linear and above 0.
+    /// Returns the farthest position, m, from `from_x` on to Rx, at which relay `k` meets the SIR `target`.
     ///
-    /// Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None` if no position meets the target. About 60 SIR
-    /// evaluations, at most about 150.
+    /// `k` is within 1 to N; `target` is linear and above 0. Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None`
+    /// if no position meets the target. The cost is about 60 evaluations of the SIR, at most about 150.
     pub fn farthest(&self, k: usize, from_x: f64, target: f64) -> Option<f64> {
         let end = self.distance_m;
         if !(0.0..=end).contains(&from_x) {
@@ -30,9 +29,10 @@ impl Link {
         None
     }
 
-    /// Returns the largest distance from Rx, m, at which the last relay meets `target` (linear) at Rx. It may exceed D.
+    /// Returns the largest distance from Rx, m, at which the last relay meets `target` (linear SIR) at Rx. It may
+    /// exceed the distance from Tx to Rx.
     ///
-    /// `None` if the target is missed even above Rx, or is not positive. About 60 SIR evaluations.
+    /// `None` if the target is missed even above Rx, or is not positive. The cost is about 60 evaluations of the SIR.
     pub fn rx_reach(&self, target: f64) -> Option<f64> {
         let sir = |distance: f64| self.sir_rx(self.distance_m - distance);
         let meets = |distance: f64| sir(distance).is_some_and(|sir| meets(sir, target));

@@ -34,7 +34,8 @@ impl Link {
         maximum(&self.grid(from, points), worst_hop)
     }
 
-    /// Returns the grid of positions from `from_x` to D. It is even, and denser near both ends and the interferer.
+    /// Returns the grid of positions from `from_x` to Rx, m. It is even, and denser near both ends and the
+    /// interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);

@@ -100,8 +100,9 @@ impl Link {
     }
 }
 
-/// Returns the parts of `low` to `high` in which `holds` is true. It changes at most once between two neighbours of
-/// `turns`, which ascend.
+/// Returns the parts of the interval `low` to `high` in which `holds` is true.
+///
+/// `turns` ascends; between two successive values `holds` must change at most once.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
     let corners = || turns.iter().copied().chain([high]);
     let froms = std::iter::once(low).chain(turns.iter().copied());

@@ -132,7 +132,8 @@ fn build() -> Result<PathBuf, Box<dyn Error>> {
     Ok(file)
 }
 
-/// Returns cargo's target folder: `target`, or that of `CARGO_TARGET_DIR` or of the configuration.
+/// Returns cargo's target folder. It is `target`, unless `CARGO_TARGET_DIR` or cargo's configuration names another
+/// folder.
 fn target_directory(cargo: &mut Command, root: &Path) -> Result<PathBuf, Box<dyn Error>> {
     let output = cargo
         .current_dir(root)

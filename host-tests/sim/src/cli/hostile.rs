@@ -144,7 +144,8 @@ impl Hostile {
         Ok(())
     }
 
-    /// Rejects a `--kill` of a silent relay, and a `--boot` of a relay before its first `--kill`.
+    /// Rejects a `--kill` of a relay that is off already, and a first `--boot` before the first `--kill`. A `--boot`
+    /// of a relay without any `--kill` is a reboot, and allowed.
     fn in_order(&self) -> Result<(), Failure> {
         let kills = self.kill.iter().map(|one| (one, true));
         let mut all: Vec<(&RelayEvent, bool)> = kills
@@ -209,8 +210,8 @@ impl Hostile {
         }
     }
 
-    /// Adds the requested failures, attack and uploads to `setup`. `sites` are those of Tx and Rx, if the scenario
-    /// has them.
+    /// Adds the requested failures, attack and uploads to `setup`. `sites` are the geographic positions of Tx and Rx,
+    /// `None` if the scenario has none.
     pub fn prepare(&self, setup: &mut Setup, sites: Option<Sites>) -> Result<(), Failure> {
         let pairs = |ones: &[RelayEvent]| ones.iter().map(|one| (one.index, one.at)).collect();
         setup.kills = pairs(&self.kill);

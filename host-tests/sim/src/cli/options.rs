@@ -39,8 +39,8 @@ pub struct Options {
     /// Search a grid of columns by rows in `adjust`, 2 to 255 each, instead of from coarse to fine
     #[arg(long, value_name = "CxR", value_parser = grid)]
     pub grid: Option<uav_relay::Local>,
-    /// Repeat a stochastic run R times, 1 to 100: fly, measure the true field, and agree again. The chain starts with the value of
-    /// Upsilon at Rx everywhere
+    /// Repeat a stochastic run R times, 1 to 100: fly, measure the true field, and agree again. In the first run the relays assume the
+    /// field of Rx at every position
     #[arg(long, value_name = "R", allow_negative_numbers = true, value_parser = whole(1_u8, 100))]
     pub closed_loop: Option<u8>,
     /// Relative tolerance of the achieved SIR, 1e-6 to 0.1; default 1e-4. Not for the -step methods
@@ -58,7 +58,7 @@ pub struct Options {
     /// Probability that a frame is overtaken by others, 0 to 0.9
     #[arg(long, value_name = "P", default_value_t = 0.0, allow_negative_numbers = true, value_parser = probability)]
     pub reorder: f64,
-    /// Bracket the target from scratch instead of from the leader's own prediction
+    /// Search the target SIR without a prediction: the leader does not compute the chain first, and needs more messages
     #[arg(long)]
     pub no_predict: bool,
     /// Seed of every random draw; the same seed gives the same run, byte for byte
@@ -67,7 +67,7 @@ pub struct Options {
     /// Print only one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Draw the chain with each hop's SIR. A side view, and a top view with room or an interferer beside the line
+    /// Draw the chain with each hop's SIR: a side view, and a top view if relays or an interferer are beside the line
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub svg: Option<PathBuf>,
     /// Write every transmitted frame to a pcapng capture with virtual times. `cargo decode` and Wireshark read it

@@ -38,9 +38,10 @@ pub struct Prepared<'a> {
 pub enum Refused {
     /// Invalid options or scenario.
     Failed(Failure),
-    /// The relays cannot be placed, for the reason that the report states.
+    /// The distance from Tx to Rx is too short for the relays, as the report says.
     ///
-    /// The failure is `Some` for the default scenario: the user cannot change that one, so the options are at fault.
+    /// The second value is `Some` for the default scenario, which the user cannot change: it is an error in the
+    /// option `--uavs`.
     Reported(Box<ChainReport>, Option<Failure>),
 }
 
@@ -208,17 +209,17 @@ impl<'a> Prepared<'a> {
         Ok(traffic.map(|traffic| TrafficReport::new(spec, &traffic)))
     }
 
-    /// Returns the linear SIR of every hop from Tx to Rx, with the interferer where it is at `then`.
+    /// Returns the linear SIR of every hop from Tx to Rx, for the interferer's position at the time `then`.
     ///
-    /// `places` has the relays' indices (from 1) and positions in the order of the chain. The mission is the one
-    /// loaded at the start, even after an upload.
+    /// `places` has the relays' indices (from 1) and positions in the order of the chain. Uploads are ignored: the
+    /// SIRs are for the mission that the relays have at the start.
     pub fn sirs_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
         let (mission, places) = self.chain_at(then, places);
         report::hop_sirs(&mission, &places)
     }
 
-    /// Returns the linear SIR of every hop from Rx to Tx, otherwise as [`Prepared::sirs_at`]. Empty in a mission of
-    /// one direction.
+    /// Returns the linear SIR of every hop from Rx to Tx; the arguments are as in [`Prepared::sirs_at`]. Empty if the
+    /// mission is for the direction from Tx to Rx only.
     pub fn sirs_back_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
         let (mission, places) = self.chain_at(then, places);
         if mission.reverse() > 0.0 {
@@ -228,7 +229,9 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Returns the mission with the interferer's position at `then`, and relay positions and profiles.
+    /// Returns the mission, and each relay's position, altitude and power, to compute the SIRs of a chain.
+    ///
+    /// The mission has the interferer's position at the time `then`.
     fn chain_at(
         &self,
         then: Instant,

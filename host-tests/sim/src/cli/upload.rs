@@ -70,9 +70,9 @@ enum Key {
     RxHeight,
 }
 
-/// Keys that `--upload` can change: name, key, smallest and largest value.
+/// Parameters that `--upload` can change: name in the option, kind, smallest and largest value.
 ///
-/// The names are those of scenario files, and `noise_w` and `tolerance`.
+/// Most names are keys of scenario files; `tx_lat_deg` and similar ones are the geographic positions of Tx and Rx.
 const KEYS: [(&str, Key, f64, f64); 22] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
@@ -142,8 +142,8 @@ impl Uploads {
 
     /// Returns the uploads in order of time, with versions from 1.
     ///
-    /// `base` is the mission that the relays have at the start, `sites` are the geographic positions of Tx and Rx, if
-    /// known.
+    /// `base` is the mission that the relays have at the start. `sites` are the geographic positions of Tx and Rx,
+    /// `None` if the scenario has none.
     pub fn of(&self, base: &Mission, sites: Option<Sites>) -> Result<Vec<UploadSpec>, Failure> {
         let end = match self.upload_from {
             None | Some(End::Tx) => Side::Upstream,

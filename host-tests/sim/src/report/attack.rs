@@ -39,7 +39,8 @@ pub struct AttackReport {
     /// Absent if a moved relay has no position in one of the two runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest_m: Option<f64>,
-    /// Number of positions that relays accepted for target SIRs that do not occur without the attack.
+    /// Number of positions that relays accepted for target SIRs that do not occur without the attack. It shows that
+    /// the attack misled the relays.
     pub misled: u64,
     /// Number of views (memberships of the chain) that relays accepted.
     pub formed: u64,

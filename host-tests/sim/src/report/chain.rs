@@ -42,7 +42,7 @@ pub struct ChainReport {
     pub method: String,
     /// Number of relays for which the run was requested.
     pub uavs: u16,
-    /// Version of the mission that the chain flies at the end; 0 for the one loaded at the start.
+    /// Version of the mission that the chain flies at the end; 0 for the mission loaded before the start.
     ///
     /// Absent without uploads. All SIRs of the report refer to this mission.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,7 +50,7 @@ pub struct ChainReport {
     /// Error message, if the run failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
-    /// Best possible linear SIR: 0 if no placement gives every hop a SIR above 0, absent otherwise.
+    /// Best possible linear SIR, 0, if no placement gives every hop a SIR above 0. Absent in all other cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir: Option<f64>,
     /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
@@ -68,12 +68,14 @@ pub struct ChainReport {
     /// Target SIR that the relays agreed on, linear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// True if no chain of equal relays can exceed `target` in the random field, within the tolerance.
+    /// True if `target` is optimal: no chain of equal relays can exceed it, apart from the tolerance.
     ///
-    /// False if that is unknown. Absent without a random field.
+    /// The leader computes an upper bound on the SIR in a random field. False if this bound is higher than `target`,
+    /// so that the optimum is unknown. Absent without a random field or a bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
-    /// Linear SIR of the chain before the first round of Algorithm 2, and after each round.
+    /// Linear SIR of the chain before the first round of Algorithm 2, and after each round. In a round of this
+    /// algorithm each relay in turn improves its position.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<f64>,
     /// Relays of the chain in order from the transmitter; empty unless every relay has a position.
@@ -115,7 +117,7 @@ pub struct ChainReport {
     /// SIR with all interferers of the scenario, if the relays assume a single one in their place.
     #[serde(flatten)]
     pub against_all: Option<AllInterferersReport>,
-    /// Number of relays in the chain at the end; absent if the log has only accepted positions.
+    /// Number of relays in the chain at the end. Absent if the log, `timeline`, is empty.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left: Option<u16>,
     /// Relays that are not in the chain at the end, with their last positions.
@@ -124,7 +126,7 @@ pub struct ChainReport {
     /// Final positions of drones with simulated autopilots; empty without them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drones: Vec<DroneReport>,
-    /// Log of the run; empty if the only events are accepted positions.
+    /// Log of the run. It is empty if nothing happened except that relays accepted positions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub timeline: Vec<MomentReport>,
     /// Times from a failure to the recovery of the chain, for each new view (membership of the chain).
@@ -354,8 +356,8 @@ impl ChainReport {
 
 /// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
 ///
-/// The chain is the largest view that all its relays have accepted, or else all relays that are on. On separate links
-/// with a failed relay it is all relays. Without a quorum it is empty.
+/// The chain is the largest view that all its relays have accepted; without such a view, all relays that are on. If a
+/// relay failed on separate links, it is all relays. Without a quorum it is empty.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -385,7 +387,7 @@ fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
         .all(|(place, (_, relay))| relay.index == place && usize::from(relay.relays) == part.len())
 }
 
-/// Reports the relays of a run that are not in `left`, the relays of the chain at its end.
+/// Returns a report about each relay that has left the chain. `left` has the relays that remain in it.
 pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostReport> {
     (1..)
         .zip(&outcome.relays)
@@ -405,7 +407,7 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
         .collect()
 }
 
-/// Returns the mission that the chain flies at the end of a run of `setup`, loaded or uploaded.
+/// Returns the mission that the chain flies at the end of a run: of `setup`, or an uploaded one.
 pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
     let version = version(outcome);
     let mut uploads = setup.uploads.iter().map(|spec| spec.upload);
@@ -415,14 +417,16 @@ pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
         .unwrap_or(setup.mission)
 }
 
-/// Returns the version of the mission that the chain flies at the end; the newest one if relays differ.
+/// Returns the version of the mission that the chain flies at the end. If the relays' versions differ, it is the
+/// newest one.
 pub(super) fn version(outcome: &Outcome) -> u16 {
     let chain = left(outcome);
     let versions = chain.iter().map(|(_, relay)| relay.version);
     versions.max().unwrap_or(0)
 }
 
-/// Returns the error line of a failed run; `None` after success. It names an upload that was not adopted.
+/// Returns the error line of a failed run; `None` after success. If an uploaded mission was not adopted, the line
+/// says so.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
     // A mission counts as adopted even if its relays are lost.
@@ -497,7 +501,8 @@ impl AirReport {
         })
     }
 
-    /// Formats the channel's report as a line; `virtual_s` is the duration of the run, s, for the load.
+    /// Formats the channel's report as a line of text. The load of the channel follows from `virtual_s`, the duration
+    /// of the run, s.
     pub(super) fn text(&self, virtual_s: f64) -> String {
         let counts = self.counts;
         let load = counts.air_time_us as f64 / 1e6 / virtual_s.max(1e-6);
@@ -514,18 +519,19 @@ impl AirReport {
 /// Availability of the chain over a whole run. All fields are absent if the run does not record them.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct AvailabilityReport {
-    /// Time when all relays of the chain first held agreed positions, s of virtual time.
+    /// Time when all relays of the chain first had agreed positions, s of virtual time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_agreement_s: Option<f64>,
-    /// Fraction of the time since the first agreement in which the chain was as good as possible.
+    /// Fraction of the time since the first agreement in which the chain was available.
     ///
-    /// The longest possible chain of the living relays then held the positions that it has without faults.
+    /// It is available while the longest chain that the living relays can form has the same positions as in a run
+    /// without faults.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub availability: Option<f64>,
-    /// Longest time since the first agreement in which the chain was not as good as possible, s.
+    /// Longest outage since the first agreement, s: a time in which the chain was not available. See `availability`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_outage_s: Option<f64>,
-    /// Largest number of groups of relays that held separate agreements at the same time.
+    /// Largest number of groups of relays that flew by separate agreements at the same time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most_flying: Option<usize>,
     /// Smallest distance of two relays during the run, m.
@@ -653,21 +659,22 @@ pub(super) fn silences(outcome: &Outcome) -> Vec<SilenceReport> {
     reports.collect()
 }
 
-/// SIR of the chain with all interferers of the scenario, where the relays assume a single one instead.
+/// SIR with all interferers of the scenario. The relays replace these interferers by a single one in their
+/// computation.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct AllInterferersReport {
     /// Linear SIR of the worst hop with all interferers of the scenario.
     pub all_sir: f64,
     /// SIR of the worst hop with all interferers of the scenario, dB.
     pub all_sir_db: f64,
-    /// Relative loss: 1 - `all_sir` / the SIR with the single interferer that the relays assume.
+    /// Relative loss of SIR by the assumption of a single interferer: 1 - `all_sir` / SIR with that one.
     ///
-    /// It is negative if the true SIR is higher.
+    /// It is negative if the SIR with all interferers is higher.
     pub all_loss: f64,
 }
 
 impl AllInterferersReport {
-    /// Computes the SIR of `relays` with all interferers of the scenario. `sir` is the one that they assume.
+    /// Computes the SIR of `relays` with all interferers. `sir` is the SIR with the single one that they assume.
     ///
     /// `None` if the scenario has a single interferer or a random field.
     pub fn of(scenario: &Scenario, relays: &[RelayReport], sir: f64) -> Option<Self> {

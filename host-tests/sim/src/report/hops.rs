@@ -27,7 +27,7 @@ pub struct RelayReport {
     /// Absent if it is unknown, or if the mission requires no SIR from Rx to Tx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_back: Option<f64>,
-    /// Version of the relay's mission, 0 for the loaded mission; absent without uploads.
+    /// Version of the relay's mission; 0 for the mission loaded before the start. Absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
 }
@@ -64,8 +64,7 @@ pub fn db(linear: f64) -> f64 {
 
 /// Returns the linear SIR of every hop from Tx to Rx, for relays at these positions, from relay 1 on.
 ///
-/// The formulas are those that relays use on board. A SIR is at most the largest f32, even if two positions nearly
-/// coincide.
+/// Relays use the same formulas on board. A SIR is at most the largest f32, even if two positions nearly coincide.
 pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let mut sender = Sender::transmitter(mission);
     let mut from_m = 0.0;
@@ -89,7 +88,8 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
 
 /// Returns the linear SIR of every hop from Rx to Tx. Entry k - 1 is received by node k - 1; node 0 is Tx.
 ///
-/// The formulas and the limit are those of [`hop_sirs`]. Empty unless the mission has one known interferer, or a way back in a field.
+/// The formulas and the limit are the same as in [`hop_sirs`]. Empty unless the mission has one known interferer, or
+/// a random field and a required SIR from Rx to Tx.
 pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let is_known = mission.known_source().is_some();
     let is_both_ways = mission.config().reverse > 0.0 && mission.field().is_some();
@@ -114,7 +114,7 @@ pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<
 /// SIR of the worst hop in the direction from Rx to Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct WorstBack {
-    /// SIR that hops need from Rx to Tx, as a fraction of that from Tx to Rx (`link.reverse`).
+    /// SIR that hops need from Rx to Tx, as a fraction of the SIR needed from Tx to Rx (`link.reverse`).
     pub reverse: f64,
     /// Linear SIR of the worst hop from Rx to Tx.
     pub worst_back: f64,
@@ -161,8 +161,8 @@ impl WorstBack {
 /// rounding errors.
 const EQUAL: f64 = 1e-3;
 
-/// Returns the name of the direction with the lower SIR, `both` if they are equal. `back` is the SIR of the way back
-/// divided by `reverse`.
+/// Returns the name of the direction with the lower SIR: `forward`, `backward`, or `both` if equal. `there` is the
+/// SIR toward Rx, `back` the SIR toward Tx divided by `reverse`.
 pub const fn direction(there: f64, back: f64) -> &'static str {
     if back < there * (1.0 - EQUAL) {
         "backward"
@@ -192,7 +192,8 @@ pub fn relays(places: &[(Placement, Profile)], sirs: &[f64]) -> Vec<RelayReport>
 
 /// Formats the relays of the chain, lost relays and Rx as a table. With `room` it has a y column.
 ///
-/// With `rx_sir_back` it has columns for the way back: hop k is received by the node before relay k.
+/// With `rx_sir_back` it also has the SIRs from Rx to Tx. The row of a relay then has the SIR at which the previous
+/// node receives this relay.
 pub fn hops_table(
     relays: &[RelayReport],
     lost: &[LostReport],

@@ -20,7 +20,7 @@ pub struct MomentReport {
     pub at_s: f64,
     /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     ///
-    /// For a partition it is the last relay before the gap.
+    /// For a partition it is the relay after which the chain is cut.
     pub relay: u16,
     /// Kind of the event, in words.
     ///
@@ -122,7 +122,7 @@ pub(super) fn timeline(moments: &[Moment]) -> Vec<MomentReport> {
 struct Group {
     first_s: f64,
     last_s: f64,
-    /// Numbers of the relays in the order of their entries; two new neighbours are in order from Tx.
+    /// Numbers of the relays that have logged the event, in the order of their entries.
     relays: Vec<u16>,
     sample: MomentReport,
 }
@@ -134,7 +134,8 @@ const TOGETHER_S: f64 = 10.0;
 
 /// Groups log entries about the same event, sorted by time.
 ///
-/// The time of an event in which all relays take part is that of its last entry, otherwise that of its first.
+/// An event in which all relays take part, such as an agreement, has the time of its last entry. Any other event has
+/// the time of its first entry.
 fn groups(timeline: &[MomentReport]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for moment in timeline {
@@ -335,10 +336,10 @@ fn count(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 
-/// Number of lines that remain at the start of a shortened log, and at its end.
+/// Number of lines that a shortened log keeps at its start, and again at its end.
 const ENDS: usize = 20;
 
-/// Formats the log with a line for each event. A log of more than 40 lines loses those in the middle.
+/// Formats the log with a line for each event. If the log has more than 40 lines, the middle ones are left out.
 pub(super) fn text(timeline: &[MomentReport]) -> String {
     let groups = groups(timeline);
     let mut text = String::new();
@@ -387,7 +388,7 @@ pub struct RecoveryReport {
     pub offered_s: Option<f64>,
     /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
     ///
-    /// It is the first such event that concerns a lost or joined relay.
+    /// If there are several such events, it is the first one that concerns a lost or a returned relay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
     /// Time when a neighbour first detected that a relay was lost or had returned, s.
@@ -495,9 +496,10 @@ fn offered(moments: &[Moment], version: u16) -> Option<&Moment> {
         .find(|moment| moment.what == TimelineEvent::Offered(version))
 }
 
-/// Returns the time of the event that caused the loss or the return of relays, `lost` and `back`.
+/// Returns the time of the event that caused the loss of the relays `lost` and the return of `back`.
 ///
-/// The cause for a relay is its latest such event in `earlier`. Of all relays' causes, the earliest is returned.
+/// For each of these relays, the cause is the latest suitable event in `earlier`, such as a failure or the end of a
+/// partition. The earliest of these causes is returned.
 fn fault_time(earlier: &[Moment], lost: &[u16], back: &[u16]) -> Option<Instant> {
     let of = |relays: &[u16], own: TimelineEvent, common: TimelineEvent| {
         let latest = |relay: &u16| {

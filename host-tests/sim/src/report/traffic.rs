@@ -7,13 +7,14 @@ use serde::Serialize;
 use crate::simulator::route::{ChainState, Period, Ps, SECOND};
 use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec, quantile_s};
 
-/// Number of periods that remain at the start of a shortened text, and at its end.
+/// Number of periods that a shortened text lists at its start, and again at its end.
 const ENDS: usize = 10;
 
 /// Largest number of queues that the text lists completely. If there are more, it lists the 8 longest.
 const SHOWN: usize = 16;
 
-/// Data traffic of a run. Arrays have the direction to Rx first and then, if used, that back to Tx.
+/// Data traffic of a run. Each array has one value for the direction to Rx and, if data goes both ways, a second one
+/// for the direction to Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficReport {
     /// Promised data rates, bit/s, for each direction: by the planner's formula at the first agreement.
@@ -43,12 +44,13 @@ pub struct TrafficDetails {
     pub until_s: f64,
     /// Traffic in each direction: to Rx and, if data goes both ways, back to Tx.
     pub flows: Vec<FlowReport>,
-    /// Periods in which the view, the state of the chain and the promised data rates did not change.
+    /// Periods in which the chain's view, its state and the promised data rates did not change. The promised rates
+    /// are those of the planner's formula.
     pub periods: Vec<PeriodReport>,
     /// Text that says how the hops share frequencies and time.
     #[serde(skip)]
     sharing: String,
-    /// True if the slots are fitted to the data of both directions.
+    /// True if the lengths of the time slots are fitted to the hops' data rates in both directions.
     #[serde(skip)]
     fits_both: bool,
 }
@@ -93,7 +95,8 @@ pub struct QueueReport {
 
 /// Data traffic of a period in which the chain does not change.
 ///
-/// Arrays have the direction to Rx first and then, if used, that back to Tx.
+/// Each array has one value for the direction to Rx and, if data goes both ways, a second one for the direction to
+/// Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PeriodReport {
     /// Start of the period, s of virtual time.

@@ -18,9 +18,9 @@ pub(super) use uav_relay_scenario::deployment::NETWORK;
 
 use super::faults::LinkSpec;
 
-/// Numbers of frames of an attack, and its end. The attacker does not know the network key.
+/// Attack on the chain: numbers of frames, and end. The attacker does not know the network key.
 ///
-/// It sends half of the frames back to back from the start of the run, and the others at random times.
+/// Half of the frames are sent back to back from the start of the run, the others at random times.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Attack {
     /// Number of forged frames that the attacker sends.
@@ -71,7 +71,8 @@ const ATTACKER: u64 = 2;
 /// Largest number of frames that the attacker records; it discards the oldest.
 const MEMORY: usize = 65_536;
 
-/// Number of random picks of a recorded frame before the attacker gives up. The frame must have arrived.
+/// Number of random picks of a recorded frame before the attacker gives up. A pick fails if the frame has not arrived
+/// at its receiver yet.
 const TRIES: usize = 64;
 
 impl Attacker {
@@ -87,7 +88,7 @@ impl Attacker {
 
     /// Draws the time and the kind of every frame of the attack. The list is not sorted by time.
     ///
-    /// Frames that are sent back to back take the time of the longest message on `link` each.
+    /// Frames that are sent back to back are spaced by the time that the longest message takes on `link`.
     pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, AttackKind)> {
         let Attack {
             forged,
@@ -233,7 +234,7 @@ fn false_message(
     copy.unwrap_or_else(|| random_message(mission, way, rng))
 }
 
-/// Returns a copy of a recorded frame with false values, and the same or a slightly higher number.
+/// Returns a copy of a recorded frame with false values. Its pass number is the same or slightly higher.
 ///
 /// `None` unless the frame is a message that relays pass along the whole chain, or a reply to one.
 fn altered_copy(plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
@@ -377,7 +378,7 @@ fn guessed_handshake(mission: &Mission, way: ForgedRoute, rng: &mut ChaCha8Rng) 
     sealed(plain)
 }
 
-/// Returns the handshake of a relay that starts with a random key; empty in a chain of one relay.
+/// Returns the handshake of a relay that starts with a random key. Empty if the chain has only one relay.
 fn foreign_handshake(
     mission: &Mission,
     way: ForgedRoute,

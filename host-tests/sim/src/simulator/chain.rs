@@ -305,9 +305,11 @@ struct Member {
     stored: Option<Upload>,
     /// Stored record of the relay's votes on views, which survives a reboot; `None` before its first vote.
     record: Option<ViewRecord>,
-    /// Last setpoint that was within its limits, so that it is not checked again.
+    /// Last setpoint that [`Chain::check`] found within the limits. It is stored so that the same setpoint is not
+    /// checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of the setpoints since the relay last had no setpoint.
+    /// Range of the setpoints: smallest and largest coordinates since the relay last had no setpoint. With a guard, a
+    /// setpoint may be outside the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -337,7 +339,9 @@ pub struct Chain {
     attacker: Option<Attacker>,
     flight: Option<Flight>,
     fleet: Vec<Vehicle>,
-    /// Distance of each pair of drones at their last hand-over, m; `None` while a pilot flies one of them.
+    /// Distance of each pair of drones when both were last handed over to their relays, m.
+    ///
+    /// `None` while one of them is on the ground, takes off, lands or is flown by its pilot.
     handed_over_m: Vec<Option<f64>>,
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     medium: Option<Medium>,
@@ -404,7 +408,8 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults. The statistics use it to judge the positions of this chain.
+    /// `run` simulates a chain without faults. The statistics compare the positions of this chain with the positions
+    /// from `run`.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -515,7 +520,9 @@ fn members(setup: &Setup, rng: &mut ChaCha8Rng) -> Result<Vec<Member>, SetupErro
     Ok(members)
 }
 
-/// Queues restarts of autopilots, and landings of drones that a pilot never returns. Returns their number.
+/// Queues the restarts of autopilots, and the landings of drones that a pilot never hands back.
+///
+/// Returns the number of these events.
 fn put_fleet(setup: &Setup, queue: &mut Queue) -> usize {
     let Some(fleet) = &setup.fleet else {
         return 0;

@@ -38,7 +38,7 @@ pub struct Injected {
 pub struct Arrival {
     /// Bytes of the frame as received, with changes by faults.
     pub bytes: Vec<u8>,
-    /// Delay of the frame by faults, in multiples of the time that the longest message takes for a hop.
+    /// Delay of the frame by faults; the unit is the time that the longest message takes for one hop.
     pub late: u64,
 }
 
@@ -203,7 +203,7 @@ impl LinkSpec {
         Duration::from_micros(bits.div_ceil(u64::from(self.baud.max(300))))
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain, with 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain. It includes 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let frame = self.line_time(MAX_SWEEP).as_micros();
         Duration::from_micros(frame + self.latency.as_micros() + 1_000)

@@ -19,7 +19,7 @@ pub struct Takeover {
     pub from: Instant,
     /// End of the takeover; `None` if it is permanent.
     ///
-    /// The pilot then hands the drone over as soon as it hovers and no other drone moves near it.
+    /// At the end the pilot hands the drone back to its relay, as soon as it hovers and no other drone moves near it.
     pub until: Option<Instant>,
     /// Position to which the pilot flies the drone: along the run's line, to its right and up, m.
     ///
@@ -32,7 +32,7 @@ pub struct Takeover {
 pub struct FleetSpec {
     /// Geographic line from Tx to Rx along which the drones fly.
     pub axis: Axis,
-    /// Position at which each pilot first hands the drone over: along the line, to its right and up, m.
+    /// Position at which each pilot first hands the drone to its relay: x, y to the right, and height, m.
     ///
     /// The drone takes off from the ground below.
     pub start: Vec<Point>,
@@ -59,7 +59,7 @@ impl FleetSpec {
     }
 }
 
-/// Returns an arbitrary geographic line of `distance_m` metres, for scenarios without sites.
+/// Returns a geographic line of `distance_m` metres at an arbitrary place, for a scenario without one.
 ///
 /// It leads eastward from 47.4 N, 8.54 E. `None` for a length that no line may have.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
@@ -126,7 +126,7 @@ pub(super) struct Vehicle {
     kind: Kind,
     spec: FleetSpec,
     pub(super) link: Autopilot,
-    /// Geographic positions of Tx and Rx in the relay's mission; `None` if no upload has moved them.
+    /// Geographic positions of Tx and Rx in the relay's mission; `None` unless an upload has moved them.
     pub(super) sites: Option<Sites>,
     pilot: Pilot,
     body: Body,
@@ -135,9 +135,9 @@ pub(super) struct Vehicle {
     armed: bool,
     landed: u8,
     mode: Mode,
-    /// Position to which the autopilot flies the drone, and where it then hovers, m.
+    /// Position, m, to which the autopilot flies the drone. There the drone hovers.
     goal: Point,
-    /// Height at which the pilot first hands the drone over, m.
+    /// Height at which the pilot first hands the drone to its relay, m.
     climbs_to_m: f64,
     /// True while the pilot sees no other drone moving near this one.
     pub(super) is_clear: bool,
@@ -149,7 +149,9 @@ pub(super) struct Vehicle {
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Time until which the relay may not know yet that it must send no position targets.
+    /// Time until which position targets that the autopilot may not receive are no error of the relay.
+    ///
+    /// The autopilot has changed its mode or state, and the relay may not know yet.
     unknown_until: Instant,
     pub(super) strays: u64,
     rng: ChaCha8Rng,
@@ -213,7 +215,7 @@ impl Vehicle {
         moved.unwrap_or(self.spec.axis)
     }
 
-    /// Returns the true position of the drone relative to the line of its relay's mission, m.
+    /// Returns the drone's true position, m, relative to the line from Tx to Rx of its relay's mission.
     pub(super) fn along(&self) -> Point {
         if self.sites.is_none() {
             return self.body.at;
@@ -223,9 +225,9 @@ impl Vehicle {
         along.map_or([f64::NAN; 3], point)
     }
 
-    /// Converts a relay's position to coordinates of the run's original line, m; `None` if it is too far.
+    /// Converts a relay's position, m, to coordinates of the line from Tx to Rx at the start of the run.
     ///
-    /// The lines differ if an upload has moved Tx or Rx.
+    /// The relay's own line differs if an upload has moved Tx or Rx. `None` if the position is too far from the line.
     pub(super) fn in_run_coordinates(&self, place: Placement) -> Option<Point> {
         let on_earth = self.line().point(place)?;
         self.spec.axis.place(on_earth).map(point)
@@ -313,9 +315,10 @@ impl Vehicle {
         }
     }
 
-    /// Updates the flight mode and state by what the pilot and the autopilot decide.
+    /// Updates the flight mode and the flight state, which the pilot and the autopilot decide.
     ///
-    /// After a change the relay gets some time to learn of it, in which it may still send targets.
+    /// After a change, position targets of the relay count as allowed for some time, until it must have learned of
+    /// the change.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);
@@ -495,9 +498,9 @@ const FIRST_S: u64 = 5;
 /// Time between the take-offs of two successive drones, ms.
 const NEXT_MS: u64 = 500;
 
-/// Delay from the end of the climb, or from a rejected hand-over, to the pilot's next hand-over, s.
+/// Delay before a pilot hands the drone to its relay, s, after the climb and after a failed attempt.
 const LOOKS_S: u64 = 2;
-/// Delay from a restart of the autopilot or of the relay to the pilot's next hand-over, s.
+/// Delay, s, before a pilot hands the drone to its relay again, from a restart of autopilot or relay.
 const RECOVERS_S: u64 = 10;
 
 /// Flight mode of a drone: who controls it.
@@ -541,14 +544,14 @@ impl Pilot {
         self.hands_over_at = self.hands_over_at.max(Some(looked));
     }
 
-    /// Handles a restart of the autopilot or the relay, or a failsafe: the pilot hands over again later.
+    /// Plans another hand-over to the relay, after a restart of the autopilot or the relay, or a failsafe.
     fn schedule_hand_over_after_restart(&mut self, now: Instant) {
         self.hands_over_at = Some(now + Duration::from_millis(1_000 * RECOVERS_S));
     }
 
-    /// Returns the flight mode that the pilot selects now; `None` to leave it as it is.
+    /// Returns the flight mode that the pilot selects now; `None` to keep the present mode.
     ///
-    /// `may_hand_over` is false while the drone moves, or another drone moves near it.
+    /// `may_hand_over` is false while this drone moves, or another drone moves near it.
     fn selected_mode(&mut self, now: Instant, may_hand_over: bool) -> Option<Mode> {
         if self.has_control(now) {
             // Schedule a hand-over after the takeover.
@@ -562,7 +565,8 @@ impl Pilot {
         None
     }
 
-    /// Returns the position to which the pilot flies the drone during a takeover, m; `None` for none.
+    /// Returns the position to which the pilot flies the drone, m. `None` without a takeover now, and if the pilot
+    /// climbs in place.
     fn flies_to(&self, now: Instant) -> Option<Point> {
         let during = |it: &&Takeover| now >= it.from && it.until.is_none_or(|until| now < until);
         self.takeovers.iter().find(during)?.to

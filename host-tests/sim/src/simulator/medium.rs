@@ -35,7 +35,7 @@ pub struct Sent {
     pub frame: Vec<u8>,
     /// Nodes that received the frame intact.
     pub heard_by: Vec<usize>,
-    /// Number of nodes in range that lost the frame in a collision, or because they were sending.
+    /// Number of nodes in range that did not receive the frame. Frames collided, or their own radio was sending.
     pub missed: usize,
 }
 
@@ -44,7 +44,8 @@ pub struct Sent {
 enum Reception {
     Clean,
     Collided,
-    /// The frame is lost at this node, because its own radio was sending.
+    /// The node does not receive the frame, because its own radio sends or turns to sending. Also if the sender is
+    /// switched off.
     Unheard,
 }
 
@@ -114,7 +115,7 @@ impl Medium {
         true
     }
 
-    /// Processes an event that is due. Returns the frame, if the event ends one.
+    /// Processes an event that is due. If it is the end of a frame, returns that frame.
     ///
     /// `hearers` returns the nodes in range of a sending node.
     pub fn happen(
@@ -337,7 +338,8 @@ pub struct AirCounts {
     pub sent: u64,
     /// Number of receptions lost because frames overlapped.
     pub collided: u64,
-    /// Number of receptions lost because the receiving node was sending.
+    /// Number of receptions lost because the receiver was sending or turning to sending. Receptions from a node that
+    /// is switched off while it sends count, too.
     pub unheard: u64,
     /// Number of times that a node found the channel busy and waited again.
     pub deferred: u64,

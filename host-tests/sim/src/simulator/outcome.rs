@@ -14,7 +14,8 @@ use super::route::Track;
 use super::true_interference::Snapshot;
 use super::watch::ObservedState;
 
-/// Kind of an event in the log of a run, about one relay. "Another node" is [`Moment::other`].
+/// Kind of an event in the log of a run, about one relay. If two nodes are concerned, [`Moment::other`] is the other
+/// node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TimelineEvent {
     /// The relay was switched off: it neither sends nor receives.
@@ -23,7 +24,7 @@ pub enum TimelineEvent {
     Booted,
     /// The relay lost its neighbour at this side, toward Tx or toward Rx.
     Lost(Side),
-    /// The relay receives a new or a lost neighbour at this side, toward Tx or toward Rx.
+    /// The relay receives a new neighbour at this side (toward Tx or toward Rx), or again a lost one.
     Found(Side),
     /// The relay accepted a new view: a new membership of the chain.
     ViewAccepted {
@@ -80,7 +81,7 @@ pub enum TimelineEvent {
     NewEstimate,
     /// The relay found that the measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The relay found that another node's measurements contradict those of all other nodes.
+    /// The relay found that one other node's measurements do not agree with those of the rest of the chain.
     SensorOff,
 }
 
@@ -106,7 +107,7 @@ pub struct Moment {
 /// Reason for the end of a simulated run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Ending {
-    /// Every relay of the chain holds a position for the same target SIR.
+    /// Every relay of the chain has a position, all for the same target SIR.
     Settled,
     /// The leader found that the chain can meet no target SIR.
     Infeasible,
@@ -128,7 +129,8 @@ pub struct RelayEnd {
     pub setpoint: Option<Placement>,
     /// Linear target SIR for which the setpoint was agreed on; `None` without a target.
     pub target: Option<f32>,
-    /// Upper bound on the linear SIR of any chain at the relays' altitudes; `None` except at the leader.
+    /// Upper bound, linear, on the SIR of the worst hop that any chain at the relays' altitudes can reach. `None`
+    /// except at the leader.
     pub bound: Option<f32>,
     /// Altitude and power of the relay.
     pub profile: Profile,
@@ -142,31 +144,31 @@ pub struct RelayEnd {
     pub relays: u16,
     /// Number of the view (membership of the chain) that the relay has accepted.
     pub view: u32,
-    /// Version of the relay's mission; 0 for the loaded one.
+    /// Version of the relay's mission; 0 for the mission loaded before the start.
     pub version: u16,
     /// Interference estimate of the relay.
     pub believed: NumberedEstimate,
-    /// Geographic positions of Tx and Rx in the relay's mission; `None` if no upload changed those loaded.
+    /// Geographic positions of Tx and Rx in the relay's mission; `None` unless an upload has moved them.
     pub sites: Option<Sites>,
-    /// State of the relay as the statistics of the run use it.
+    /// State of the relay from which the run's statistics are computed, such as the availability.
     pub observed: ObservedState,
 }
 
 /// Availability of the chain over a whole run.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Watched {
-    /// Time when all relays of a view first held agreed positions; `None` if they never did.
+    /// Time when all relays of a view first had agreed positions; `None` if they never had.
     pub first_agreement: Option<Instant>,
-    /// Fraction, 0 to 1, of the time since the first agreement in which the chain was as good as possible.
+    /// Fraction, 0 to 1, of the time since the first agreement in which the chain was available.
     ///
-    /// The longest possible chain of the living relays then held the positions that it has without faults. `None`
-    /// unless the run is judged.
+    /// It is available while the longest chain that the living relays can form has the same positions as in a run
+    /// without faults. `None` unless the run has a fixed end.
     pub availability: Option<f64>,
-    /// Longest time since the first agreement in which the chain was not as good as possible.
+    /// Longest outage since the first agreement: a time in which the chain was not available.
     ///
-    /// `None` unless the run is judged.
+    /// `None` unless the run has a fixed end.
     pub longest_wrong: Option<Duration>,
-    /// Largest number of groups of relays that held separate agreements at the same time.
+    /// Largest number of groups of relays that flew by separate agreements at the same time.
     pub most_flying: usize,
     /// Smallest distance of two relays during the run, m: of drones if simulated, else of setpoints.
     pub least_separation_m: Option<f64>,
@@ -179,7 +181,8 @@ pub struct Outcome {
     pub ending: Ending,
     /// State of each relay at the end, from relay 1.
     pub relays: Vec<RelayEnd>,
-    /// Linear SIR of the chain before the first round of Algorithm 2, and after each round.
+    /// Linear SIR of the chain before the first round of Algorithm 2, and after each round. In a round of this
+    /// algorithm each relay in turn improves its position.
     pub rounds: Vec<f32>,
     /// Number of passes (messages forwarded along the whole chain) and view proposals that relays began.
     pub sweeps: u32,
@@ -201,16 +204,17 @@ pub struct Outcome {
     pub moments: Vec<Moment>,
     /// Closest approach of two flying drones; `None` if no flight was simulated.
     pub nearest: Option<Nearest>,
-    /// Closest approach of two drones with autopilots while no pilot controls them; `None` without one.
+    /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
+    /// never two.
     pub nearest_lent: Option<Nearest>,
     /// Smallest margin, m: the distance of two drones minus the distance that they have to keep.
     ///
-    /// Pairs with a drone in a pilot's hands do not count. A pair has to keep the mission's separation, or its
-    /// distance at the last hand-over if that is smaller. Infinite if there was no such pair.
+    /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
+    /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
     pub margin_m: f64,
-    /// Pair of drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
+    /// Two drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
     pub margin_at: Option<Nearest>,
-    /// Number of position targets that autopilots received in a state that forbids them.
+    /// Number of position targets that relays sent while the autopilot accepts none, such as on the ground.
     ///
     /// Targets up to 1.5 s after the change of the state do not count. Nonzero is a bug.
     pub stray_targets: u64,

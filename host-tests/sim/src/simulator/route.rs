@@ -104,7 +104,7 @@ impl Track {
         }
     }
 
-    /// Returns this record with the positions of all relays replaced by `places`, m, at the same times.
+    /// Returns this record with each relay at its position in `places`, m, whenever it has a position.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -120,24 +120,24 @@ impl Track {
     }
 }
 
-/// Computes the true SIR of every hop, with the interference that is really present.
+/// Computation of the true SIR of every hop, from the interference that is really present.
 #[derive(Debug)]
 pub struct TrueHops {
     /// Relays and interferers at time 0, and the interferers' velocity along and beside the line, m/s.
     ///
     /// `None` in a random field and in a run with uploads.
     scene: Option<(Scene, [f64; 2])>,
-    /// Missions by version, for runs in which `scene` is `None`. Version 0 is the loaded one.
+    /// Missions by version, for runs in which `scene` is `None`. Version 0 is the mission at the start of the run.
     missions: Vec<(u16, Mission)>,
     /// Altitude and power of each relay, from relay 1.
     profiles: Vec<Profile>,
 }
 
 impl TrueHops {
-    /// Prepares the true SIRs of a run of `setup`, whose relays fly `mission` at first.
+    /// Prepares the computation of true SIRs for a run of `setup` whose relays have `mission` at the start.
     ///
-    /// The SIRs are those with all interferers of `scenario`, which may move. In a random field, and in a run with
-    /// uploads, the interference is that of the mission that the chain flies.
+    /// The interference is from all interferers of `scenario`, which may move. In a random field, and in a run with
+    /// uploads, it is the interference of the mission that the chain flies.
     pub fn new(scenario: &Scenario, setup: &Setup, mission: &Mission) -> Self {
         let relays = mission.relays();
         let moved = setup
@@ -210,34 +210,34 @@ impl TrueHops {
     }
 }
 
-/// Time slots of a hop: one in each frame, a period in which every hop has its slot.
+/// Recurring time slot of a hop: the same part of every TDMA frame. In a TDMA frame each hop has one slot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Window {
-    /// Start of the first frame, ps.
+    /// Start of the first TDMA frame, ps.
     anchor: Ps,
-    /// Duration of a frame, ps.
+    /// Duration of a TDMA frame, ps.
     frame: Ps,
-    /// Time from the start of a frame to the start of the slot, ps.
+    /// Time from the start of a TDMA frame to the start of the slot, ps.
     opens: Ps,
     /// Duration of the slot, ps, at least 1.
     open_for: Ps,
 }
 
 impl Window {
-    /// Returns the end of the frame that contains `at`; `at` itself if a frame ends there.
+    /// Returns the end of the TDMA frame that contains the time `at`; `at` itself if a frame ends there.
     pub const fn frame_end(&self, at: Ps) -> Ps {
         let since = at.saturating_sub(self.anchor);
         self.anchor + since.div_ceil(self.frame) * self.frame
     }
 
-    /// Returns the total duration of the slots, or parts of slots, from the first frame to `at`.
+    /// Returns the slot time, ps, from the first TDMA frame to `at`: the total duration of slots in it.
     fn elapsed(&self, at: Ps) -> Ps {
         let since = at.saturating_sub(self.anchor);
         let (frames, into) = (since / self.frame, since % self.frame);
         frames * self.open_for + into.saturating_sub(self.opens).min(self.open_for)
     }
 
-    /// Returns the total duration of the slots, or parts of slots, between `from` and `until`.
+    /// Returns the slot time, ps, from `from` to `until`: the total duration of slots in this period.
     pub fn between(&self, from: Ps, until: Ps) -> Ps {
         self.elapsed(until) - self.elapsed(from)
     }
@@ -281,7 +281,8 @@ pub enum ChainState {
     Broken,
 }
 
-/// Period in which the view, the state of the chain and the promised data rates do not change.
+/// Period in which the chain's view, its state and the promised data rates are constant. The planner's formula gives
+/// the promised rates.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Period {
     /// Start of the period, ps. It ends where the next one starts.
@@ -316,7 +317,7 @@ pub struct Stage {
 pub struct Route {
     /// Stages, in which no hop changes, in order of time; at least one.
     pub stages: Vec<Stage>,
-    /// Periods, in which view and state do not change, in order of time; at least one.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time. At least one.
     pub periods: Vec<Period>,
     /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
     pub promised_bps: Vec<f64>,
@@ -366,7 +367,7 @@ impl Members {
 
     /// Returns the number (from 0) and the present position of each relay in the view.
     ///
-    /// A relay without a position gets a substitute. The hops at such a relay carry no data anyway.
+    /// A relay without a position gets an arbitrary one, which has no effect, because its hops carry no data.
     fn places(&self) -> Vec<(usize, Point)> {
         let place = |(index, member): (usize, &Option<(usize, RelayState)>)| {
             let known = member.and_then(|(relay, state)| Some((relay, state.observed.place?)));
@@ -375,7 +376,7 @@ impl Members {
         self.relays.iter().enumerate().map(place).collect()
     }
 
-    /// Returns the numbers of the chain's nodes, from Tx (0) to Rx (`rx`); `None` for one that cannot send.
+    /// Returns the numbers of the chain's nodes, from Tx (0) to Rx (`rx`). `None` stands for a node that cannot send.
     fn nodes(&self, rx: usize) -> Vec<Option<usize>> {
         let alive = self.relays.iter().map(|member| {
             let (relay, state) = (*member)?;
@@ -388,9 +389,9 @@ impl Members {
             .collect()
     }
 
-    /// Returns the agreed positions; `None` unless all relays hold positions for the same target SIR.
+    /// Returns each relay's number (from 0) and agreed position; `None` unless all have one target SIR.
     ///
-    /// Positions from which relays measure an unknown interferer have no target, and do not count.
+    /// Positions that relays take only to measure an unknown interferer have no target SIR, and do not count.
     fn agreed(&self) -> Option<Vec<(usize, Point)>> {
         let target = |state: &RelayState| state.observed.target.map(f32::to_bits);
         let (_, first) = self.relays.first().copied().flatten()?;
@@ -410,7 +411,7 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction. They are set anew at each agreement and for each new view.
+/// Time slots of all hops, for each direction. The slots are assigned anew at each agreement and for each new view.
 struct Layout {
     view: ViewId,
     agreed: Option<Vec<(usize, Point)>>,
@@ -427,7 +428,8 @@ pub struct DataLink {
     pub packet_bits: f64,
     /// True if data goes from Tx to Rx and from Rx to Tx; false if only to Rx.
     pub both: bool,
-    /// Ratio of the planned data rate to Tx to that to Rx, 0 to 1. It is 0 if only the direction to Rx is planned.
+    /// Planned data rate to Tx, as a fraction (0 to 1) of the planned rate to Rx. It is 0 if only the direction to Rx
+    /// is planned.
     pub reverse: f64,
 }
 
@@ -451,7 +453,7 @@ impl DataLink {
         }
     }
 
-    /// Returns true if the slots are fitted to the data of both directions.
+    /// Returns true if the lengths of the time slots are fitted to the hops' data rates in both directions.
     pub fn is_fitted_to_both(&self) -> bool {
         self.radio.link.access == Access::Fitted && self.reverse > 0.0
     }

@@ -17,7 +17,7 @@ use super::true_interference::TrueInterference;
 /// Period in which relays 1 to `after` and the other relays do not receive each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Partition {
-    /// Number of the last relay before the gap, from 1.
+    /// Number, from 1, of the relay after which the partition cuts the chain.
     pub after: u16,
     /// Start of the partition.
     pub from: Instant,
@@ -220,7 +220,7 @@ impl Setup {
         })
     }
 
-    /// Returns the longest time that a message needs for one hop along the chain, with 1 ms for computing.
+    /// Returns the longest time that a message needs for one hop along the chain. It includes 1 ms for computing.
     pub fn hop_time(&self) -> Duration {
         let latency = Duration::from_micros(self.link.latency.as_micros() + 1_000);
         self.load().map_or(self.link.hop_time(), |load| {

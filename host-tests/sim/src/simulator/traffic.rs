@@ -24,7 +24,8 @@ use std::fmt;
 use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
-/// Number of packets that are sent after the end of a run, so that the rates are meaningful.
+/// Number of packets that are sent after the end of a run. They make the reported data rates averages over many
+/// packets.
 const AFTER: usize = 1_000;
 /// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;
@@ -75,7 +76,7 @@ impl fmt::Display for TrafficError {
 
 impl std::error::Error for TrafficError {}
 
-/// Numbers of packets by what became of them.
+/// Numbers of packets: created, and by outcome (delivered, dropped, or lost with a relay).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Packets {
     /// Number of packets that the source created.
@@ -138,7 +139,7 @@ pub struct Traffic {
     pub from: Ps,
     /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
-    /// Periods in which the view, the state of the chain and the promised data rates do not change.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time.
     pub periods: Vec<Period>,
     /// Traffic to Rx and, if data goes both ways, traffic back to Tx.
     pub flows: Vec<Flow>,
@@ -247,7 +248,7 @@ struct Queue {
     packets: VecDeque<Ps>,
     /// Hop on which the node sends; `None` while it cannot send.
     hop: Option<Hop>,
-    /// Slot time, ps, that the first packet still needs at the time `since`; 0 before it is sent.
+    /// Slot time, ps, that the first packet still needs, counted from `since`. 0 before its transmission.
     rest: Ps,
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
@@ -259,7 +260,8 @@ struct Queue {
 }
 
 impl Queue {
-    /// Adds the queue's length since the last call to its statistics. Must precede each change of the length.
+    /// Adds the queue's length, which was constant since the last call, to its statistics. Must be called before each
+    /// change of the length.
     fn count(&mut self, now: Ps) {
         self.sum += self.packets.len() as u128 * u128::from(now.saturating_sub(self.counted));
         self.counted = now;
@@ -298,9 +300,9 @@ impl Queue {
     }
 }
 
-/// End of a transmission in the queue of events: time, order, node, and number of the transmission.
+/// End of a transmission, as an event in a queue: time, order, node, and number of the transmission.
 ///
-/// If several end at the same time, the one nearest to the end of the chain is first.
+/// If several end at the same time, `order` puts the one nearest to the end of the chain first.
 type End = Reverse<(Ps, usize, usize, u32)>;
 
 /// Simulation of the traffic in one direction, while it runs.
@@ -362,7 +364,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Replaces the hops of all nodes by those of `stage`. The queues of relays that are off are lost.
+    /// Replaces the hops of all nodes by the hops of `stage`. The queues of relays that are off are lost.
     fn enter(&mut self, stage: &Stage) {
         self.period = stage.period;
         let mut hops: Vec<Option<Hop>> = vec![None; self.queues.len()];

@@ -22,9 +22,9 @@ pub struct TrueInterference {
     pub period: Duration,
     /// True if a relay measures only once at each of its positions.
     pub once: bool,
-    /// Given samples that replace all measurements: the relay's number from 1, and the sample.
+    /// Samples that relays get in place of all measurements: the relay's number from 1, and the sample.
     ///
-    /// Relays get them at the time of the first measurement.
+    /// They get these at the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
     /// Measuring receivers that report wrong powers.
     pub broken: Vec<BrokenReceiver>,
@@ -150,13 +150,13 @@ impl TrueInterference {
         self.ends && now >= from && now < until
     }
 
-    /// Draws the factor of a measurement's error: the mean of `samples` exponential variables of mean 1.
+    /// Draws the random factor of a measured power: the mean of `samples` exponential variables of mean 1.
     fn mean(&self, rng: &mut impl Rng) -> f64 {
         let samples = f64::from(self.samples);
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
     }
 
-    /// Returns the shadowing at `at` in standard deviations. It is equal in a whole cell of [`SHADOW_M`].
+    /// Returns the shadowing at `at`, in standard deviations. It is equal within a cube of edge [`SHADOW_M`].
     #[expect(clippy::cast_possible_truncation, reason = "a number of a cell")]
     fn shadow(&self, at: Place) -> f64 {
         use rand::SeedableRng as _;
@@ -179,7 +179,8 @@ pub struct Snapshot {
     pub at: Instant,
     /// Numbers of the relays that are on, from 1.
     pub nodes: Vec<u16>,
-    /// Position of each relay that is on and has one: that of its drone, or its setpoint without drones.
+    /// Positions of the relays that are on and have one. Each is the position of the drone or, without drones, the
+    /// setpoint.
     pub places: Vec<Placement>,
     /// Setpoints of all relays; `None` unless every relay has one.
     pub goals: Option<Vec<Placement>>,

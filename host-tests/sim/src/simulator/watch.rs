@@ -10,12 +10,13 @@ pub use super::outcome::Watched;
 use super::outcome::{Ending, Outcome};
 use super::setup::Setup;
 
-/// Statistics of a run while it goes on: availability, simultaneous groups, smallest distance.
+/// Statistics that a run collects: availability of the chain, groups of flying relays, least distance.
 #[derive(Debug)]
 pub struct Watch {
     pub(super) states: Vec<ObservedState>,
     pub(super) optima: Optima,
-    /// Last setpoint of each relay, from relay 1; `None` before its first one. Relays that are off keep theirs.
+    /// Last setpoint of each relay, from relay 1; `None` before its first one. A relay that is off keeps its last
+    /// one.
     last_setpoints: Vec<Option<Point>>,
     until: Instant,
     first: Option<Instant>,
@@ -47,7 +48,8 @@ impl Watch {
         }
     }
 
-    /// Adds the time since the last call, in which no state changed, to the available or the outage time.
+    /// Counts the time since the last call as available or as outage. The caller makes sure that no state changed in
+    /// that time.
     pub fn count_time(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
@@ -93,7 +95,8 @@ impl Watch {
         }
     }
 
-    /// Updates the number of groups and the first agreement, after all changes of states at `now`.
+    /// Updates the number of groups that fly by separate agreements, and the time of the first agreement. The caller
+    /// has recorded all changes of states at `now`.
     pub fn count_groups(&mut self, now: Instant) {
         self.most_flying = self.most_flying.max(groups(&self.states));
         if self.first.is_none() && has_agreed(&self.states) {
@@ -103,8 +106,8 @@ impl Watch {
 
     /// Sets whether the chain counts as available from now on.
     ///
-    /// It is available while the longest possible chain of the living relays holds the positions that it has without
-    /// faults.
+    /// It is available while the longest chain that the living relays can form has the same positions as in a run
+    /// without faults.
     pub fn set_available(&mut self, is_right: bool) {
         if self.is_right && !is_right {
             self.wrong = Duration::from_micros(0);
@@ -112,10 +115,10 @@ impl Watch {
         self.is_right = is_right;
     }
 
-    /// Returns the statistics up to `now`.
+    /// Returns the statistics up to `now`. They include the availability only if `is_judged` is true.
     ///
-    /// The availability is `None` unless `is_judged`. `flown_m` is the smallest distance of simulated drones, m,
-    /// which replaces that of setpoints.
+    /// `flown_m` is the smallest distance of simulated drones, m. If it is `None`, because no drones are simulated,
+    /// the smallest distance of setpoints is used.
     pub fn end(mut self, now: Instant, is_judged: bool, flown_m: Option<f64>) -> Watched {
         self.count_time(now);
         let share = self.first.map_or(0.0, |first| {
@@ -131,12 +134,12 @@ impl Watch {
     }
 }
 
-/// State of a relay as the statistics of a run use it.
+/// State of a relay from which a run's statistics are computed, such as the availability of the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ObservedState {
     /// True if the relay is switched on.
     pub is_on: bool,
-    /// Phase of the relay's protocol, such as planning or holding a position.
+    /// Phase of the relay's protocol, such as planning or holding an agreed position.
     pub phase: Phase,
     /// View of the relay: the membership of the chain that it has accepted.
     pub view: ViewId,
@@ -146,7 +149,7 @@ pub struct ObservedState {
     pub relays: u16,
     /// Index of the relay in its view (membership of the chain), from 1 next to Tx.
     pub index: u16,
-    /// Version of the relay's mission; 0 for the loaded one.
+    /// Version of the relay's mission; 0 for the mission loaded before the start.
     pub version: u16,
     /// Linear target SIR of the relay's position; `None` without a target.
     pub target: Option<f32>,
@@ -180,10 +183,10 @@ impl ObservedState {
     }
 }
 
-/// Returns the number of groups of relays that each hold an agreement of their own.
+/// Returns the number of groups of relays that each fly by an agreement of their own.
 ///
-/// A group consists of the relays of one view with valid leases. Relays of one view that claim the same index belong
-/// to different groups. Relays separated by a partition that still hold their common agreement are one group.
+/// A group consists of the relays of one view with valid leases. If relays of a view claim the same index, they are
+/// in different groups. A partition does not split a group whose agreement is still valid.
 pub fn groups(seen: &[ObservedState]) -> usize {
     let mut views: BTreeMap<(ViewId, u16), BTreeMap<u16, usize>> = BTreeMap::new();
     for one in seen.iter().filter(|one| one.flies()) {
@@ -194,7 +197,7 @@ pub fn groups(seen: &[ObservedState]) -> usize {
     claims.sum()
 }
 
-/// Returns true if in some view all relays hold their positions for the same target SIR.
+/// Returns true if there is a view whose relays all have positions for the same target SIR.
 pub fn has_agreed(seen: &[ObservedState]) -> bool {
     seen.iter().filter(|one| one.is_on).any(|one| {
         let same = |other: &&ObservedState| {
@@ -212,8 +215,8 @@ const MAX_CHAINS: usize = 1_000;
 
 /// Returns the largest number of relays that can form a chain, and the chains of that many relays.
 ///
-/// `on` lists the usable relays in ascending order, from 0. `links` returns true for two linked relays, the lower one
-/// first. Only chains whose members all satisfy `with` are returned, at most 1000.
+/// `on` lists the usable relays in ascending order, from 0. `links(a, b)` returns true if relays a < b can be
+/// neighbours. Only chains whose relays all satisfy `with` are returned, at most 1000.
 pub fn longest(
     on: &[usize],
     links: impl Fn(usize, usize) -> bool,
@@ -342,7 +345,7 @@ impl Optima {
         }
     }
 
-    /// Returns true if `places` are the positions in which relays `nodes` (from 1) settle without faults.
+    /// Returns true if `places` are the positions that the relays `nodes` (from 1) reach without faults.
     ///
     /// `version` is the version of their mission. False if a position is missing.
     pub fn is_met(

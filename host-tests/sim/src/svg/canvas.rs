@@ -223,7 +223,7 @@ impl Scale {
         Self { from, to }
     }
 
-    /// Returns the picture coordinate of `value`; for a value outside the scale, that of the nearer end.
+    /// Returns the picture coordinate of `value`. A value outside the scale gets the coordinate of the nearer end.
     pub(super) fn at(&self, value: f64) -> f64 {
         let share = ((value - self.from.0) / (self.from.1 - self.from.0)).clamp(0.0, 1.0);
         self.to.0 + share * (self.to.1 - self.to.0)

@@ -116,9 +116,11 @@ const SIR_SIZE: f64 = 10.0;
 /// It is larger than the radius of a relay's circle.
 const GAP: f64 = 4.6;
 
-/// Places along a hop at which its SIR may be written, as fractions of its length.
+/// Positions along a hop at which the text with its SIR may be, as fractions of its length.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
-/// Distances of a SIR from its hop, in picture units: positive above the hop, negative below.
+/// Distances, in picture units, by which the text with a hop's SIR may be moved away from the hop.
+///
+/// The sign is the side of the hop: positive for above, negative (also -0.0) for below.
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
 /// Largest number of hops for which each SIR is written beside its hop. For more hops, the SIRs are in one row.
@@ -129,7 +131,7 @@ pub(super) struct Hop {
     line: [Point; 2],
     /// SIR of the hop in the worse of its directions, dB; `None` if it is unknown.
     decibels: Option<f64>,
-    /// SIRs of the hop in the direction to Rx and in that to Tx, dB; `None` if unknown.
+    /// SIRs of the hop in the direction to Rx and in the direction to Tx, dB; `None` if unknown.
     ways: [Option<f64>; 2],
     /// True if the picture shows SIRs of both directions, to Rx and back to Tx.
     has_back: bool,
@@ -246,9 +248,9 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
     }
 }
 
-/// Returns positions at which a hop's SIR may be written, the best first, each with a point on the hop.
+/// Returns pairs of a point on the hop and a position for the text with its SIR, the best pair first.
 ///
-/// `width` and `height` are those of the text.
+/// `width` and `height` are the size of the text.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);

@@ -30,7 +30,7 @@ pub struct Picture {
     pub interferers: Vec<(f64, f64, f64)>,
     /// Earlier or estimated interferers, in the form of `interferers`. They are drawn faintly.
     pub others: Vec<(f64, f64, f64)>,
-    /// Kind of the interferers in `others`: those of the mission before an upload, or the estimated one.
+    /// Kind of the interferers in `others`: of the mission before an upload, or estimated.
     pub others_are: OtherInterferers,
     /// Relays from Tx to Rx: x along the line and altitude, m. A position that is not finite is not drawn.
     pub nodes: Vec<(f64, f64)>,
@@ -40,7 +40,7 @@ pub struct Picture {
     pub hop_sir: Vec<f64>,
     /// Linear SIR of every hop in the direction to Tx, the hop next to Tx first. Empty if only the way to Rx counts.
     pub hop_sir_back: Vec<f64>,
-    /// Ratio, 0 to 1, of the SIR that a hop needs in the direction to Tx to that in the direction to Rx.
+    /// SIR that hops need toward Tx, as a fraction (0 to 1) of the SIR that they need toward Rx.
     pub reverse: f64,
     /// Numbers, 1 to N, of silent relays. They are crossed out, and their hops are dashed.
     pub lost: Vec<usize>,
@@ -50,10 +50,10 @@ pub struct Picture {
     pub events: Vec<(f64, String)>,
 }
 
-/// Kind of the faint interferers in a picture: those before an upload, or an estimated one.
+/// Kind of the faintly drawn interferers in a picture: of the mission before an upload, or estimated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum OtherInterferers {
-    /// Interferers of the mission that was flown before an upload.
+    /// Interferers of the mission that the relays had before an upload.
     #[default]
     Before,
     /// Interferer that the relays have estimated from measurements.
@@ -150,8 +150,8 @@ pub(super) fn decibels(sir: f64) -> Option<f64> {
     (sir.is_finite() && sir > 0.0).then(|| 10.0 * sir.log10())
 }
 
-/// Returns the linear SIR of hop `number`, from 1, in its worse direction; `None` without such a hop. SIRs of the way
-/// back are divided by `reverse`.
+/// Returns the linear SIR of hop `number`, from 1, in its worse direction; `None` without such a hop. SIRs in the
+/// direction to Tx are divided by `reverse` before they are compared.
 pub(super) fn counted(picture: &Picture, number: usize) -> Option<f64> {
     let at = number.checked_sub(1)?;
     let there = picture.hop_sir.get(at).copied()?;

@@ -17,7 +17,7 @@ const FAR_LINES: usize = 4;
 /// Interferer: transmit power, W, and position x along the line and y to its right, m.
 type Source = (f64, f64, f64);
 
-/// Splits interferers into those within the plot and those outside. Values that are not finite are left out.
+/// Splits interferers into two lists: within the plot, and outside. Values that are not finite are left out.
 fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
     let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
     all.iter()

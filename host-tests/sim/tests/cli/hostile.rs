@@ -106,7 +106,7 @@ fn the_larger_of_two_parts_goes_on_until_they_merge() {
     assert_eq!(healed["sir"], json("")["sir"]);
 }
 
-/// Checks that of two relays only the leader, relay 1, may go on alone: the other has no quorum.
+/// Checks that relay 1 of two, the leader, has a quorum alone if the other fails, and relay 2 has none.
 #[test]
 fn too_few_relays_with_positions_give_status_1() {
     let output = chain("--json --uavs 2 --kill 1@20");
@@ -236,9 +236,10 @@ fn an_overloaded_channel_is_refused_before_flight() {
     assert!(json("--baud 9600 --wires")["sir"].as_f64().unwrap() > 1.0);
 }
 
-/// Checks that a channel that is too slow for fifty relays in range of each other is refused.
+/// Checks that a channel that is too slow for fifty relays in range of each other is rejected.
 ///
-/// The error names settings that would suffice. A run with the slower probing that it names is accepted.
+/// The error names settings that would suffice. A run with the longer probing interval that the error names is
+/// accepted.
 #[test]
 fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
@@ -351,7 +352,7 @@ fn relays_spread_for_measuring_have_no_sir_in_the_picture() {
     assert!(!svg.contains("SIR 0.000"), "{svg}");
 }
 
-/// Checks that the true and the optimum SIR of a report are those of the remaining relays.
+/// Checks that a report's true and optimum SIR are computed without a lost relay.
 #[test]
 fn a_lost_relay_does_not_count_in_the_status() {
     let options = "--uavs 6 --kill 4@20 --listen --listen-for 120";

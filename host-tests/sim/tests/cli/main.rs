@@ -420,7 +420,7 @@ fn root() -> &'static Path {
         .unwrap()
 }
 
-/// Checks that no alias of cargo hides its progress. A build without output for a minute looks like a hang.
+/// Checks that no cargo alias hides the progress of a build. A minute without output looks like a hang.
 #[test]
 fn no_command_hides_cargos_progress() {
     let text = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap();

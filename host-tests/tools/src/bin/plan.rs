@@ -351,9 +351,10 @@ impl Options {
         }
     }
 
-    /// Returns the request: a number of relays, or the SIR that the fewest relays shall reach.
+    /// Returns the number of relays of the request: given, or to be found for a target SIR.
     ///
-    /// For a requested data rate it is 1 relay: the number of relays is then found by that rate.
+    /// For a requested data rate the result is 1 relay, because the number of relays is then found later by that
+    /// rate.
     fn number(&self) -> Number {
         let wanted = &self.wanted;
         match (wanted.uavs, wanted.target_sir, wanted.target_sir_db) {

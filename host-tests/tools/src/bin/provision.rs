@@ -406,7 +406,7 @@ struct Options {
     /// key the messages between the two are not signed
     #[arg(long, value_name = "FILE")]
     autopilot_key_file: Option<PathBuf>,
-    /// Accept a hypothetical interferer in place of several. Without it a loss of more than 1 % of the best SIR is refused
+    /// Accept that relays plan with one hypothetical interferer instead of several real ones. Without this option a loss of more than 1 % of the best SIR is refused
     #[arg(long)]
     stand_in: bool,
     /// File to write the block to

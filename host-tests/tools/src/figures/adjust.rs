@@ -134,9 +134,9 @@ fn taken() -> Vec<String> {
     ]
 }
 
-/// Formats the horizontal distance of two neighbours, each at the chain's head, middle and tail.
+/// Formats the horizontal distances of neighbours near Tx, in the middle, and near Rx.
 ///
-/// They are those after `round` rounds of Algorithm 2.
+/// The relays' positions are those after `round` rounds of Algorithm 2.
 fn steps(rows: &[ShapeRow], round: u16) -> String {
     let x = |relay: u16| {
         let mut of = rows.iter().filter(|row| row.round == round);

@@ -39,9 +39,10 @@ fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }
 
-/// Returns the pairs of interferer's offset and altitude, m, that are drawn.
+/// Returns the points of the figure: pairs of the interferer's distance from the line and an altitude.
 ///
-/// Altitudes are 5 m apart; near the paper's best one and at its offset they are 0.5 m apart.
+/// Both are in m. Altitudes are 5 m apart. For the distance of the interferer at which the paper reads its best
+/// altitude, they are 0.5 m apart near that altitude.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {
@@ -80,8 +81,8 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 
 /// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// The interferer is at (500, `y_m`) m. Scans every 5 m, then refines to 0.1 m by ternary search if that gains more
-/// than the tolerance of a chain.
+/// The interferer is at (500, `y_m`) m. Tries every 5 m. Then refines to 0.1 m by ternary search, if that raises the
+/// SIR by more than the relative tolerance with which a chain finds it.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;

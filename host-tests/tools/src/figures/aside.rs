@@ -44,7 +44,9 @@ struct Row {
     sir_linear: f32,
 }
 
-/// Table row: best SIRs of a relay above the line, at one altitude or any, and beside the line.
+/// Table row: best SIRs of one relay with different freedom to leave the line at the lowest altitude.
+///
+/// It may have to stay there, fly higher above the line, or fly beside the line.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PowerRatio {
     interferer_y_m: f64,

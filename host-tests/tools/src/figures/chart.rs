@@ -50,7 +50,8 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-/// Style of a curve. Curves of a chart differ in colour, stroke and marker, so one of these is enough.
+/// Style of a curve. Curves of a chart differ in colour, stroke and marker, so that a reader who cannot tell the
+/// colours apart recognises them, too.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
     /// Number of the colour, from 0 to 6, which also selects the shape of the markers.
@@ -198,7 +199,9 @@ impl Chart {
 
 const STEPS: f64 = 6.0;
 
-/// Largest number of decades on a logarithmic axis with labels at 2 and 5, too, not only at 1.
+/// Largest number of decades on a logarithmic axis with tick labels at 1, 2 and 5 times a power of ten.
+///
+/// A longer axis has labels at powers of ten only.
 const FEW_DECADES: f64 = 2.4;
 
 /// Distance that a tick may lie beyond an end of the axis, as a fraction of its length.

@@ -14,7 +14,7 @@ pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 /// paper's Algorithm 1.
 pub const STEP: f64 = 0.1;
 
-/// Table row: SIR of a chain after one sweep, a pass of messages along it.
+/// Table row: SIR of a chain after one pass of messages along the chain (a sweep).
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,

@@ -25,9 +25,9 @@ const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
 const PEN: u32 = 4;
 const APART: f64 = 105.0;
-/// Distance of a curve's first marker from its beginning, picture units, for each colour number.
+/// Shift of a curve's markers along the curve, in picture units, for each step of the colour number.
 ///
-/// The markers of curves that coincide are then side by side.
+/// It puts the markers of curves that coincide side by side instead of on top of each other.
 const APART_BY_HUE: u8 = 25;
 
 /// Error: the chart cannot be drawn, with the reason.

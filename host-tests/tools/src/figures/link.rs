@@ -16,24 +16,26 @@ use crate::plan::{Number, Plan, PlanRequest, plan};
 /// Largest number of relays in the figure; every number from 1 to it is drawn.
 pub const MOST_RELAYS: u16 = 24;
 
-/// Table row: SIRs and data rates of one number of relays, for one direction and for both. For both directions the
-/// same SIR or rate is required each way (r = 1).
+/// Table row: SIRs and data rates of one number of relays, for data to Rx and in both directions.
+///
+/// In both directions the same SIR or rate is required.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     relays: u16,
-    /// SIR of the worst hop to Rx, linear, with the positions for one direction.
+    /// SIR of the worst hop to Rx, linear, with the positions that are best for data to Rx.
     one_way_sir_linear: f64,
-    /// SIR of the worst hop of both directions, linear, with the positions for both.
+    /// SIR of the worst hop of both directions, linear, with the positions that are best for both.
     both_ways_sir_linear: f64,
-    /// SIR of the worst hop of both directions, linear, with the positions for one direction.
+    /// SIR of the worst hop of both directions, linear, with the positions that are best for data to Rx.
     judged_sir_linear: f64,
-    /// Data rate to Rx in equal time slots, with the positions for one direction.
+    /// Data rate to Rx in equal time slots, with the positions that are best for it.
     one_way_slots_bit_per_s_hz: f64,
-    /// Data rate to Rx in slots as long as each hop needs, with the positions for that rate.
+    /// Data rate to Rx in time slots as long as each hop needs, with the positions that are best for it.
     one_way_fitted_bit_per_s_hz: f64,
-    /// Data rate in each of both directions in equal time slots, with the positions for both.
+    /// Data rate in either direction at the same time, in equal time slots, with the best positions for it.
     both_ways_slots_bit_per_s_hz: f64,
-    /// Data rate in each of both directions in slots as long as each hop needs, with the positions for it.
+    /// Data rate in either direction at the same time, in time slots as long as each hop needs. The positions are the
+    /// best ones for it.
     both_ways_fitted_bit_per_s_hz: f64,
 }
 

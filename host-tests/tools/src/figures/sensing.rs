@@ -10,24 +10,26 @@ use crate::listening::{
 };
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Number of random scenes for each curve of the figure with interferers that do not move.
+/// Number of random arrangements of interferers for each curve of the figure in which they do not move.
 pub const SCENES: u64 = 60;
-/// Number of random scenes for each speed in the figure with a moving interferer.
+/// Number of random arrangements for each speed in the figure with a moving interferer.
 pub const PASSES: u64 = 6;
 
 /// Speeds of the moving interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// Table row: SIR relative to the best possible one after a number of agreements, over many scenes.
+/// Table row: a chain's SIR as a fraction of the best possible one, after a number of agreements.
+///
+/// It is over many random arrangements of the interferers.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 struct AgreementShare {
     scene: &'static str,
     relays: u16,
     /// Number of agreements on positions that used measurements of the interference.
     agreements: usize,
-    /// Median over the scenes of the chain's SIR divided by the best possible one.
+    /// Median of the chain's SIR divided by the best possible one, over all arrangements of interferers.
     median_linear: f64,
-    /// Ratio of the chain's SIR to the best possible one that nine of ten scenes reach.
+    /// Ratio of the SIR to the best possible one that nine of ten arrangements of interferers reach.
     tenth_linear: f64,
 }
 
@@ -45,7 +47,7 @@ struct Tracked {
 
 type Run = fn(&RandomScene) -> Result<Setup, FigureError>;
 
-/// Kinds of scenes, each with its name, number of relays, number of interferers, and setup function.
+/// Kinds of experiments: name, number of relays, number of interferers, and setup function of each.
 const KINDS: [(&str, u16, usize, Run); 6] = [
     ("3 relays, one source", 3, 1, unknown),
     ("8 relays, one source", 8, 1, unknown),
@@ -60,8 +62,10 @@ const KINDS: [(&str, u16, usize, Run); 6] = [
     ),
 ];
 
-/// Returns a row for each kind of scene and number of agreements: the chain's SIR over the best one. Each is over
-/// `scenes` random scenes.
+/// Returns the table rows of the SIR as a fraction of the best possible one, by number of agreements.
+///
+/// There is a row for each kind of experiment and number of agreements, over `scenes` random arrangements of the
+/// interferers.
 fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     let mut rows = Vec::new();
     for (what, relays, sources, run) in KINDS {
@@ -79,8 +83,9 @@ fn by_agreement(scenes: u64) -> Result<Vec<AgreementShare>, FigureError> {
     Ok(rows)
 }
 
-/// Returns a row for each speed of the interferer: the chain's mean SIR over the best one. Each is over `scenes`
-/// random scenes.
+/// Returns the table rows of the mean SIR relative to the best possible one, by the interferer's speed.
+///
+/// There is a row for each number of relays and speed, over `scenes` random arrangements.
 fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
     let mut rows = Vec::new();
     for relays in [3, 8] {

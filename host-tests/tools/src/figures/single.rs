@@ -319,9 +319,10 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// Returns the cells of the table in the caption: the printed averages, and the nearest computed ones.
+/// Returns the cells of the caption's table, which compares the paper's averages with computed ones.
 ///
-/// For each kind of average it has the pair of powers with the smallest difference. The drawn pairs follow.
+/// Its rows are the printed averages, then for each kind of average the pair of powers that comes nearest to them,
+/// then the pairs of powers that the figure draws.
 fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",

@@ -13,7 +13,7 @@ use uav_relay_scenario::{BetaPoint, Field, Interference, Scenario};
 /// Numbers of relays, one for each curve of the figure.
 pub const RELAYS: [u16; 5] = [10, 20, 30, 40, 50];
 
-/// Seed of the random interference in the field that varies along the line.
+/// Seed of the random interference, where it varies along the line Tx-Rx.
 pub const SEED: u64 = 4;
 
 const SPACING_M: u32 = 20;
@@ -23,18 +23,23 @@ const ALPHA: f64 = 3.0;
 /// Largest interference power as a multiple of the power that a relay receives from 1 W right below it.
 const MOST: f64 = 2.0;
 
-/// Kind of interference field: varying along the line Tx-Rx, or the same everywhere.
+/// Kind of known interference: varying along the line Tx-Rx, or the same everywhere.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Field that varies along the line: E[1 / I] of the interference power I is within a range. It is between 0.6
-    /// and 1 over the power that a relay receives from 1 W right below it.
+    /// Interference that varies along the line: E[1 / I] is between 0.6 / P and 1 / P.
+    ///
+    /// I is the interference power; P is the power that a relay receives from a sender of 1 W right below it.
     Uneven,
-    /// Field that is the same everywhere: E[1 / I] is 0.8 over the power received from 1 W right below.
+    /// Interference that is the same everywhere: E[1 / I] is 0.8 / P.
+    ///
+    /// I is the interference power; P is the power that a relay receives from a sender of 1 W right below it.
     Even,
 }
 
-/// Table row: expected SIR of a chain in an interference field after one pass of messages along it.
+/// Table row: expected SIR of a chain after one pass of messages along it.
+///
+/// The interference is random; its distribution is known along the line Tx-Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct Row {
     field: Kind,
@@ -46,7 +51,7 @@ struct Row {
     sir_linear: f64,
 }
 
-/// Table row: distribution of the interference power I at one x of the field.
+/// Table row: distribution of the random interference power I at one x on the line Tx-Rx.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct PointRow {
     field: Kind,
@@ -64,7 +69,7 @@ fn lambda_w(mission: &Mission) -> f64 {
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// Returns the points of the field at which the distribution of the interference power is given.
+/// Returns the distributions of the interference power at the points of the line that define `kind`.
 fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;
@@ -85,7 +90,7 @@ fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     })
 }
 
-/// Returns the mission of `relays` relays in the interference field `kind`.
+/// Returns the mission of `relays` relays whose interference along the line Tx-Rx is of this kind.
 pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     let points = field(kind)?;
     let spec = Field {
@@ -160,7 +165,9 @@ fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the curve of one chain, SIR by sweep; its last SIR is extended to the end of the picture.
+/// Returns the curve of one chain: its SIR after each pass of messages along the chain.
+///
+/// A chain that settles early keeps its last SIR up to the right end of the picture.
 fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     let of = rows
         .iter()

@@ -24,7 +24,7 @@ pub struct Chain {
 /// Places each relay as far along the chain as the target SIR `target` (linear, > 0) allows.
 ///
 /// `None` if a hop cannot meet the target. If the target is too high, the last relay is far from the end of the
-/// chain, and the last hop has a lower SIR. Work: one farthest position for each of N relays.
+/// chain, and the last hop has a lower SIR. The cost is one search for a farthest position for each relay.
 pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
     let profile = mission.config().common;
     let mut from = PerTarget::from(
@@ -76,9 +76,10 @@ pub struct Sweep {
     pub chain: Option<Chain>,
 }
 
-/// Returns all passes of messages of Algorithm 1 until the chain settles (of Algorithm 4 in a field).
+/// Returns all passes of messages along the chain until it settles, by the paper's Algorithm 1.
 ///
-/// `step` is the decrease of the target SIR from one pass to the next, linear.
+/// `step` is the decrease of the target SIR from one pass to the next, linear. If the interference is known only
+/// along the line (a field), the algorithm is the paper's Algorithm 4.
 pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> {
     let own = mission.config().common;
     let mut search = Search::new(mission, own, Schedule::FixedStep { step })?;
@@ -121,7 +122,9 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> 
     Ok(sweeps)
 }
 
-/// Returns the chain that the relays of `mission` agree on by Algorithm 1 (Algorithm 4 in a field).
+/// Returns the chain that the relays of `mission` agree on by the paper's Algorithm 1.
+///
+/// If the interference is known only along the line (a field), it is Algorithm 4.
 pub fn settled(mission: &Mission) -> Result<Chain, FigureError> {
     let common = |_| mission.config().common;
     let agreed = plan::solve(mission, Schedule::Bracketed, common)?;

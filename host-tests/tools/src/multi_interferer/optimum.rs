@@ -18,7 +18,8 @@ const ROUNDING: f64 = 1e-12;
 pub struct Chain {
     /// Positions (x, altitude) of the relays from Tx to Rx, m.
     ///
-    /// x is in [0, D] and rises by at least the least separation (less 1e-12 of it, for rounding).
+    /// x is between 0 (Tx) and the distance to Rx. It rises by at least the least separation, less 1e-12 of that for
+    /// rounding.
     pub places: Vec<(f64, f64)>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
@@ -114,23 +115,26 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
     Some(below)
 }
 
-/// Number of steps of the scan over altitudes: 24 of equal length, and 24 more of equal ratio.
+/// Number of intervals into which the range of altitudes is divided for the scan.
+///
+/// It is divided twice: into intervals of equal length, and into intervals of equal ratio.
 const SCANNED: u32 = 24;
 
 const TOPS: usize = 3;
 
 /// Number of golden-section steps that refine a maximum over altitude.
 ///
-/// The interval shrinks by about 5e-6, the loss in SIR by its square.
+/// They reduce the interval to 6e-6 of its length; the loss in SIR falls with the square of that.
 const STEPS: u32 = 25;
 
 const COMMON_TOLERANCE: f64 = 1e-11;
 
-/// Returns the best chain whose relays share one altitude of the scene's band.
+/// Returns the best chain whose relays share one altitude within the permitted range of altitudes.
 ///
-/// It is never worse than at either end of the band. Scans the band and refines the three highest maxima; a narrower
-/// maximum between scanned altitudes may be missed. `None` as for [`optimum`](super::optimum()), if a relay has a
-/// fixed altitude of its own, and for an empty band. Work: about 120 optima.
+/// It is never worse than at the lowest or the highest altitude. Scans the range and refines the three highest
+/// maxima; a narrower maximum between scanned altitudes may be missed. `None` as for [`optimum`](super::optimum()),
+/// if a relay has a fixed altitude of its own, and for an empty range. The cost is about 120 times that of
+/// [`optimum`](super::optimum()).
 pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     let band = scene.band;
     if scene.relays.iter().any(|relay| relay.holds) || !(band.least_m <= band.most_m) {
@@ -167,9 +171,7 @@ pub fn best_common_altitude(scene: &Scene) -> Option<Chain> {
     at_altitude(scene, best.0)
 }
 
-/// Returns the altitudes from `least` to `most` to scan, m, in rising order.
-///
-/// It is a single one if both are equal.
+/// Returns the altitudes from `least` to `most` to scan, m, in rising order. Equal limits give a single altitude.
 fn altitudes(least: f64, most: f64) -> Vec<f64> {
     let shares = (0..=SCANNED).map(|i| f64::from(i) / f64::from(SCANNED));
     let mut altitudes: Vec<f64> = shares
@@ -219,9 +221,9 @@ pub(super) fn golden(
 // d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
 // target can be bisected.
 
-/// Group of feasible hops from one relay to the next, as an interval of x for each end.
+/// Group of feasible hops from one relay to the next, as an interval of x for each of the two.
 ///
-/// From each x in `from` some x in `to` is received at the target SIR.
+/// A sender at any x in `from` has at least one x in `to` at which the next relay meets the target SIR.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     from: Span,
@@ -235,7 +237,7 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Intervals of x in which each relay may be, so that the rest of the chain meets one target SIR.
+/// Intervals of x in which each relay may be, so that all hops from it on to Rx meet one target SIR.
 ///
 /// They are computed from Rx to Tx. The hop from Tx to the first relay is not checked.
 pub(super) struct Stages<'a> {
@@ -244,11 +246,11 @@ pub(super) struct Stages<'a> {
     target: f64,
     /// Feasible hops sent by relays N - 1, N - 2, and so on to 1, in this order.
     before: Vec<Stage>,
-    /// Positions of relay 1 from which the rest of the chain can meet the target.
+    /// Positions of relay 1 from which all hops on to Rx can meet the target SIR.
     first: Vec<Span>,
 }
 
-/// Ranges of hops at one target SIR and one sender's power, kept for the next relay of equal power.
+/// Ranges of hops for one target SIR and one transmit power, kept for relays of equal power.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -258,8 +260,8 @@ struct Reach {
 impl<'a> Stages<'a> {
     /// Computes the feasible positions of each relay for the SIR `target` (linear, > 0).
     ///
-    /// Relays are at least `apart` metres apart. `None` if a relay has no feasible position. Work: a scan of the
-    /// line's nodes per change of power along the chain, and a few intervals per relay.
+    /// Relays are at least `apart` metres apart. `None` if a relay has no feasible position. The cost is a scan of
+    /// the sampled positions for each change of power along the chain, and a few intervals for each relay.
     pub(super) fn new(line: &'a Line<'a>, target: f64, apart: f64) -> Option<Self> {
         let (last, others) = line.scene.relays.split_last()?;
         let mut spans = vec![Span {
@@ -302,8 +304,8 @@ impl<'a> Stages<'a> {
 
     /// Returns the x of each relay, m, in a chain that meets the target if [`Stages::is_met`].
     ///
-    /// They rise from Tx to Rx. Each relay is as near to an even division of the remaining distance as the target
-    /// allows. `None` if the feasible positions are not connected.
+    /// They rise from Tx to Rx. Each relay divides the rest of the line among the remaining hops as evenly as the
+    /// target allows. `None` if the feasible positions are not connected.
     pub(super) fn chain(&self) -> Option<Vec<f64>> {
         let d = self.line.scene.distance_m;
         let mut hops = self.before.len() as f64 + 2.0;
@@ -598,8 +600,8 @@ pub(super) struct Crossing {
 
 /// Returns the points, in rising order, at which the function `exact` crosses `level`.
 ///
-/// `values` are those of the function at the rising `nodes`. Two crossings between neighbouring nodes are missed.
-/// Work: about 60 evaluations per crossing.
+/// `values` are those of the function at the rising `nodes`. Two crossings between neighbouring nodes are missed. The
+/// cost is about 60 evaluations for each crossing.
 pub(super) fn crossings(
     nodes: &[f64],
     values: &[f64],

@@ -25,7 +25,7 @@ const PLACES: u32 = 16;
 /// Later rounds search only one such step on either side of the present value.
 const LEVELS: u32 = 8;
 
-/// Number of golden-section steps that refine a maximum: the interval shrinks by about 1e-7.
+/// Number of golden-section steps that refine a maximum. They reduce the interval to 1e-7 of its length.
 const STEPS: u32 = 34;
 
 /// Result of the local search: the improved chain and its SIR.
@@ -175,9 +175,10 @@ impl Turn<'_> {
         }
     }
 
-    /// Returns the smallest and largest x, m, that the neighbours leave to the relay.
+    /// Returns the smallest and largest x, m, that the neighbours leave to the relay at `y` and `h`.
     ///
-    /// It is at altitude `h` and lateral position `y`, m. The first is above the second if no x is allowed.
+    /// `h` is the relay's altitude and `y` its lateral position, m. The first result is above the second if no x is
+    /// allowed.
     fn room(&self, y: f64, h: f64) -> (f64, f64) {
         let ahead = |apart: f64, other: Place| {
             let across = (y - other.y).powi(2) + (h - other.h).powi(2);
@@ -196,10 +197,10 @@ fn better(one: (Place, f64), other: (Place, f64)) -> (Place, f64) {
     if other.1 > one.1 { other } else { one }
 }
 
-/// Finds the altitude or lateral position near `own` that maximises the SIR of `at`.
+/// Finds the altitude or lateral position near `own` at which a relay has the best SIR.
 ///
-/// Returns the relay's position and SIR there. `window` is the fraction of the range `least` to `most` that is
-/// searched on either side.
+/// `at` returns the relay's best position and its SIR for a given altitude or lateral position; the best of these is
+/// returned. `window` is the fraction of the range `least` to `most` that is searched on either side.
 fn scanned(
     own: f64,
     (least, most): (f64, f64),

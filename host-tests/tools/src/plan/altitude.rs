@@ -18,8 +18,9 @@ const MOST: usize = Mission::MAX_RELAYS as usize;
 
 type Chain = Solver<MOST, { MOST / 10 }>;
 
-/// Returns the plan of the joint method, which chooses x, side and altitude of each of `relays` relays. If that finds
-/// none, the relays stay at their own altitudes.
+/// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
+///
+/// If the method finds none, the relays keep the altitudes that the scenario gives them.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     match joint(&briefed) {
@@ -47,8 +48,9 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
 
 /// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
 ///
-/// Computes what a relay on board solves for the whole chain, and the pass of messages that follows. `seat_of`
-/// returns a relay's data.
+/// Computes without messages what the relays compute on board: the solution of the whole chain, then the pass of
+/// messages along the chain that fixes each position. `seat_of` returns the power of a relay and the altitudes and
+/// lateral positions that it may choose from.
 pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Placement>> {
     let mut solver = Box::new(Chain::new(mission)?);
     let target = loop {
@@ -101,7 +103,7 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
     Some(places)
 }
 
-/// Number of common altitudes that are tried to find a number of relays that surely suffices.
+/// Number of common altitudes that are tried, to find an upper limit for the fewest relays.
 const LEVELS: u8 = 9;
 
 /// Returns the plan with the fewest relays that give every hop the SIR `target`, with free altitudes.
@@ -116,8 +118,9 @@ pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result
 
 /// Returns the plan with the fewest relays that give every hop the SIR `target`, by bisection.
 ///
-/// The upper end is the fewest by `at_level`, with all relays at one altitude. `free` plans a given number of relays;
-/// more relays are assumed to do no worse.
+/// The upper limit of the search is the fewest relays at one common altitude, which `at_level` plans for several
+/// altitudes. `free` plans a given number of relays with free altitudes. The search assumes that more relays do no
+/// worse.
 pub(super) fn fewest_of(
     scenario: &Scenario,
     target: f64,

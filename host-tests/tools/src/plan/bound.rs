@@ -89,8 +89,10 @@ struct Bound<'a> {
     targets: Targets,
 }
 
-/// Node with its possible cells in ascending order of x. For each cell it has the largest squared length, m^2, of a
-/// hop that the node can receive there at its target SIR.
+/// Node of the chain during the proof, with the cells (intervals of x) that it may be in, ascending.
+///
+/// For each cell, `hears_squared` is the largest squared length, m^2, of a hop that the node can receive there at its
+/// target SIR.
 struct Node<'a> {
     cells: &'a [Range<f64>],
     hears_squared: Vec<f64>,

@@ -23,7 +23,9 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
 
-/// Largest relative loss of rate on the coarse grid at which a number of relays is still refined.
+/// Largest relative excess of the time per bit on the coarse grid at which positions are still refined.
+///
+/// It is relative to the number of relays with the least time. For a larger excess no refinement can make up.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
@@ -41,9 +43,11 @@ pub struct Carried<'a> {
 }
 
 impl<'a> Carried<'a> {
-    /// Creates the planner for up to `most` relays; `None` if the positions of the best SIR are used. They also
-    /// maximise the rate, or no better ones are searched for: with free altitudes, a given x, a field or several
-    /// interferers.
+    /// Creates the planner for up to `most` relays; `None` if the positions of the best SIR serve.
+    ///
+    /// They serve if they also maximise the data rate: with equal time slots or a frequency for each hop, for data in
+    /// one direction or at equal rates in both. They also serve where no better positions are searched for: with free
+    /// altitudes, a given x, several interferers, or interference known only along the line.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,
@@ -75,10 +79,10 @@ impl<'a> Carried<'a> {
         table.as_ref()
     }
 
-    /// Returns the largest number of relays whose positions are worth a refinement, in fitted slots.
+    /// Returns the largest number of relays for which a precise search for positions is worthwhile.
     ///
-    /// A bit needs at most 5 % more time on the coarse grid than with the best number. With more relays no refinement
-    /// makes up for the loss.
+    /// It is used for time slots as long as each hop needs. With more relays, one bit needs over 5 % more time on the
+    /// coarse grid than with the best number, which a precise search cannot make up for.
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }
@@ -87,7 +91,7 @@ impl<'a> Carried<'a> {
     /// [`Carried::new`].
     ///
     /// # Errors
-    /// [`NoPlan`] if there is no mission, or if no positions give every hop an SIR above 0.
+    /// [`NoPlan`] if the scenario is not a valid mission, or if no positions give every hop an SIR above 0.
     pub fn plan(&self, relays: u16) -> Result<Plan, NoPlan> {
         let by_sir = source::best(self.scenario, relays, self.tolerance)?;
         let briefed = ProfiledMission::new(self.scenario, relays, self.tolerance)?;
@@ -130,7 +134,9 @@ impl<'a> Carried<'a> {
         Ok(Plan { sirs, back, ..plan })
     }
 
-    /// Returns `plan` marked as proven if it is proven that no positions carry more. Fitted slots have no proof.
+    /// Returns `plan`, marked as proven if it is proven that no positions carry more data.
+    ///
+    /// There is no such proof for time slots as long as each hop needs.
     #[must_use]
     pub fn proven(&self, plan: Plan) -> Plan {
         let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);

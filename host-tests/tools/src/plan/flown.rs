@@ -56,7 +56,7 @@ impl Flown {
 
 /// Returns the positions on which `relays` relays in `scenario` would agree by `method`.
 ///
-/// Work: that of [`super::plan`] twice.
+/// The cost is that of two calls of [`super::plan`].
 pub fn flown(
     scenario: &Scenario,
     relays: u16,
@@ -79,7 +79,9 @@ pub fn flown(
     })
 }
 
-/// Returns the plan of what the relays find on board. Its SIRs are against all interferers of the scenario.
+/// Returns the plan with the positions that the relays would find on board by `method`.
+///
+/// Relays use one hypothetical interferer in place of several, but the SIRs in the plan are against all of them.
 fn alone(
     scenario: &Scenario,
     relays: u16,
@@ -110,13 +112,14 @@ fn alone(
     })
 }
 
-/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed one. Another machine rounds
-/// differently.
+/// Tolerated difference of a coordinate, m, between the file's plan and the recomputed one.
+///
+/// There is one if the plan was made on another machine, which rounds differently.
 const SAME_M: f64 = 0.1;
 /// Tolerated difference of the SIR, dB, between the file's plan and the recomputed one.
 const SAME_DB: f64 = 0.01;
 
-/// Returns the section `[plan]` of a scenario file with the positions of `flown`.
+/// Returns the section `[plan]` of a scenario file for the relays' agreed positions `flown`.
 pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned {
     let places: Vec<PlannedPlace> = flown
         .plan
@@ -182,8 +185,9 @@ fn value(of: impl Into<Value>) -> Item {
     Item::Value(of.into())
 }
 
-/// Checks that the plan in the scenario file equals what the relays would agree on, `flown`. `flown` must be computed
-/// for the same number of relays and method.
+/// Checks that the plan in the scenario file equals `flown`, on which the relays would agree.
+///
+/// `flown` must be computed for the same number of relays and method.
 ///
 /// # Errors
 /// A line that states the differences.

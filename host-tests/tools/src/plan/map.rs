@@ -10,7 +10,7 @@ use uav_relay_scenario::{Line, Scenario};
 
 use super::Plan;
 
-/// Object on the map: a site, a relay, an interferer or a hop.
+/// Object on the map: Tx, Rx, a relay, an interferer or a hop.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Feature {
     /// Label of the object on the map, for example `relay 3`.
@@ -59,7 +59,7 @@ impl fmt::Display for Number {
 /// Geographic map of a plan, from which the GeoJSON and KML files are made.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Map {
-    /// Features of the map: sites, relays and interferers, then the hops in order from Tx.
+    /// Features of the map: Tx and Rx, relays and interferers, then the hops in order from Tx.
     pub features: Vec<Feature>,
     /// Height of the mean sea level above the ellipsoid, m, if the scenario states it.
     pub geoid_m: Option<f64>,

@@ -33,7 +33,7 @@ pub use altitude::solved;
 
 /// Finds the relay positions that `ask` requests for `scenario`, and their SIRs.
 ///
-/// Work: some milliseconds; with free altitudes up to some seconds for fifty relays or more.
+/// It takes some milliseconds; with free altitudes up to some seconds for fifty relays or more.
 ///
 /// # Errors
 /// [`NoPlan`]: an invalid request, or one that cannot be met, with the best SIR found.
@@ -300,8 +300,10 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the least separation of the relays does not cost any SIR. That is so if there is none, or if
-/// `is_as_good` returns `Some(true)` for the scenario without it.
+/// Returns true if the least separation of the relays does not cost any SIR, or if there is none.
+///
+/// `is_as_good` gets the scenario without a least separation. It returns `Some(true)` if the best SIR there is not
+/// higher, and `None` if it finds no chain.
 fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
     let free = Scenario {
         min_separation_m: 0.0,

@@ -70,7 +70,9 @@ struct Planner<'a> {
     hypothetical: Hypothetical,
 }
 
-/// Chains of one number of relays: the best for the hypothetical interferer, the best for all of them.
+/// Two candidate chains with the same number of relays.
+///
+/// One is the best for the hypothetical interferer, the other the best found against the sum of all real ones.
 struct Candidates {
     scene: Scene,
     relays: u16,
@@ -156,8 +158,9 @@ impl Planner<'_> {
 
     /// Returns scenarios with a single interferer, whose best chains serve as further start chains.
     ///
-    /// They have the hypothetical interferer mirrored, lateral room on one side or none, or one of the first
-    /// interferers alone.
+    /// They differ from the scenario of the hypothetical interferer: that interferer is on the other side of the
+    /// line, or relays may leave the line to one side only or not at all, or one of the first real interferers takes
+    /// its place.
     fn variants(&self) -> Vec<Scenario> {
         let one = with_one(self.scenario, &self.hypothetical);
         let mut variants = Vec::new();
@@ -237,9 +240,10 @@ impl Candidates {
         one.max(all)
     }
 
-    /// Returns the chain for the hypothetical interferer if its SIR suffices, else that for all of them.
+    /// Returns the chain for the hypothetical interferer if its SIR suffices, else the best one found.
     ///
-    /// It suffices if it is at least `target`, or, without a target, at most 1 % below that of the other chain.
+    /// With a `target` the SIR suffices if it is at least that. Without one it suffices if it is at most 1 % below
+    /// the SIR of the best chain against all interferers.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
         let one = self.by_one.as_ref().map(|(_, sir)| *sir);
         let best = self.by_all.as_ref().map_or(0.0, |best| best.sir);

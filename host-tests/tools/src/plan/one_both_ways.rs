@@ -51,8 +51,9 @@ const EQUAL: f64 = 1e-6;
 /// Coefficients of a polynomial, from the constant term to the highest power.
 type Polynomial = Vec<f64>;
 
-/// Returns the best position of the scene's only relay for both directions; `None` if every SIR is 0. The SIR from Rx
-/// to Tx needs to be only `reverse` (above 0) times the SIR from Tx to Rx.
+/// Returns the best position of a single relay for both directions; `None` if every SIR is 0.
+///
+/// The SIR from Rx to Tx needs to be only `reverse` (above 0) times the SIR from Tx to Rx.
 pub fn best(scene: &Scene, reverse: f64) -> Option<Best> {
     let ([relay], [source]) = (scene.relays.as_slice(), scene.sources.as_slice()) else {
         return None;

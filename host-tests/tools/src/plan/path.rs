@@ -28,10 +28,10 @@ const MOST_EVEN: u32 = 1_402;
 
 /// Number of dense grid points on each side of Tx, Rx and every interferer.
 const DENSE: i32 = 22;
-/// Ratio of the distances of two successive dense grid points from their end or interferer.
+/// Ratio by which each dense grid point is farther from Tx, Rx or an interferer than the point before.
 const RATIO: f64 = 1.4;
 
-/// Distance of the nearest dense grid point from its end or interferer, relative to the line's length.
+/// Distance of the nearest dense grid point from Tx, Rx or an interferer, relative to the line Tx-Rx.
 const NEAREST: f64 = 1e-4;
 
 /// Number of grid points in the window around a relay's position; odd, to include the position.
@@ -48,10 +48,14 @@ const NARROWEST: f64 = 1e-7;
 /// Rounding error allowed in a distance of two positions, as a fraction of the line Tx-Rx.
 const ROUNDING: f64 = 1.2e-7;
 
-/// Factor of the small term of a hop's time that decides between equal times in favour of higher SIRs.
+/// Weight of a small extra time that decides between hops of equal time in favour of the higher SIR.
+///
+/// Hops at the same rate step of a radio have equal times.
 const GUIDE: f64 = 1e-3;
 
-/// Calculator of the time, s Hz, that each hop of a scene needs for one bit of data to Rx.
+/// Calculator of the time that each hop of a chain needs for one bit of data to Rx.
+///
+/// The unit is s Hz: the time in s for a bandwidth of 1 Hz.
 #[derive(Clone, Debug)]
 pub struct Times<'a> {
     scene: &'a Scene,
@@ -69,7 +73,8 @@ struct Point {
 }
 
 impl<'a> Times<'a> {
-    /// Creates the calculator for a scene. `reverse` is the rate back to Tx over that to Rx, 0 for one direction.
+    /// Creates the calculator for a chain. `reverse` is the required rate to Tx, as a fraction of the rate to Rx; 0
+    /// for one direction.
     pub fn new(scene: &'a Scene, radio: &'a Radio, reverse: f64) -> Self {
         let steps = match &radio.link.model {
             RateModel::Shannon { .. } => Vec::new(),
@@ -203,7 +208,7 @@ impl<'a> Times<'a> {
         self.add(total, self.time(&last, from, self.rx(), guide))
     }
 
-    /// Returns the x of the first grid's points, m, ascending. They are dense near ends and interferers.
+    /// Returns the x of the first grid's points, m, ascending. They are denser near Tx, Rx and the interferers.
     fn grid(&self) -> Vec<f64> {
         let d = self.scene.distance_m;
         // Relays that gather keep exactly their least separation: it is a whole number of steps.
@@ -396,7 +401,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Computes the best chains on the grid, for 1 relay up to the number of relays of the scene.
+    /// Computes the best chains on the grid, for 1 relay up to all relays of the chain.
     pub fn new(times: &Times<'_>) -> Self {
         let grid = times.grid();
         let mut layers = Layers::new(times);
@@ -422,9 +427,9 @@ impl Table {
         Self { starts }
     }
 
-    /// Returns the largest number of relays whose grid time is at most 1 + `loss` times the least one.
+    /// Returns the largest number of relays whose time per bit on the grid is near the least one.
     ///
-    /// It is 0 if no time is finite.
+    /// It is at most 1 + `loss` times the least time of all numbers of relays. Returns 0 if no time is finite.
     pub fn largest_within(&self, loss: f64) -> u16 {
         let times = || self.starts.iter().map(|(time, _)| *time);
         let best = times().fold(f64::INFINITY, f64::min);
@@ -433,7 +438,7 @@ impl Table {
         u16::try_from(last).unwrap_or(u16::MAX)
     }
 
-    /// Returns the x of the relays, m, in the best grid chain of `relays` relays; `None` if there is none.
+    /// Returns the x of `relays` relays, m, in their best chain on the grid; `None` if there is none.
     pub fn start(&self, relays: u16) -> Option<&[f64]> {
         let at = usize::from(relays).checked_sub(1)?;
         self.starts.get(at).map(|(_, x)| x.as_slice())

@@ -24,7 +24,10 @@ const MOST_SLOW: u16 = 20;
 /// Largest number of relays whose rate is computed, where positions are chosen for the largest rate.
 const MOST_SEARCHED: u16 = 60;
 
-/// Smallest number of relays up to which a list of rates goes, unless so many do not fit on the line.
+/// Number of relays up to which data rates are always computed if time slots fit the hops' needs.
+///
+/// The list ends earlier only if so many relays do not fit on the line, or if it is proven that more relays do not
+/// carry more.
 const LEAST_LISTED: u16 = 10;
 
 /// Data rate of a chain, bit/s.
@@ -90,7 +93,10 @@ pub struct RateOf {
 pub struct BestRate {
     /// Number of relays with the largest data rate.
     pub best_uavs: u16,
-    /// Largest data rate, bit/s. For both directions it is the smaller of the rate to Rx and the rate to Tx over r.
+    /// Largest data rate, bit/s.
+    ///
+    /// For both directions it is the smaller of two numbers: the rate to Rx, and the rate to Tx divided by the
+    /// fraction of the rate to Rx that is required there.
     pub best_rate_bps: f64,
     /// Largest number of relays tried; all numbers from 1 to it were tried.
     pub tried_uavs: u16,
@@ -113,7 +119,8 @@ impl Rates {
     /// Plans 1, 2, 3 and more relays, and computes their data rates over `radio`.
     ///
     /// Ends when provably no larger number carries more, or at a limit of some seconds. `target_bps` is the wanted
-    /// rate to Rx; for both directions the rate to Tx is then at least r times it.
+    /// rate to Rx. For both directions, the rate to Tx must then be at least the scenario's fraction `reverse` of
+    /// that.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
@@ -215,7 +222,7 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
 
 /// Relative gain in rate above which a larger number of relays counts as better.
 ///
-/// Without a least separation more relays never carry less, so tiny gains are ignored.
+/// Smaller gains are ignored, so that the best number is not a larger one that gains next to nothing.
 const RISE: f64 = 1e-4;
 
 /// Largest number of relays for which [`carry_no_more`] looks for a proof.
@@ -260,8 +267,10 @@ impl MostRate {
         }
     }
 
-    /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s. For both directions
-    /// the data rate is the smaller of the rate to Rx and the rate to Tx over r.
+    /// Returns an upper bound on the data rate of all chains with `relays` relays or more, bit/s.
+    ///
+    /// For both directions the data rate is the smaller of the rate to Rx, and the rate to Tx divided by its required
+    /// fraction of the rate to Rx.
     fn of(&self, radio: &Radio, relays: u16) -> f64 {
         let relays = f64::from(relays);
         match radio.link.access {
@@ -277,8 +286,9 @@ impl MostRate {
 
 /// Returns upper bounds on the SIR, linear, of the first hop and of a hop between relays.
 ///
-/// Relays keep their least separation, and interferers count as if at the farther end of the line. Infinite in a
-/// field.
+/// The bounds assume the strongest signal (hops as short as the least separation permits) and the weakest
+/// interference (each interferer received from the end of the line that is farther from it). Infinite if the
+/// interference is known only along the line.
 fn most_between(scenario: &Scenario) -> [f64; 2] {
     let Some(scene) = Scene::new(scenario, 1) else {
         return [f64::INFINITY; 2];

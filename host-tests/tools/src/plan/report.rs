@@ -290,7 +290,7 @@ pub struct PlanReport {
     /// SIR of the plan's worst hop, dB. For both directions an SIR toward Tx counts divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
-    /// SIRs in the direction from Rx to Tx; absent in a field of interference known only along the line.
+    /// SIRs in the direction from Rx to Tx; absent if the interference at Tx is unknown.
     #[serde(flatten)]
     pub way_back: Option<WayBack>,
     /// Data rates over the data link; absent without a bandwidth.

@@ -15,7 +15,7 @@ use super::{
     one_both_ways,
 };
 
-/// Returns the plan with the fewest relays, at their own altitudes, that meet the SIR `target`.
+/// Returns the plan with the fewest relays that meet the SIR `target`; relays keep their own altitudes.
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     let how = if scenario.reverse > 0.0 {
         "eq. (Opt) for both directions"
@@ -58,7 +58,7 @@ fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> 
 
 /// Returns true if it is proven that no positions of `relays` relays meet `target` in both directions.
 ///
-/// The proof shares no code with Algorithm 1.
+/// The proof shares no code with Algorithm 1, whose result it confirms.
 fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
     let targets = Targets {
         there: target,
@@ -312,7 +312,7 @@ pub(super) fn plan_in_field(scenario: &Scenario, ask: &PlanRequest) -> Result<Pl
     }
 }
 
-/// Returns the plan with the best positions of `relays` relays in a field of interference.
+/// Returns the plan with the best positions if the interference is known only along the line Tx-Rx.
 fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let profile = briefed.profile(1);

@@ -21,11 +21,11 @@ use super::config::{
 pub enum BlockError {
     /// Error: the scenario is not a valid mission, for this reason.
     Refused(Refusal),
-    /// Error: the interference field has this many points, more than a block can hold.
+    /// Error: the scenario states the interference at this many positions, too many for a block.
     Points(usize),
     /// Error: the drone would reject the configuration, for this reason.
     Config(ConfigError),
-    /// Error: the drone would reject the sites of Tx and Rx, for this reason.
+    /// Error: the drone would reject the surveyed positions of Tx and Rx, for this reason.
     Course(CourseError),
     /// Error: the drone would read a different configuration from the block.
     Changed,
@@ -107,7 +107,7 @@ pub struct Flight {
 impl Flight {
     /// Creates the configuration of `uavs` relays in `scenario`, with the network number `network`.
     ///
-    /// The method is `align`, without measurements. `tolerance` is the relative one of the SIR.
+    /// The method is `align`, without measurements. `tolerance` is the relative tolerance on the achieved SIR.
     ///
     /// # Errors
     /// [`BlockError`] if the scenario is not a valid mission, or does not fit into a block.
@@ -148,7 +148,7 @@ impl Flight {
         Self { method, ..self }
     }
 
-    /// Sets how the relays measure the interference field; `None` if they do not.
+    /// Sets how the relays measure the interference along the line Tx-Rx; `None` if they do not.
     pub fn measuring(self, measure: Option<Measure>) -> Self {
         Self { measure, ..self }
     }
@@ -166,7 +166,8 @@ impl Flight {
         Self { secret, ..self }
     }
 
-    /// Sets the drones' greatest speed, m/s. It has no effect without sites in the scenario.
+    /// Sets the drones' greatest speed, m/s. It has no effect if the scenario lacks geographic positions of Tx and
+    /// Rx.
     pub fn no_faster_than(mut self, speed_m_s: f32) -> Self {
         if let Some(sites) = &mut self.sites {
             sites.speed_m_s = speed_m_s;
@@ -182,7 +183,9 @@ impl Flight {
         }
     }
 
-    /// Returns true if the scenario has the sites of Tx and Rx, which setpoints for an autopilot need.
+    /// Returns true if the scenario has the geographic positions of Tx and Rx.
+    ///
+    /// An autopilot needs these, because its setpoints are latitudes and longitudes.
     pub const fn has_sites(&self) -> bool {
         self.sites.is_some()
     }
@@ -278,9 +281,10 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
     [settings.probe_after, settings.dead_after]
 }
 
-/// Returns the `probe_after_ms` of a block: `given_ms` of the command line, otherwise the section's.
+/// Returns the silence, ms, after which a relay with this block probes a neighbour.
 ///
-/// 0 means the firmware's default. `name` is that of the scenario, for errors.
+/// It is `given_ms` from the command line, otherwise the value of the scenario's section `network`; 0 selects the
+/// firmware's default. `name` is that of the scenario, for errors.
 ///
 /// # Errors
 /// A line that names a key whose value no block can express, the value and the allowed one.

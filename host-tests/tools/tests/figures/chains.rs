@@ -302,7 +302,7 @@ fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {
     integral(alpha - 2.0) / integral(alpha - 1.0)
 }
 
-/// Returns a reference link in the interference field called `field` of the figure's table.
+/// Returns a reference link with the interference that the figure's table calls `field`.
 ///
 /// It has `relays` relays of 1 W at 20 m.
 fn field_link(field: &str, relays: usize) -> StochasticLink {

@@ -417,7 +417,7 @@ fn the_ranges_are_those_of_a_relay() {
     }
 }
 
-/// Checks that relays in an interference field cannot be set to locate an interferer.
+/// Checks that a scenario of known interference along the line is refused if relays are to locate it.
 #[test]
 fn a_field_is_refused_with_listening() {
     let mut scenario = super::in_a_field(3);

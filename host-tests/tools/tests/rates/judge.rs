@@ -103,7 +103,10 @@ impl Chain {
         }
     }
 
-    /// Returns the time for one bit of a chain with relays at `x`, m: all hops' sum, or the longest hop.
+    /// Returns the time for one bit of a chain with relays at `x`, m, in units of 1 / bandwidth.
+    ///
+    /// If time slots are as long as each hop needs, it is the sum over all hops, otherwise the time of the slowest
+    /// hop.
     fn total(&self, x: &[f64]) -> f64 {
         let last = x.len() + 1;
         let mut from = 0.0;
@@ -239,7 +242,8 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rate found with all relays, bit/s/Hz. The search also starts from `others`.
+    /// Returns the largest data rate found with all relays, bit/s/Hz. The search also starts from the positions
+    /// `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> f64 {
         let grid = self.on_grid();
         let starts = [grid.last().unwrap().as_slice(), others];

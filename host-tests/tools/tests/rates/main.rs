@@ -36,7 +36,7 @@ fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-/// Draws a random scene and data link, for the planner and for the independent model `Chain`.
+/// Draws a random chain and data link, for the planner and for the independent model `Chain`.
 fn drawn(seed: u64, access: Access, has_steps: bool) -> (Scenario, Radio, Chain) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let relays = rng.random_range(1..=16_u16);

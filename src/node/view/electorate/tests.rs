@@ -24,7 +24,7 @@ fn count(nodes: &[u16]) -> u16 {
     u16::try_from(nodes.len()).unwrap()
 }
 
-/// Voting states (acceptors) of nodes 1 to N.
+/// Voting states (Paxos acceptors) of nodes 1 to N.
 struct Chain(Vec<Electorate>);
 
 impl Chain {
@@ -32,13 +32,13 @@ impl Chain {
         Self((0..relays).map(|_| Electorate::new(relays, 1)).collect())
     }
 
-    /// Makes the relay with list index `at` accept the decided view `view`. Returns true if it does.
+    /// Delivers the decision for `view` to the relay with list index `at`. Returns true if the relay accepts it.
     fn accept(&mut self, at: usize, view: View) -> bool {
         let base = self.0[at].agreed();
         self.0[at].accept(view.id, base, Some(view))
     }
 
-    /// Returns the votes on a proposal that visits `nodes` in this order.
+    /// Returns the votes on `proposal` after it has visited `nodes` in this order.
     fn poll(&mut self, nodes: &[u16], proposal: ViewId) -> Poll {
         let mut told = None;
         for &node in nodes {
@@ -49,8 +49,8 @@ impl Chain {
         told.unwrap()
     }
 
-    /// Returns the decision on a proposal that visits `nodes` in order. The last `accept` of these nodes receive the
-    /// decision.
+    /// Returns the decision on `proposal` after it has visited `nodes` in this order. Only the last `accept` of these
+    /// nodes receive the decision.
     fn propose(&mut self, nodes: &[u16], proposal: ViewId, accept: usize) -> Option<View> {
         let poll = self.poll(nodes, proposal);
         let outcome = decide(
@@ -80,7 +80,7 @@ const fn granted(id: ViewId, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks for all parts of chains of up to seven relays that a part decides only if it is a quorum. A quorum is more
+/// Checks for every subset of chains of up to seven relays that it decides only if it is a quorum. A quorum is more
 /// than half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_or_half_with_the_initial_leader_decide() {
@@ -171,8 +171,8 @@ fn a_view_that_may_be_agreed_on_is_decided_again() {
     );
 }
 
-/// Checks that a view of all relays is accepted even if most of them have lost their votes. Otherwise a chain with
-/// most relays restarted would never fly again.
+/// Checks that a proposal that reaches all relays is accepted even if most have lost their votes. Otherwise a chain
+/// could never fly again after most relays restarted.
 #[test]
 fn all_relays_of_the_mission_are_always_a_view() {
     let mut chain = Chain::of(3);
@@ -260,8 +260,8 @@ fn the_next_proposal_spreads_the_agreed_view() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Checks that the vote of a relay that does not know the newest view does not count. It votes before a relay that
-/// knows that view, and thus in the older view.
+/// Checks that the vote of a relay that does not know the newest view does not count. The relay votes before one that
+/// knows that view.
 #[test]
 fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);
@@ -302,8 +302,8 @@ fn only_members_may_be_relied_on() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Checks that a refused proposal needs no room in the list of votes. The list holds a limited number of proposals
-/// without a known decision.
+/// Checks that a refused proposal takes no place in the limited list of votes. The list is for proposals with an
+/// unknown decision.
 #[test]
 fn votes_are_kept_until_their_result_is_known() {
     let mut relay = Electorate::new(3, 1);
@@ -342,8 +342,8 @@ fn votes_are_kept_until_their_result_is_known() {
     assert!(!more.has_voted(view.id) && more.has_voted(id(100, 2)));
 }
 
-/// Checks that a relay without its stored votes breaks the safety of the votes. Node 3 is a member of the current
-/// view, forgets it, and votes in the initial view.
+/// Checks that safety needs the stored votes: without them two views can be in force. Node 3 is a member of the
+/// current view, loses its votes, and votes in the initial view.
 #[test]
 fn a_relay_without_its_record_may_decide_a_second_view() {
     let mut chain = Chain::of(5);

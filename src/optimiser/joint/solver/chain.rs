@@ -43,7 +43,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
-    /// Returns c of the hop to relay `index`, target SIR over gain, which determines the length of the hop. It
+    /// Returns c of the hop to relay `index`, target SIR over gain. c determines the hop's maximum length. It
     /// includes the factor 1 + noise / interference at the sender's position `from`.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
@@ -52,7 +52,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the altitude of relay `index`, m, if it is fixed while others choose theirs; else `None`.
+    /// Returns the altitude of relay `index`, m, if it is fixed and others are not; else `None`.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = (self.seat_of)(index).room;
         let free = !self.mission.config().band.is_single();
@@ -88,7 +88,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the last hop for `target`, m, and the derivatives of the slack. The slack is the hop's
+    /// Returns the spare length of the last hop for `target`, m, and its derivatives. The spare length is the hop's
     /// maximum length less its length. The last relay is at `at`; the derivatives are by its position.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
@@ -105,8 +105,9 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target, in ln(SIR), from which on no hop can pass the interferer in a single leap. It is just
-    /// above the largest gain of any hop.
+    /// Returns the target from which on every hop has a maximum length, in ln(SIR). It is just above the largest gain
+    /// of a hop. With a lower target a hop may pass the interferer and be of any length, because its SIR tends to the
+    /// gain.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -141,7 +142,8 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of a segment of the chain: the x before it, and the value function at its end.
+/// Stored state of a segment of the chain: the x of the relay before it, and derivatives at its end. The derivatives
+/// are those of the chain's spare length at Rx by the position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before the segment, m.

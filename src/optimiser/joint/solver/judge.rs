@@ -13,14 +13,14 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision, in ln(SIR), of the search for the highest target that a chain meets after an ascent.
+/// Precision of the search for the highest target of a chain after its improvement, in ln(SIR).
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound on a chain's SIR that its first and last hop set, in ln(SIR). A chain that meets the
-/// bound less this tolerance ends the search for better ones.
+/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). A chain within
+/// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Distance by which an ascent's first target limit is above the chain's upper bound, in ln(SIR).
+/// Difference between the first limit on a chain's target and the upper bound of its SIR, in ln(SIR).
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -67,10 +67,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records the result of one target, and selects the next work.
+    /// Records the result of one target, and selects the next piece of work.
     ///
     /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
-    /// position. `Some(true)`: it is met only if some relays stay short of it.
+    /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
     pub(super) fn tried(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -177,8 +177,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target of a chain by the rules of the messages. Hops are
-    /// computed as the relays do from their messages.
+    /// Returns the work that searches for the highest target with hops computed as by the relays. The relays compute
+    /// the hops from their messages.
     ///
     /// The chain results from an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in
     /// ln(SIR). Relays may stay short of their farthest position.
@@ -192,21 +192,22 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the ascent from the current initial chain may still give the best chain.
+    /// Returns true if the ascent from the current initial chain may still give the best chain. An ascent improves
+    /// one initial chain step by step.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current ascent is dropped early because it cannot give the best chain. `turn` is its next
-    /// action.
+    /// Returns true if the improvement of the current chain is stopped early. It then cannot give the best chain.
+    /// `turn` is its next action.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    /// Returns true if the best chain so far exceeds the upper bound `ceiling` by its tolerance. No other chain can
-    /// be better then. `ceiling` is in ln(SIR).
+    /// Returns true if the best chain so far meets the highest target that the search tries. No other chain can be
+    /// better then. That target is the upper bound `ceiling` plus its tolerance, in ln(SIR).
     pub(super) fn is_complete(&self, ceiling: f32) -> bool {
         self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
     }
@@ -244,23 +245,23 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays of a chain that is polished at the end, by trial moves of single relays. Chains with
-/// fixed altitudes are always polished, since their path has kinks.
+/// Maximum number of relays of a chain that is improved at the end by trial moves of single relays. Chains in which
+/// some relays have a fixed altitude are always improved so, since their path has kinks.
 const POLISHED: u16 = 5;
 
-/// Number of times that the final polish of a chain halves the moves of its relays.
+/// Number of times that the trial moves of the relays are halved at the end of the solution.
 const HALVINGS: u16 = 12;
-/// First trial move of a relay in the final polish of a chain, as a fraction of its allowed range.
+/// First trial move of a relay at the end of the solution, as a fraction of its allowed range.
 const FIRST_MOVE: f32 = 0.25;
 
-/// Minimum gain of the target, in ln(SIR), for which the final polish accepts a trial move of a relay.
+/// Minimum gain of the target for which a trial move of a relay is accepted, in ln(SIR).
 pub(super) const GAIN: f32 = 2e-5;
-/// Maximum number of accepted trial moves in the final polish of a chain; it then ends.
+/// Maximum number of accepted trial moves of single relays, after which the solution ends.
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the current trial move of the polish: relay, kind of move, and number of halvings. Kinds 0 to 3 are
-    /// down, up, left and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two back.
+    /// Returns the current trial move: relay, kind of move, and number of halvings. Kinds 0 to 3 are down, up, left
+    /// and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -321,7 +322,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Begins the ascent from the next initial chain, or ends the search after the last one.
+    /// Begins the ascent (improvement) of the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -393,7 +394,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`, stored or of a new initial chain.
+    /// Returns the lateral offset and altitude of relay `index`. They are those of a new initial chain if `purpose`
+    /// is a start, and otherwise the stored ones.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

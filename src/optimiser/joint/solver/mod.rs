@@ -39,9 +39,9 @@ pub(super) use chain::SolverContext;
 struct ForwardPass {
     /// Number of relays that the forward pass has completed.
     done: u16,
-    /// New position of the relay that this forward pass has computed last.
+    /// New position of the last relay that this forward pass has moved.
     from: Placement,
-    /// Old position, before this forward pass, of the relay that the pass has computed last.
+    /// Position that the last relay moved by this forward pass had before the pass.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -75,8 +75,8 @@ enum Work {
     Polish(f32),
     /// Run the backward pass, which computes the relays' moves, for this segment of the chain.
     Back(u8),
-    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). If `true`, it stores
-    /// the chain; otherwise it is a trial.
+    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). The `bool` is true
+    /// to store the chain, false for a trial.
     Forward(f32, f32, bool),
 }
 
@@ -84,23 +84,23 @@ enum Work {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search raises the target during an ascent, with the chain unchanged.
+    /// The search raises the target during the improvement of a chain, while its relays stay.
     Raise,
     /// The search computes the chain's slack (spare length at Rx) again after the cap on it was lowered.
     Tighten,
-    /// The search finds the highest target of the chain after an ascent, with hops as in the ascent.
+    /// The search finds the highest target of an improved chain, with hops as in its improvement.
     Judge,
-    /// The search finds the highest target after an ascent, with hops as in the relays' messages. Relays may then
-    /// stay short of their farthest position.
+    /// The search finds the highest target of an improved chain, with hops computed as by the relays. The relays
+    /// compute hops from their messages. Some may then stay short of their farthest position.
     Last,
-    /// The search checks, with hops as in the relays' messages, that the chain meets its upper bound.
+    /// The search checks that the chain meets its upper bound, with hops computed as by the relays.
     Probe,
-    /// The search checks a trial move of one relay, with hops as in the relays' messages.
+    /// The search checks a trial move of one relay, with hops computed as by the relays.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the search computes the hops as relays compute them from their messages (sweeps).
+    /// Returns true if the search computes hops as the relays compute them from their messages.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -117,32 +117,34 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the best ascent had reached at its end, in ln(SIR). An ascent that will stay below is dropped.
+    /// Target SIR that the improvement of the best chain reached, in ln(SIR). The improvement of another chain is
+    /// stopped once it is predicted to end below this target.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
-    /// Target, in ln(SIR), from which the highest target of the best chain was searched. `None` if a repetition of
-    /// its ascent would give another chain, so that the stored one cannot be used.
+    /// Start value of the search for the highest target SIR that the best chain meets, in ln(SIR). With it the stored
+    /// best chain can be used, and its improvement is not repeated. `None` if a repetition would give another chain.
     best_judged: Option<f32>,
-    /// Target from which the current chain's highest target is searched, in ln(SIR).
+    /// Start value of the search for the highest target SIR that the current chain meets, in ln(SIR).
     judged_at: Option<f32>,
-    /// True while the current ascent runs as it would without a best chain to compare with. A repetition of it then
-    /// gives the same chain.
+    /// True if no comparison with the best chain has cut the current chain's improvement short. A repetition of the
+    /// improvement would then give the same chain.
     is_whole: bool,
-    /// True in the last phase, which searches the best target more finely and polishes the chain.
+    /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
+    /// relays try other positions.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
-    /// True if the minimum separation limited the ascent from any initial chain.
+    /// True if the minimum separation has limited the improvement of any chain.
     walled: bool,
-    /// Number of the current trial move in the final polish of the chain.
+    /// Number of the current trial move of a single relay, at the end of the solution.
     moving: u16,
-    /// Number of trial moves that the final polish has accepted.
+    /// Number of trial moves of single relays that were accepted at the end of the solution.
     moved: u8,
-    /// Lateral offset and altitude of the relay before the current trial move.
+    /// Lateral offset and altitude that a relay had before its current trial move.
     kept: Cell,
     /// Segment of the chain whose policies (relays' moves) are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
@@ -301,7 +303,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Processes one portion of the work: ten relays of a pass that moves them, or else twenty.
+    /// Continues to solve the chain by one bounded step. A step takes ten relays of a pass that moves them, or twenty
+    /// relays of any other pass. For both directions it takes two relays of Algorithm 1.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
@@ -332,7 +335,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that the stored best chain equals the one that a repetition of its ascent gives.
+/// Checks that a shortcut of the solver changes nothing: it stores the best chain. Without the shortcut it would
+/// compute that chain a second time.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -410,8 +414,9 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solved chain, as f32 bits, and the number of `step` calls. The chain is its target, and the
-    /// relays' lateral offsets and altitudes.
+    /// Returns the solved chain, and the number of `step` calls. The chain is the target, and each relay's lateral
+    /// offset and altitude, as the bits of f32 numbers. If `once_more`, the best chain is computed a second time
+    /// instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -445,8 +450,8 @@ mod tests {
         (bits, portions)
     }
 
-    /// Checks for random missions that the stored best chain equals a repetition of its ascent. The environment
-    /// variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
+    /// Checks for random missions that the stored best chain equals one computed a second time, to the bit. The
+    /// environment variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;

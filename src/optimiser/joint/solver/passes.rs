@@ -151,8 +151,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share` of their computed moves. The pass stores them if `kept`.
-    /// `None` if a hop cannot meet `target`.
+    /// Moves the relays of `segment` by the fraction `share` of their computed moves. If `kept`, their new lateral
+    /// offsets and altitudes are stored. `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -187,16 +187,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays per call in a pass that changes no relay's lateral offset or altitude.
+/// Number of relays per call in a pass that only computes x, and no moves of the relays.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty at which a chain counts as feasible, in units of D. Relays too near the interferer cause the
-/// penalty.
+/// Maximum penalty at which a chain counts as feasible, in units of D. The penalty is for relays too near the
+/// interferer.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Continues a pass that computes the chain for the target `sigma`, in ln(SIR), without moves. Stores the chain
-    /// if `kept`. Ready with the slack, the spare length at Rx, m; `None` if a hop cannot meet the target.
+    /// Continues a pass that computes the x of the relays for the target `sigma`, in ln(SIR). Lateral offsets and
+    /// altitudes stay. Stores the chain if `kept`. Ready with the spare length at Rx, m, or with `None` if a hop
+    /// cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -29,13 +29,13 @@ use crate::vehicle::Vehicle;
 
 pub(crate) const KEY: [u8; 32] = [7; 32];
 
-/// Lock of the mock clock, which all tests share.
+/// Lock by which the tests take turns, because they share the mock clock.
 static CLOCK: Mutex<()> = Mutex::new(());
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipe {
     bytes: Rc<RefCell<VecDeque<u8>>>,
-    /// Simulated time that each poll of a hanging writer takes, ms; 0 for a writer that works.
+    /// Simulated time that each poll of a hanging writer takes, ms; 0 while the writer works.
     stall_ms: Rc<Cell<u64>>,
 }
 
@@ -75,7 +75,7 @@ impl Write for Pipe {
 }
 
 impl Pipe {
-    /// Moves as many bytes as are available and fit to `into`; returns their number.
+    /// Moves received bytes to `into`, as many as are available and fit; returns their number.
     pub(crate) fn take(&self, into: &mut [u8]) -> usize {
         let mut bytes = self.bytes.borrow_mut();
         let count = bytes.len().min(into.len());
@@ -108,7 +108,7 @@ pub(crate) struct Bench {
     wiring: Wiring,
     others: Vec<Relay>,
     pub(crate) events: Vec<Event>,
-    /// Bytes in transit: from the drone to the other relays, and from them to the drone.
+    /// Bytes in transit: [0] from the drone to the other relays, [1] from the other relays to the drone.
     wire: [Pipe; 2],
     drone: Option<Running>,
     vehicle: Option<Vehicle>,
@@ -174,12 +174,12 @@ pub(crate) fn block_of_three() -> Block {
     write(&config(3, 1, None), &numbers(), Some(secret), None)
 }
 
-/// Returns the configuration block of a chain's only relay, between these sites.
+/// Returns the configuration block of a chain's only relay, between these Tx and Rx positions.
 pub(crate) fn block_alone(sites: Sites) -> Block {
     write(&config(1, 1, Some(sites)), &numbers(), None, None)
 }
 
-/// Returns the position that the only relay of a chain chooses between these sites.
+/// Returns the position that the only relay of a chain chooses between these Tx and Rx positions.
 pub(crate) fn alone(sites: Sites) -> Placement {
     let parsed = config(1, 1, Some(sites));
     let now = Instant::ZERO;
@@ -191,7 +191,7 @@ pub(crate) fn alone(sites: Sites) -> Placement {
     relay.setpoint().unwrap()
 }
 
-/// Sites of transmitter and receiver, as far apart as the test mission says: 1343.795 m.
+/// Positions of transmitter and receiver for the tests. They are 1343.795 m apart, as the test mission requires.
 pub(crate) const SITES: Sites = Sites {
     ends: [
         [474_000_000, 85_400_000, 420_000],
@@ -223,7 +223,7 @@ fn why(board: Board<Ram>, autopilot: Option<(Pipe, Pipe)>) -> Refused {
 }
 
 thread_local! {
-    /// Times at which the watchdog was fed.
+    /// Times at which the test's drone has fed its watchdog.
     pub(crate) static FED: RefCell<Vec<Instant>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -241,12 +241,12 @@ fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)
 }
 
 impl Bench {
-    /// Creates the bench with relay 2 as the wired neighbour, at its first start.
+    /// Creates a test bench whose drone has relay 2 as its only neighbour, by wire. Relay 2 has just started.
     pub(crate) fn new() -> Self {
         Self::wired(Wiring::Pair, 2)
     }
 
-    /// Creates the bench with relays 2 and 3 on one radio channel, at their first start.
+    /// Creates a test bench whose drone shares a radio channel with relays 2 and 3. These have just started.
     pub(crate) fn radio() -> Self {
         Self::wired(Wiring::Shared, 3)
     }
@@ -277,7 +277,7 @@ impl Bench {
         }
     }
 
-    /// Restarts the drone with `board`. Bytes on the wires are lost.
+    /// Starts the drone again with `board`. Bytes on the wires are lost.
     pub(crate) fn boot(&mut self, board: Board<Ram>) {
         for wire in &self.wire {
             wire.bytes.borrow_mut().clear();
@@ -312,7 +312,8 @@ impl Bench {
         self.drone = None;
     }
 
-    /// Lets the drone's UART hang: each poll of its driver takes `millis` ms and sends nothing. 0 lets it work again.
+    /// Lets the drone's UART hang: each poll of its driver takes `millis` ms and sends nothing. With 0 it works
+    /// again.
     pub(crate) fn stall_uart(&mut self, millis: u64) {
         self.wire[0].stall_ms.set(millis);
     }

@@ -39,9 +39,10 @@ fn neighbours_accept_the_epoch_of_every_start() {
     assert_eq!(bench.signature_rejections(), 0);
 }
 
-/// Checks that a relay restarted with an older epoch, or with the same epoch and seed, is rejected.
+/// Checks that a relay is rejected if it restarts with an older epoch, or with the same epoch and seed.
 ///
-/// Its frames may be replayed ones. (The library's tests cover the same epoch with another seed, a duplicate index.)
+/// The reason is that its frames could be replays of earlier ones. (The library's tests cover the same epoch with
+/// another seed, a duplicate index.)
 #[test]
 fn frames_with_a_forgotten_epoch_are_rejected() {
     for (epoch, seed) in [(1, 2), (2, 1)] {

@@ -32,8 +32,8 @@ fn a_loop_that_hangs_stops_feeding_the_watchdog() {
     assert!(FED.with_borrow(Vec::len) >= 60);
 }
 
-/// Checks that the watchdog is not fed while turns of the relay's task take 12 s. The feeding future is polled in
-/// each turn, but the relay's timers are late.
+/// Checks that the watchdog is not fed while the relay's task hangs for 12 s each time it runs. The task still polls
+/// the future that feeds, but the relay's timers are late.
 #[test]
 fn late_timers_stop_feeding_the_watchdog() {
     let mut bench = Bench::new();

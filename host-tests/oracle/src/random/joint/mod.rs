@@ -45,7 +45,9 @@ use crate::reference::joint::{Corridor, FixedCrossSection};
 use crate::reference::{Link, Relay};
 use uav_relay_scenario::number::narrow;
 
-/// Random link, and the corridor in which its relays choose positions. In the link they are at its lowest altitude.
+/// Random link, and the corridor in which its relays choose positions.
+///
+/// The corridor limits altitude and lateral position. In the link all relays are at its lowest altitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// Chain of relays with Tx, Rx and interferer.
@@ -79,11 +81,15 @@ impl Scenario {
     }
 }
 
-/// Range of minimum separations that hardly ever limit a chain, as a fraction of D / (N + 1).
+/// Range of minimum separations that hardly ever limit a chain, as a fraction of the equal spacing.
+///
+/// The equal spacing of N relays is D / (N + 1), with D the distance from Tx to Rx.
 pub const ROOMY: (f64, f64) = (0.01, 0.1);
 
-/// Range of minimum separations that often limit a chain, as a fraction of D / (N + 1). About a tenth of those
-/// scenarios lose SIR by it.
+/// Range of minimum separations that often limit a chain, as a fraction of the equal spacing.
+///
+/// The equal spacing of N relays is D / (N + 1), with D the distance from Tx to Rx. The separation lowers the optimum
+/// SIR in about a tenth of these scenarios.
 pub const CROWDED: (f64, f64) = (0.03, 0.3);
 
 /// Draws a random scenario; the distribution is in the module's table. `relays` is a range within 1 to 1000, `apart`
@@ -191,7 +197,7 @@ fn count(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> u32 {
         .unwrap_or(fewest)
 }
 
-/// Draws the interferer's X, its position along the line Tx-Rx, as a fraction of D.
+/// Draws the interferer's position along the line Tx-Rx, as a fraction of the distance from Tx to Rx.
 fn along(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..40) {
         0..32 => rng.random_range(0.0..=1.0),
@@ -204,7 +210,7 @@ fn along(rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// Draws the interferer's Y, its offset from the line Tx-Rx, as a fraction of D.
+/// Draws the interferer's distance from the line Tx-Rx, as a fraction of the distance from Tx to Rx.
 fn aside(rng: &mut impl Rng) -> f64 {
     if rng.random_bool(0.7) {
         log_uniform(rng, 0.003, 0.1)

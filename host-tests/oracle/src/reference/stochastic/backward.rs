@@ -88,8 +88,8 @@ impl StochasticLink {
     /// Returns the best [`StochasticLink::backward_sir`] that a search over the target SIR finds.
     ///
     /// It tries `points` targets down to 1e-8 of the ceiling, evenly spaced in their logarithm, and four times as
-    /// many again around the best one. It is for fields in which that SIR has several maxima; a maximum narrower than
-    /// the spacing may be missed.
+    /// many again around the best one. It is for interference with which that SIR has several maxima; a maximum
+    /// narrower than the spacing may be missed.
     pub fn backward_best(&self, points: u32) -> f64 {
         let (mut low, mut high) = (1e-8_f64.ln(), 0.0);
         let mut best = (0.0, 0.0);

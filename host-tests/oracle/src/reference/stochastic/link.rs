@@ -2,9 +2,9 @@
 
 use super::super::link::{Relay, received_w};
 
-/// Chain of relays between Tx at (0, 0) and Rx at (D, 0) in an interference field.
+/// Chain of relays between Tx at (0, 0) and Rx at (D, 0), in random interference known along the line.
 ///
-/// The field is known as Upsilon(x) = E[1/I], where I is the interference power at x.
+/// The interference is given as Upsilon(x) = E[1/I], where I is the interference power at x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StochasticLink {
     /// Tx-Rx distance D, m, > 0.
@@ -15,10 +15,10 @@ pub struct StochasticLink {
     pub mu_los: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Table of the interference field: strictly rising positions x, m, each with Upsilon, 1/W.
+    /// Table of the random interference along the line: strictly rising x, m, each with Upsilon, 1/W.
     ///
-    /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant
-    /// beyond the first and the last one.
+    /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant beyond the
+    /// first and the last one.
     pub upsilon: Vec<(f64, f64)>,
     /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,
@@ -27,7 +27,7 @@ pub struct StochasticLink {
 impl StochasticLink {
     /// Returns Upsilon, the mean inverse interference power E[1/I], at `x` metres, 1/W.
     ///
-    /// It is interpolated from the table of the interference field; NaN if the table is empty.
+    /// It is interpolated between the positions of the table `upsilon`; NaN if the table is empty.
     pub fn upsilon_at(&self, x: f64) -> f64 {
         let mut left: Option<(f64, f64)> = None;
         for &(at, value) in &self.upsilon {

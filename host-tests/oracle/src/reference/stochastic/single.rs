@@ -24,8 +24,8 @@ impl StochasticLink {
 
     /// Runs the corrected Algorithm 3: it continues while a lower target SIR could still be better.
     ///
-    /// It returns the best position seen. In a constant interference field this may be one step away from the
-    /// position of the printed algorithm, with an SIR at least as high.
+    /// It returns the best position seen. If the interference is the same everywhere, this may be one step away from
+    /// the position of the printed algorithm, with an SIR at least as high.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
             (best.sir >= gamma - step).then_some(best)
@@ -69,8 +69,8 @@ impl StochasticLink {
 
     /// Returns the best position (m) and expected SIR (linear) of one relay by brute force.
     ///
-    /// It tries `points` positions between two points of the interference field's table, then refines four times
-    /// around the best position. `None` unless there is exactly one relay.
+    /// It tries `points` positions between two successive positions of the interference table, then refines four
+    /// times around the best position. `None` unless there is exactly one relay.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
         let [_] = self.relays.as_slice() else {
             return None;

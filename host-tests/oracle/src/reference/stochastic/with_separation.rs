@@ -61,9 +61,9 @@ impl StochasticLink {
         low
     }
 
-    /// Splits an interval of positions at the points of the interference field's table.
+    /// Splits an interval of positions at the positions of the interference table.
     ///
-    /// In each part the field's Upsilon = E[1/I] (I is the interference power) is then linear.
+    /// In each part Upsilon = E[1/I] (I is the interference power) is then linear.
     fn pieces(&self, (low, high): (f64, f64)) -> Stretches {
         let inside = self.upsilon.iter().map(|point| point.0);
         let inside = inside.filter(|x| *x > low && *x < high);

@@ -95,7 +95,7 @@ fn all_of_it_can_be_heard() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks that no hop is marked as the worst if all have the same SIR within the chain's tolerance.
+/// Checks that no hop is drawn in red, as the worst, if the SIRs of all hops differ by less than 0.1 %.
 #[test]
 fn no_hop_is_red_where_all_are_equal() {
     let mut browser = opened(1280, 900);

@@ -94,7 +94,8 @@ fn native(browser: &mut Browser) -> String {
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
-/// Returns the report in the page's result `told`, which is JSON, without changing a character.
+/// Cuts the report out of `told`, the JSON result of a run in the page. The text stays as it is, so that a test can
+/// compare it with the report of `cargo chain` byte by byte.
 pub(crate) fn report(told: &str) -> &str {
     let report = told.strip_prefix("{\"report\":").unwrap();
     let end = report.find(",\"film\":{\"stands\":").unwrap();
@@ -135,7 +136,7 @@ fn the_numbers_are_those_of_the_command_to_the_bit() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks the page's percentage of the optimum SIR: a relay that is switched off does not count.
+/// Checks that the page's percentage of the optimum SIR ignores relays that are switched off.
 #[test]
 fn a_relay_that_is_off_does_not_count_in_the_share_of_the_optimum() {
     let mut browser = opened(1280, 900);

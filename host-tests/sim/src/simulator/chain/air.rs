@@ -274,7 +274,7 @@ pub(super) fn link(index: usize, port: Port) -> Link {
     }
 }
 
-/// Largest difference of two neighbours' numbers, even if the radio range is larger.
+/// Largest difference of the numbers of two neighbours in the chain. It applies even if the radio range is larger.
 const NEIGHBOUR: usize = 4;
 
 impl Chain {

@@ -18,9 +18,9 @@ const ARRIVED_M: f64 = 1.0;
 /// Period in which the simulated operator looks for landed drones of lost relays.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
-/// Distance, m, beyond the required separation, from which on a pilot ignores another moving drone.
+/// Distance to keep from moving drones during a hand-over, m, in addition to the required separation.
 ///
-/// A pilot hands no drone over while a moving drone is nearer.
+/// A pilot does not hand a drone over to its relay while another moving drone is nearer.
 const TRAFFIC_M: f64 = 30.0;
 
 /// Time after which a pilot lands a drone whose relay is off, or which the pilot took over for good.
@@ -64,7 +64,7 @@ impl Chain {
         self.queue.put(self.now + STEP, 0, QueuedEvent::Fly);
     }
 
-    /// Updates the smallest separation margin of two drones, `margin_m` of the outcome.
+    /// Updates `margin_m` of the outcome, the smallest distance of two drones minus the distance to keep.
     ///
     /// It checks all pairs of flying drones that no pilot controls.
     fn measure_pairs(&mut self) {
@@ -241,7 +241,7 @@ impl Chain {
 }
 
 impl Chain {
-    /// Creates the drones of the setup, simple or with autopilots, if any, and starts their time steps.
+    /// Creates the drones of the setup, if any, with or without autopilots, and starts their time steps.
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));
@@ -250,7 +250,8 @@ impl Chain {
         self.line_up();
     }
 
-    /// Moves all simple drones for one time step. Relays that are on get the reported positions of their drones.
+    /// Moves all drones without autopilots for one time step. Relays that are on get the reported positions of their
+    /// drones.
     pub(super) fn fly(&mut self) {
         let now = self.now;
         let Some(mut flight) = self.flight.take() else {
@@ -294,9 +295,10 @@ impl Chain {
         }
     }
 
-    /// Returns true if each simple drone of a living relay is at its agreed position by its own estimate.
+    /// Returns true if each drone that is simulated without autopilot has reached its agreed position.
     ///
-    /// True without simple drones.
+    /// Drones of relays that are off do not count. The position is the drone's own estimate. True if there are no
+    /// such drones.
     pub(super) fn has_arrived(&self) -> bool {
         let Some(flight) = &self.flight else {
             return true;

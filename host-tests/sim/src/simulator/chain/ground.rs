@@ -176,7 +176,8 @@ impl Station {
     }
 }
 
-/// Creates the ground stations that upload or measure. There are none without keys: they sign all frames.
+/// Creates the ground stations that upload or measure. None without a network key, because ground stations sign all
+/// frames.
 pub(super) fn stations(setup: &Setup) -> Vec<Station> {
     let Some(proof) = setup.proof(1) else {
         return Vec::new();
@@ -202,6 +203,8 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
 
 impl Chain {
     /// Returns the position of the drone of relay `index` (from 0), m; `None` if no drones are simulated.
+    ///
+    /// It is the position that the drone estimates if the drone has no autopilot, otherwise the true position.
     pub(super) fn drone(&self, index: usize) -> Option<Point> {
         let flight = self.flight.as_ref();
         flight

@@ -34,7 +34,8 @@ impl ChangedRelays {
 }
 
 impl Chain {
-    /// Starts the statistics of the run. `run` simulates a chain without faults, to judge this chain.
+    /// Starts the statistics of the run. `run` simulates a chain without faults, with whose positions this chain is
+    /// compared.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
@@ -101,9 +102,10 @@ impl Chain {
         }
     }
 
-    /// Returns true if one of the longest possible chains of the living relays holds its best positions.
+    /// Returns true if the chain is available: a longest chain of the living relays has its best positions.
     ///
-    /// If these chains are too small for a quorum, their relays hold no positions, and the result is false.
+    /// Several chains of that length may exist. The best positions are those in which the relays settle without
+    /// faults. If such chains are too small for a quorum, their relays have no positions, and the result is false.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
@@ -187,7 +189,7 @@ impl Chain {
         (settled && others).then_some(Ending::Settled)
     }
 
-    /// Ends a run that has a fixed end (`soak` of the setup) if the next event, at `next`, is later.
+    /// Ends the run if its next event, at the time `next`, is after its fixed end (`soak` of the setup).
     pub(super) fn end_soak(&mut self, next: Instant) {
         if let Some(until) = self.setup.soak
             && next > until
@@ -251,9 +253,10 @@ fn is_counted(part: &[&Member]) -> bool {
     })
 }
 
-/// Returns true if no part of the chain has enough relays for a quorum, and the relays know it.
+/// Returns true if no part of the chain has enough relays for a quorum, and the relays have noticed it.
 ///
-/// Each relay must know its present neighbours, and one relay of each part must have reported the missing quorum.
+/// For this each relay must know its present neighbours, and one relay of each part must have reported the missing
+/// quorum.
 fn is_cut(parts: &[Vec<&Member>]) -> bool {
     parts.iter().all(|part| {
         let nodes = part.iter().map(|member| Some(member.node));
@@ -272,7 +275,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all of these relays hold positions that were agreed on for the same target SIR.
+/// Returns true if all of these relays have positions that were agreed on for the same target SIR.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()
@@ -286,7 +289,7 @@ fn holds(part: &[&Member]) -> bool {
 impl Chain {
     /// Checks that the setpoint of relay `index` (from 0) is within its limits, and counts violations.
     ///
-    /// It also records the SIR after each round of Algorithm 2.
+    /// It also records the SIR after each round of Algorithm 2, the stepwise improvement of the positions.
     pub(super) fn check(&mut self, index: usize) {
         let Some(member) = self.members.get_mut(index) else {
             return;
@@ -474,7 +477,7 @@ impl Chain {
 }
 
 impl Member {
-    /// Returns the number of passes and view proposals that this relay has begun, even before reboots.
+    /// Returns the number of passes and view proposals that this relay has begun, also before reboots.
     ///
     /// A pass is a message that relays forward along the whole chain.
     fn begun(&self) -> u32 {

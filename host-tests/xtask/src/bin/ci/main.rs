@@ -1,7 +1,7 @@
 //! Runs all checks; `cargo ci`. The last lines name the failed ones, with their output.
 //!
-//! Steps that share a target folder run one after the other. Those with a folder of their own run beside them, one after the other,
-//! at low priority: many tests wait for the wall clock.
+//! The steps run in three lanes. Steps that share a target folder run one after the other. Those with a folder of their own run
+//! beside them, one after the other, at low priority. Tests that mostly wait for the wall clock run beside both.
 
 mod prepare;
 mod steps;
@@ -14,7 +14,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use steps::Step;
+use steps::{Lane, Step};
 
 /// Runs all checks; the last lines name the failed ones, with their output.
 #[derive(Parser)]
@@ -42,25 +42,24 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     }
     let all = steps.len();
-    let (beside, others): (Vec<_>, Vec<_>) =
-        (1..).zip(&steps).partition(|(_, step)| step.is_background);
+    let (background, others): (Vec<_>, Vec<_>) = (1..)
+        .zip(&steps)
+        .partition(|(_, step)| step.lane == Lane::Background);
     let mut failed: Vec<(&str, Evidence)> = Vec::new();
     std::thread::scope(|scope| {
-        let beside = scope.spawn(|| {
-            let run = |&(number, step)| {
-                let mut output = Vec::new();
-                let failure = run(number, all, step, &mut output);
-                // In one piece, so that these lines do not mix with those of the other steps.
-                _ = stdout().write_all(&output);
-                failure
-            };
-            beside.iter().filter_map(run).collect::<Vec<_>>()
-        });
-        let run = |&(number, step): &(usize, _)| run(number, all, step, &mut stdout());
-        failed.extend(others.iter().filter_map(run));
-        match beside.join() {
-            Ok(failures) => failed.extend(failures),
-            Err(panic) => resume_unwind(panic),
+        let mut lanes = vec![scope.spawn(|| run_in_one_piece(background, all))];
+        for (number, step) in others {
+            if step.lane == Lane::Waiting {
+                lanes.push(scope.spawn(move || run_in_one_piece(vec![(number, step)], all)));
+            } else {
+                failed.extend(run(number, all, step, &mut stdout()));
+            }
+        }
+        for lane in lanes {
+            match lane.join() {
+                Ok(failures) => failed.extend(failures),
+                Err(panic) => resume_unwind(panic),
+            }
         }
     });
     let seconds = started.elapsed().as_secs();
@@ -79,6 +78,18 @@ fn main() -> ExitCode {
         );
         ExitCode::FAILURE
     }
+}
+
+/// Runs the steps of a `lane` beside the main lane, with their numbers. Returns the failures.
+fn run_in_one_piece(lane: Vec<(usize, &Step)>, all: usize) -> Vec<(&str, Evidence)> {
+    let run = |(number, step)| {
+        let mut output = Vec::new();
+        let failure = run(number, all, step, &mut output);
+        // In one piece, so that these lines do not mix with those of the other steps.
+        _ = stdout().write_all(&output);
+        failure
+    };
+    lane.into_iter().filter_map(run).collect()
 }
 
 /// Runs step `number` of `all` and writes its output and result to `out`.

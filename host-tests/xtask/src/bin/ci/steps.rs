@@ -48,8 +48,18 @@ pub(crate) struct Step {
     pub(crate) name: String,
     pub(crate) command: String,
     environment: &'static [(&'static str, &'static str)],
-    /// True for a step that runs beside the others, at low priority. It has a target folder of its own.
-    pub(crate) is_background: bool,
+    pub(crate) lane: Lane,
+}
+
+/// Order in which a step runs relative to the other steps.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Lane {
+    /// The step runs after the previous step of this lane.
+    Main,
+    /// The step starts after the previous step of the main lane, which does not wait for its end. It mostly waits for the wall clock.
+    Waiting,
+    /// The step runs at low priority after the previous step of this lane. It has a target folder of its own.
+    Background,
 }
 
 /// Nightly compiler for the fuzzer and for Miri.
@@ -70,7 +80,7 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
         name: name.into(),
         command: command.into(),
         environment: &[],
-        is_background: false,
+        lane: Lane::Main,
     }
 }
 
@@ -79,7 +89,7 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
 /// They use idle time: many tests of the other steps wait for the wall clock.
 fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
     let moved = |step| Step {
-        is_background: true,
+        lane: Lane::Background,
         ..step
     };
     steps.into_iter().map(moved)
@@ -88,7 +98,7 @@ fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
 impl Step {
     /// Runs the command of the step and copies its standard output to `out`.
     ///
-    /// The error output goes to `out` too for a background step, otherwise to this program's error output.
+    /// The error output goes to `out` too for a step beside the main lane, otherwise to this program's error output.
     ///
     /// # Errors
     /// The relevant lines of the output, if the command fails.
@@ -111,7 +121,7 @@ impl Step {
     /// Starts the command of the step. Returns its process, and the pipe from which its output is read.
     fn start(&self) -> Result<(Child, PipeReader), Error> {
         let (reader, writer) = pipe()?;
-        let priority = if self.is_background {
+        let priority = if self.lane == Lane::Background {
             "nice -n 10 "
         } else {
             ""
@@ -120,7 +130,7 @@ impl Step {
         let mut words = line.split_whitespace();
         let mut command = Command::new(words.next().unwrap_or("cargo"));
         command.args(words).envs(self.environment.iter().copied());
-        if self.is_background {
+        if self.lane != Lane::Main {
             command.stderr(writer.try_clone()?);
         }
         let child = command.stdout(writer).spawn()?;
@@ -216,6 +226,14 @@ fn workspace_tests() -> Vec<Step> {
             "tests",
             "cargo test --workspace --exclude host-tests --no-fail-fast --locked",
         ),
+        Step {
+            lane: Lane::Waiting,
+            environment: &[("RUST_TEST_THREADS", WAITING_TESTS)],
+            ..step(
+                "tests of companions",
+                format!("cargo test -p host-tests --no-fail-fast --locked --test {WAITING_TEST}"),
+            )
+        },
         step(
             "tests of chains",
             format!(
@@ -223,13 +241,6 @@ fn workspace_tests() -> Vec<Step> {
                 chains.concat()
             ),
         ),
-        Step {
-            environment: &[("RUST_TEST_THREADS", WAITING_TESTS)],
-            ..step(
-                "tests of companions",
-                format!("cargo test -p host-tests --no-fail-fast --locked --test {WAITING_TEST}"),
-            )
-        },
     ]
 }
 
@@ -392,12 +403,12 @@ fn nightly() -> Vec<Step> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Step, WAITING_TEST, all, integration_tests, quick, step};
+    use super::{Lane, Step, WAITING_TEST, all, integration_tests, quick, step};
 
     #[test]
     fn a_failed_background_step_is_reported_with_its_output() {
         let step = Step {
-            is_background: true,
+            lane: Lane::Background,
             ..step("list", "ls --no-such-option")
         };
         let mut out = Vec::new();
@@ -408,12 +419,12 @@ mod tests {
 
     #[test]
     fn steps_in_the_background_have_a_target_folder_of_their_own() {
-        for step in all().iter().filter(|step| step.is_background) {
+        for step in all().iter().filter(|step| step.lane == Lane::Background) {
             let command = &*step.command;
             let is_apart = command.contains("--target-dir ") || command == "cargo template --check";
             assert!(is_apart || command.contains(" fmt "), "{command}");
         }
-        assert!(quick().iter().all(|step| !step.is_background));
+        assert!(quick().iter().all(|step| step.lane == Lane::Main));
     }
 
     #[test]

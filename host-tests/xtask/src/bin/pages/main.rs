@@ -57,7 +57,7 @@ struct Options {
     /// Run for pages whose names contain this only
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
-    /// The slow blocks, and no others
+    /// Run only the slow commands of the pages
     #[arg(long)]
     slow: bool,
 }
