@@ -236,9 +236,12 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
 };
 
 /// States of the two solvers, which share their memory.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is one of it, and nothing allocates"
+#[cfg_attr(
+    feature = "altitude",
+    expect(
+        clippy::large_enum_variant,
+        reason = "there is one of it, and nothing allocates"
+    )
 )]
 #[repr(u8)]
 #[derive(Clone, Debug)]
