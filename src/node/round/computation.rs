@@ -8,7 +8,7 @@ use super::sense::{SENSING, Sense, Sensing};
 use super::state::{Action, Phase, RoundState};
 use super::sweep::SweepPass;
 use super::turn::TurnPass;
-use crate::mission::{Mission, Profile};
+use crate::mission::Profile;
 use crate::node::context::Context;
 use crate::node::sample::Meter;
 use crate::optimiser::joint::{MOST_SOLVED, Solver};
@@ -407,13 +407,10 @@ impl LeaderTask {
         *self = Self::Predicting(planner);
     }
 
-    /// Starts the joint method, whose state is built in place; returns false if it cannot solve the chain.
-    pub(crate) fn solve(&mut self, mission: &Mission) -> bool {
+    /// Starts the joint method, whose solver still has to begin.
+    #[inline(never)] // or the stack of each step has room for a second solver
+    pub(crate) fn solve(&mut self) {
         *self = Self::Solving(ChainSolver::NEW);
-        match self {
-            Self::Solving(chain) => chain.begin(mission),
-            _ => false,
-        }
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is

@@ -218,14 +218,18 @@ impl Computation {
     #[inline(never)]
     pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
         let mission = context.mission();
-        if !matches!(self.task, LeaderTask::Solving(_)) && !self.task.solve(mission) {
-            self.task.clear();
-            self.choose_configured(context);
-            return Some(0.0);
+        let is_new = !matches!(self.task, LeaderTask::Solving(_));
+        if is_new {
+            self.task.solve();
         }
         let LeaderTask::Solving(chain) = &mut self.task else {
             return None;
         };
+        if is_new && !chain.begin(mission) {
+            self.task.clear();
+            self.choose_configured(context);
+            return Some(0.0);
+        }
         let seats = &self.seats;
         let seat_of = |index| seats.of(mission, index);
         let Poll::Ready(solved) = chain.step(mission, seat_of) else {

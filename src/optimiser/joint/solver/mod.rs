@@ -268,6 +268,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 
     /// Selects the directions of `mission`, in place. False if the chain cannot be solved.
+    #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
         if mission.reverse() > 0.0 {
             self.0 = Way::Both([const { Both::NEW }; BOTH]);

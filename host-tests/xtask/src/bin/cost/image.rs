@@ -117,7 +117,7 @@ const IMAGES: &[Image] = &[
         //   autopilot
         // - both directions by Algorithms 1, 2 and 4, in sensing and uploads, and longer texts: 7 KiB
         // - both directions by the joint method: 10.4 KiB flash, 1.6 KiB RAM
-        [213 * 1024, 15_168, 8_192],
+        [213 * 1024, 15_168, 7_168],
     ),
 ];
 
