@@ -304,7 +304,7 @@ impl core::fmt::Display for SetupError {
             }
             Self::Step => "the fixed target step (linear SIR) must be above 0",
             Self::Method => "method must be Align with an interference field; Joint needs the feature altitude and at most 100 relays, Adjust needs the feature adjust",
-            Self::Reverse => "a mission with a reverse above 0 needs the method Align or Adjust, which place relays for both directions",
+            Self::Reverse => "a mission with a reverse above 0 and the method Joint needs a known interferer: listen must be None",
             Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
             Self::Measure => {
                 "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field is needed"
@@ -352,7 +352,8 @@ pub(crate) fn check(
     if !able {
         return Err(SetupError::Method);
     }
-    if settings.method == Method::Joint && mission.config().reverse > 0.0 {
+    let is_listening_joint = settings.method == Method::Joint && settings.listen.is_some();
+    if is_listening_joint && mission.config().reverse > 0.0 {
         return Err(SetupError::Reverse);
     }
     if let Method::Adjust(Adjust {

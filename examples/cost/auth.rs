@@ -36,6 +36,7 @@ fn exchange_all(upper: &mut Relay, lower: &mut Relay, now: Instant) {
 
 /// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay. The sweep
 /// message carries the search for positions along the chain.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));

@@ -8,7 +8,7 @@ use super::missions::{HIGH, UNEVEN};
 
 /// Simulated chain of three relays that records the cost of every call.
 pub(crate) struct Flight {
-    relays: [Relay; 3],
+    relays: heapless::Vec<Relay, 3>,
     /// Instructions of the most expensive call so far.
     most: u32,
     /// Length of the longest frame so far, bytes.
@@ -17,8 +17,13 @@ pub(crate) struct Flight {
 
 impl Flight {
     fn new(mission: Mission, settings: Settings) -> Self {
+        let mut relays = heapless::Vec::new();
+        for index in [1, 2, 3] {
+            // One relay at a time on the stack.
+            _ = relays.push(relay(index, settings, mission));
+        }
         Self {
-            relays: [1, 2, 3].map(|index| relay(index, settings, mission)),
+            relays,
             most: 0,
             longest: 0,
         }

@@ -56,7 +56,13 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
-/// Mission of three relays with ranges of altitudes and of lateral offsets, 280 m to either side.
+/// Mission of three relays with ranges of altitudes for both directions.
+pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
+    reverse: 1.0,
+    ..*HIGH.config()
+});
+
+/// Mission of three relays that may choose altitudes, and of lateral offsets, 280 m to either side.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,

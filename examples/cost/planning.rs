@@ -8,10 +8,11 @@ use uav_relay::planning::fleet::Fewest;
 use uav_relay::planning::single::theorems;
 
 use super::counter::instructions;
-use super::missions::{HIGH, MISSION, WIDE};
+use super::missions::{BOTH, HIGH, MISSION, WIDE};
 
 /// Measures the instructions for the paper's Theorems 1 to 3, and for finding the number of relays. This is the
 /// minimum number that reaches an SIR.
+#[inline(never)]
 pub(crate) fn planning() {
     let common = HIGH.config().common;
     let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
@@ -55,18 +56,24 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
 }
 
 /// Measures the instructions of the joint method's solver alone, without messages between relays.
+#[inline(never)]
 pub(crate) fn joint() {
-    let (total, longest_call, calls) = solve_instructions(&HIGH, 8);
-    hprintln!("solved_8 {}", total);
-    hprintln!("portion_8 {}", longest_call);
-    hprintln!("portions_8 {}", calls);
-    let (total, longest_call, calls) = solve_instructions(&HIGH, 50);
-    hprintln!("solved_50 {}", total);
-    hprintln!("portion_50 {}", longest_call);
-    hprintln!("portions_50 {}", calls);
-    let (total, longest_call, calls) = solve_instructions(&WIDE, 50);
-    hprintln!("solved_50_wide {}", total);
-    hprintln!("portion_50_wide {}", longest_call);
-    hprintln!("portions_50_wide {}", calls);
+    for (of, relays, suffix) in [
+        (&HIGH, 8, ""),
+        (&HIGH, 20, ""),
+        (&HIGH, 50, ""),
+        (&WIDE, 50, "_wide"),
+        (&HIGH, 100, ""),
+        (&BOTH, 5, "_both"),
+        (&BOTH, 8, "_both"),
+        (&BOTH, 20, "_both"),
+        (&BOTH, 50, "_both"),
+        (&BOTH, 100, "_both"),
+    ] {
+        let (total, longest_call, calls) = solve_instructions(of, relays);
+        hprintln!("solved_{}{} {}", relays, suffix, total);
+        hprintln!("portion_{}{} {}", relays, suffix, longest_call);
+        hprintln!("portions_{}{} {}", relays, suffix, calls);
+    }
     hprintln!("size_of_solver {}", size_of::<Solver<100, 10>>());
 }

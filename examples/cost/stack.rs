@@ -8,6 +8,7 @@ use super::counter::relay;
 use super::missions::mission;
 
 /// Measures the maximum stack use of a relay's calls, bytes, by a pattern that they overwrite.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);
     let mut head = relay(1, Settings::default(), TWO);

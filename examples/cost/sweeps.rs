@@ -11,6 +11,7 @@ use uav_relay::{Instant, MAX_FRAME, Mission, MissionConfig, Phase, Port, Setting
 use super::counter::{instructions, next_frame, relay};
 use super::missions::{INTERFERER, MISSION, mission};
 
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn reach() {
     let common = MISSION.config().common;
     let middle = Hop::new(
@@ -81,6 +82,7 @@ struct SweepCost {
 
 /// Prints the costs of a sweep (search for positions along the chain). They are measured for a mission with traffic
 /// in one direction, and for one with traffic in both.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     const BOTH_WAYS: Mission = Mission::new(MissionConfig {
@@ -176,6 +178,7 @@ fn measured(mission: Mission) -> SweepCost {
 }
 
 /// Measures the instructions for deframing and checking the first sweep message of eight relays.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn deframe() {
     let settings = Settings {
         predict: false,
@@ -206,6 +209,7 @@ pub(crate) fn deframe() {
 
 /// Measures the instructions of the calls in which relay 1 of 100 computes the target SIR in advance. Prints the
 /// largest cost and the number of calls.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

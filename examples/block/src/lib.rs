@@ -197,7 +197,8 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
     if method != Method::Align && raw.points > 0 {
         return Err(ConfigError::Method);
     }
-    if method == Method::Joint && mission.config().reverse > 0.0 {
+    let is_listening_joint = method == Method::Joint && listen.is_some();
+    if is_listening_joint && mission.config().reverse > 0.0 {
         return Err(ConfigError::Reverse);
     }
     Ok(Config {

@@ -9,5 +9,7 @@ mod scenes;
 mod sensing;
 mod several;
 mod shares;
+mod space;
+mod space_judge;
 mod turns;
 mod unchanged;

@@ -47,7 +47,7 @@ fn a_way_back_out_of_range_is_refused() {
 }
 
 #[test]
-fn the_joint_method_is_refused() {
+fn the_joint_method_of_relays_that_listen_is_refused() {
     let mission = Mission::try_new(both_ways()).unwrap();
     let with = |settings: Settings| {
         let identity = Identity {
@@ -61,7 +61,12 @@ fn the_joint_method_is_refused() {
         method: Method::Joint,
         ..Settings::default()
     };
-    assert_eq!(with(joint), Some(SetupError::Reverse));
+    assert_eq!(with(joint), None);
+    let listening = Settings {
+        listen: Some(Listen::default()),
+        ..joint
+    };
+    assert_eq!(with(listening), Some(SetupError::Reverse));
     for settings in [
         Settings {
             method: Method::Adjust(uav_relay::Adjust::default()),
@@ -75,5 +80,8 @@ fn the_joint_method_is_refused() {
         assert_eq!(with(settings), None, "{settings:?}");
     }
     let line = SetupError::Reverse.to_string();
-    assert!(line.contains("reverse") && line.contains("Align"), "{line}");
+    assert!(
+        line.contains("reverse") && line.contains("listen"),
+        "{line}"
+    );
 }

@@ -407,8 +407,10 @@ impl LeaderTask {
         *self = Self::Predicting(planner);
     }
 
-    pub(crate) fn solve(&mut self, chain: ChainSolver) {
-        *self = Self::Solving(chain);
+    /// Starts the joint method, whose solver still has to begin.
+    #[inline(never)] // or the stack of each step has room for a second solver
+    pub(crate) fn solve(&mut self) {
+        *self = Self::Solving(ChainSolver::NEW);
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is

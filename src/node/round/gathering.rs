@@ -5,7 +5,7 @@
 //!
 //! Then each relay solves the whole chain without further messages, and uses its own position in the solution.
 
-use super::computation::{ChainSolver, LeaderTask};
+use super::computation::LeaderTask;
 use super::computation::{Computation, JointPlace, PassKind};
 use super::state::Action;
 use crate::mission::{Mission, Profile};
@@ -218,13 +218,18 @@ impl Computation {
     #[inline(never)]
     pub(super) fn solve(&mut self, context: &Context<'_>) -> Option<f32> {
         let mission = context.mission();
-        if !matches!(self.task, LeaderTask::Solving(_)) && !self.begin_solving(mission) {
-            self.choose_configured(context);
-            return Some(0.0);
+        let is_new = !matches!(self.task, LeaderTask::Solving(_));
+        if is_new {
+            self.task.solve();
         }
         let LeaderTask::Solving(chain) = &mut self.task else {
             return None;
         };
+        if is_new && !chain.begin(mission) {
+            self.task.clear();
+            self.choose_configured(context);
+            return Some(0.0);
+        }
         let seats = &self.seats;
         let seat_of = |index| seats.of(mission, index);
         let Poll::Ready(solved) = chain.step(mission, seat_of) else {
@@ -248,16 +253,6 @@ impl Computation {
         };
         self.task.clear();
         Some(target)
-    }
-
-    /// Starts the solver of the joint method. Returns false if the solver cannot handle this mission.
-    #[inline(never)] // a solver is built here once
-    fn begin_solving(&mut self, mission: &Mission) -> bool {
-        let Some(chain) = ChainSolver::new(mission) else {
-            return false;
-        };
-        self.task.solve(chain);
-        true
     }
 
     fn choose_configured(&mut self, context: &Context<'_>) {

@@ -109,6 +109,15 @@ pub(crate) struct Ascent {
 }
 
 impl Ascent {
+    /// Ascent before the first start: all its bytes are 0.
+    pub(crate) const NONE: Self = Self {
+        spare: 0.0,
+        limit: 0.0,
+        slope: 0.0,
+        trust: 0.0,
+        ..Self::new(0.0, 0.0, 0.0, 0.0)
+    };
+
     /// Creates an ascent, which improves a chain. For the target `sigma` the chain has the spare length `slack` at
     /// Rx, m. Targets are in ln(SIR), and never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {

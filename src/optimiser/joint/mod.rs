@@ -10,11 +10,13 @@
 //! | `outlook` | the value function: the slack as a quadratic in a relay's position; a relay's step, and its feedback |
 //! | `site` | one relay and the hop to it: its part of the forward pass and of the backward pass; its room across the line |
 //! | `ascent` | step control: the increase of the target, and the accepted fraction of the step |
+//! | `interior` | with a way back: the interior-point method for both directions |
 //! | `starts` | initial chains and initial targets of the ascents |
 //! | [`solver`] | the solution of a whole chain without messages |
 
 mod ascent;
 mod hop;
+mod interior;
 mod outlook;
 mod site;
 pub mod solver;

@@ -282,7 +282,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
 }
 
 /// Compressed [`Policy`]: the derivatives are stored with three digits, which is sufficient.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Brief {
     axis: Coordinate,
     rising: bool,
@@ -291,6 +291,13 @@ pub(super) struct Brief {
 }
 
 impl Brief {
+    pub(super) const NONE: Self = Self {
+        axis: Coordinate::X,
+        rising: false,
+        step: [0.0; 2],
+        follow: [[0; 3]; 2],
+    };
+
     pub(super) fn of(policy: &Policy) -> Self {
         let Policy {
             axis,
@@ -307,16 +314,20 @@ impl Brief {
     }
 
     pub(super) fn policy(self) -> Policy {
-        let whole = |half: u16| f32::from_bits(u32::from(half) << 16);
         Policy {
             axis: self.axis,
             rising: self.rising,
             step: self.step,
-            follow: self.follow.map(|row| row.map(whole)),
+            follow: self.follow.map(|row| row.map(widened)),
         }
     }
 }
 
-const fn upper_half(value: f32) -> u16 {
+/// Returns a finite value rounded to three digits.
+pub(super) const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
+}
+
+pub(super) const fn widened(half: u16) -> f32 {
+    f32::from_bits((half as u32) << 16)
 }

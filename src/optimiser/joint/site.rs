@@ -351,6 +351,8 @@ const LAST: f32 = 16_777_215.0;
 pub(super) struct Cell([u8; 6]);
 
 impl Cell {
+    pub(super) const NONE: Self = Self([0; 6]);
+
     /// Encodes the lateral offset and altitude `at` for storage, limited to `room`, the allowed ranges.
     pub(super) fn of(at: CrossSection, room: Room) -> Self {
         let [a, b, c, _] = code(at.y_m, room.lateral).to_le_bytes();
@@ -363,6 +365,28 @@ impl Cell {
         CrossSection {
             y_m: value([a, b, c, 0], room.lateral),
             altitude_m: value([d, e, f, 0], room.band),
+        }
+    }
+}
+
+/// Stored lateral offsets and altitudes of the relays of a chain.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cells<const RELAYS: usize>([Cell; RELAYS]);
+
+impl<const RELAYS: usize> Cells<RELAYS> {
+    pub(super) const NEW: Self = Self([Cell::NONE; RELAYS]);
+
+    /// Returns the cell of relay `index`.
+    #[inline(never)] // called from many places
+    pub(super) fn get(&self, index: u16) -> Cell {
+        let at = usize::from(index).wrapping_sub(1);
+        self.0.get(at).copied().unwrap_or_default()
+    }
+
+    pub(super) fn set(&mut self, index: u16, cell: Cell) {
+        let at = usize::from(index).wrapping_sub(1);
+        if let Some(kept) = self.0.get_mut(at) {
+            *kept = cell;
         }
     }
 }

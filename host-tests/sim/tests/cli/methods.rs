@@ -7,7 +7,7 @@ use uav_relay_scenario::scene::Scene;
 use super::{chain, example, json, refusal};
 
 #[test]
-fn a_way_back_is_refused_by_joint_only() {
+fn a_way_back_is_flown_by_align_adjust_and_joint() {
     let file = std::env::temp_dir().join(format!("way_back_{}.toml", std::process::id()));
     let text = uav_relay_scenario::DEFAULT;
     std::fs::write(&file, format!("{text}\n[link]\nreverse = 1.0\n")).unwrap();
@@ -30,9 +30,13 @@ fn a_way_back_is_refused_by_joint_only() {
         adjusted["sir"].as_f64().unwrap() > sir * (1.0 - 1e-5),
         "{adjusted}"
     );
-    let (status, line) = refusal(&format!("{ask} --method joint"));
-    assert_eq!(status, 2);
-    assert!(line.contains("reverse") && line.contains("Align"), "{line}");
+    let altitudes = std::fs::read_to_string(example("altitudes.toml")).unwrap();
+    std::fs::write(&file, format!("{altitudes}\n[link]\nreverse = 1.0\n")).unwrap();
+    let (align, joint) = (json(&ask), json(&format!("{ask} --method joint")));
+    let [level, free] = [&align, &joint].map(|report| report["sir"].as_f64().unwrap());
+    assert!(free > 1.2 * level, "{free} {level}");
+    let target = joint["target"].as_f64().unwrap();
+    assert!((free / target - 1.0).abs() < 1e-3, "{joint}");
     std::fs::remove_file(&file).unwrap();
 }
 

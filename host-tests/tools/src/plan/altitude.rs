@@ -14,7 +14,9 @@ use uav_relay::{Mission, Placement};
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
 use uav_relay_scenario::Scenario;
 
-type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as usize / 10 }>;
+const MOST: usize = Mission::MAX_RELAYS as usize;
+
+type Chain = Solver<MOST, { MOST / 10 }>;
 
 /// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
 ///
@@ -22,7 +24,14 @@ type Chain = Solver<{ Mission::MAX_RELAYS as usize }, { Mission::MAX_RELAYS as u
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     match joint(&briefed) {
-        Some(places) => Ok(briefed.plan(&places, "the joint method", false)),
+        Some(places) => {
+            let how = if scenario.reverse > 0.0 {
+                "the joint method for both directions"
+            } else {
+                "the joint method"
+            };
+            Ok(briefed.plan(&places, how, false))
+        }
         // The relays do the same: they stay at their own altitudes.
         None => source::best(scenario, relays, tolerance),
     }
@@ -73,7 +82,12 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
         let from_m = places.last().map_or(0.0, |place| place.x_m);
         let mut reaches = PerTarget::new();
         link_of(index).extend(&[target], &[from_m], &mut reaches);
-        places.push(own_of(index).cross_section.at(*reaches.first()?));
+        let mut x_m = *reaches.first()?;
+        if index == mission.relays() {
+            // With a way back the last relay may stop before its reach.
+            (_, x_m) = link_of(index).ending(target, from_m, x_m)?;
+        }
+        places.push(own_of(index).cross_section.at(x_m));
     }
     for index in (2..=mission.relays()).rev() {
         let before = usize::from(index) - 2;

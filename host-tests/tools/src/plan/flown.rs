@@ -8,7 +8,7 @@ use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Scenario, mission};
 
 use super::multi_interferer::with_one;
-use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, both_ways_only_by_align, source};
+use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, source};
 
 /// Result of the on-board method for a scenario: the positions on which the relays would agree.
 #[derive(Clone, PartialEq, Debug)]
@@ -63,9 +63,6 @@ pub fn flown(
     method: PlannedMethod,
     tolerance: f64,
 ) -> Result<Flown, NoPlan> {
-    if method == PlannedMethod::Joint {
-        both_ways_only_by_align(scenario, "the method joint")?;
-    }
     let plan = alone(scenario, relays, method, tolerance)?;
     let ask = PlanRequest {
         number: Number::Of(relays),

@@ -56,13 +56,10 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
         return Err(Refusal::ReverseSources.into());
     }
     if matches!(scenario.interference, Interference::Field(_)) {
-        both_ways_only_by_align(scenario, "a plan in a [field]")?;
+        only_one_way(scenario, "a plan in a [field]")?;
     }
     if ask.x_m.is_some() {
-        both_ways_only_by_align(scenario, "--x-m")?;
-    }
-    if ask.free_altitude {
-        both_ways_only_by_align(scenario, "--altitude free")?;
+        only_one_way(scenario, "--x-m")?;
     }
     let Some(x_m) = ask.x_m else { return Ok(()) };
     let d = scenario.distance_m;
@@ -80,11 +77,10 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
 }
 
 /// Returns an error that names the option `what`, if the scenario carries data in both directions.
-fn both_ways_only_by_align(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
+fn only_one_way(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
     if scenario.reverse > 0.0 {
         return Err(NoPlan::Wrong(format!(
-            "{what} is for one direction, and link.reverse = {:?}: for both directions only Algorithm 1 places the relays, at fixed altitudes; \
-             allowed: link.reverse = 0.0 or no {what}",
+            "{what} is for one direction, and link.reverse = {:?}: allowed: link.reverse = 0.0 or no {what}",
             scenario.reverse
         )));
     }

@@ -56,7 +56,7 @@ impl fmt::Display for BlockError {
                 "[listen] needs a scenario with [[interferer]] or without interference, not one with a [field]",
             ),
             Self::Config(ConfigError::Reverse) => f.write_str(
-                "link.reverse above 0 needs the method align or adjust: joint places relays for one direction",
+                "link.reverse above 0 with [listen] needs the method align or adjust: the method joint needs a known interferer",
             ),
             Self::Config(ConfigError::Secret) => {
                 f.write_str("the key must contain a byte other than 0, and the epoch must be within 1 to 4294967294")

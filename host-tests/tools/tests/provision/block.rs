@@ -393,7 +393,7 @@ fn a_field_out_of_range_is_named() {
 }
 
 #[test]
-fn a_way_back_is_stored_and_is_for_align_without_sensing() {
+fn a_way_back_is_stored_and_is_for_align_and_joint_without_sensing() {
     let scenario = Scenario {
         reverse: 0.25,
         rx_w: 5.0,
@@ -407,13 +407,16 @@ fn a_way_back_is_stored_and_is_for_align_without_sensing() {
     let mission = config.mission.config();
     assert!((mission.reverse, mission.rx_power_w) == (0.25, 5.0));
     flies(&config);
-    for error in [
-        flight.by(Method::Joint).block(3).unwrap_err(),
-        BlockError::Config(reads(&changed(block, 14, &[1])).unwrap_err()),
-    ] {
-        assert_eq!(error, BlockError::Config(ConfigError::Reverse));
-        assert!(error.to_string().contains("link.reverse"), "{error}");
-    }
+    assert_eq!(
+        reads(&changed(block, 14, &[1])).map(|config| config.method),
+        Ok(Method::Joint)
+    );
+    let flight = flight.by(Method::Joint);
+    flight.block(3).unwrap();
+    let adjust = Method::Adjust(Adjust::default());
+    let error = flight.by(adjust).block(3).unwrap_err();
+    assert_eq!(error, BlockError::Config(ConfigError::Reverse));
+    assert!(error.to_string().contains("link.reverse"), "{error}");
     let higher = 1.0_f32.next_up().to_le_bytes();
     let error = ConfigError::Mission(MissionError::Reverse);
     assert_eq!(reads(&changed(block, 376, &higher)), Err(error));

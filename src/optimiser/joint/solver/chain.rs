@@ -12,16 +12,17 @@ use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
 use crate::sir::{Sender, square};
 
+/// Chain to be solved: its mission, and the profiles of its relays.
 #[derive(Clone, Copy)]
-pub(super) struct SolverContext<'a, F> {
-    pub(super) mission: &'a Mission,
-    pub(super) interferer: &'a Interferer,
-    pub(super) seat_of: &'a F,
+pub(in crate::optimiser::joint) struct SolverContext<'a, F> {
+    pub(in crate::optimiser::joint) mission: &'a Mission,
+    pub(in crate::optimiser::joint) interferer: &'a Interferer,
+    pub(in crate::optimiser::joint) seat_of: &'a F,
     pub(super) gain: PowerRatio,
 }
 
 impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
-    pub(super) fn distance_m(&self) -> f32 {
+    pub(in crate::optimiser::joint) fn distance_m(&self) -> f32 {
         self.mission.config().distance_m
     }
 
@@ -144,7 +145,7 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 
 /// Stored state of a segment of the chain: the x of the relay before it, and derivatives at its end. The derivatives
 /// are those of the chain's spare length at Rx by the position of the segment's last relay.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before the segment, m.
     pub(super) x_m: f32,
@@ -156,6 +157,12 @@ pub(super) struct Mark {
 }
 
 impl Mark {
+    pub(super) const NONE: Self = Self {
+        x_m: 0.0,
+        slope: [0.0; 3],
+        bend: [0.0; 6],
+    };
+
     pub(super) fn look(&mut self, outlook: &Outlook) {
         let [[xx, xy, xh], [_, yy, yh], [_, _, hh]] = outlook.bend;
         self.slope = outlook.slope;
@@ -172,10 +179,17 @@ impl Mark {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Stage {
     pub(super) x_m: f32,
     pub(super) policy: Brief,
+}
+
+impl Stage {
+    pub(super) const NONE: Self = Self {
+        x_m: 0.0,
+        policy: Brief::NONE,
+    };
 }
 
 pub(super) fn last_of(mission: &Mission) -> u8 {

@@ -4,7 +4,7 @@
 //! tries another position, where the derivatives show no gain.
 
 use super::chain::{Seat, SolverContext, far_off, last_of};
-use super::{Purpose, Solver, Work};
+use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};
@@ -24,7 +24,7 @@ pub(super) const CEILING: f32 = 5e-5;
 /// its limit is checked against the bound, which the first and the last hop set.
 const PROBED: f32 = 3e-4;
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     pub(super) fn seek(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -259,7 +259,7 @@ pub(super) const GAIN: f32 = 2e-5;
 /// Maximum number of accepted trial moves of single relays, after which the solution ends.
 const MOVES: u8 = 200;
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Returns the current trial move: relay, kind of move, and number of halvings. Kinds 0 to 3 are down, up, left
     /// and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
@@ -285,7 +285,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             return Poll::Ready(Ok(libm::expf(sigma)));
         }
         let room = (chain.seat_of)(index).room;
-        self.kept = self.cell(index);
+        self.kept = self.cells.get(index);
         let part = FIRST_MOVE
             * libm::ldexpf(1.0, -i32::from(halved))
             * if way % 2 > 0 { 1.0 } else { -1.0 };
@@ -306,7 +306,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 self.moving += 1;
                 return Poll::Pending;
             }
-            moved = Cell::of(self.cell(other).place((chain.seat_of)(other).room), room);
+            moved = Cell::of(
+                self.cells.get(other).place((chain.seat_of)(other).room),
+                room,
+            );
         }
         if moved == self.kept {
             self.moving += 1;
@@ -318,7 +321,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Begins the ascent (improvement) of the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
@@ -402,7 +405,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         purpose: Purpose,
     ) -> CrossSection {
         if purpose != Purpose::Start {
-            return self.cell(index).place(room);
+            return self.cells.get(index).place(room);
         }
         let wanted = match self.start {
             Start::Far => {

@@ -11,26 +11,31 @@
 //! | --- | --- |
 //! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
 //! | `judge` | the steps after a target is found: the next start, or the polish |
+//! | `both` | the solver for both directions |
 //! | `chain` | data shared by the passes; a segment of the chain; the profile of one relay |
 //!
-//! This file has the state of a solver, its current work and its purpose, and one portion of its work.
+//! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the work.
 
+mod both;
 mod chain;
 mod judge;
 mod passes;
 
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
-use crate::optimiser::joint::site::Cell;
+use crate::optimiser::joint::site::{Cell, Cells};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
-use chain::{Mark, SEGMENT, STAGES, SolverContext, Stage};
+use chain::{Mark, SEGMENT, STAGES, Stage};
 use core::task::Poll;
 
-pub use chain::Seat;
+use both::Both;
 
-#[derive(Clone, Copy, Debug, Default)]
+pub use chain::Seat;
+pub(super) use chain::SolverContext;
+
+#[derive(Clone, Copy, Debug)]
 struct ForwardPass {
     /// Number of relays that the forward pass has completed.
     done: u16,
@@ -43,6 +48,18 @@ struct ForwardPass {
     holds_back: bool,
 }
 
+impl ForwardPass {
+    const NONE: Self = Self {
+        done: 0,
+        from: Placement::on_line(0.0, 0.0),
+        old: Placement::on_line(0.0, 0.0),
+        penalty: 0.0,
+        end_m: 0.0,
+        holds_back: false,
+    };
+}
+
+#[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
     /// Begin the next initial chain, from which the search for the best chain continues.
@@ -92,14 +109,13 @@ impl Purpose {
     }
 }
 
-/// Joint solver of a chain of at most `RELAYS` relays. `SEGMENTS` is at least a tenth of that, since a segment has
-/// ten relays.
+/// Solver of a chain for one direction.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is told on its own, by another part of the work"
 )]
 #[derive(Clone, Debug)]
-pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
+struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     number: u8,
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
@@ -108,7 +124,7 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     /// stopped once it is predicted to end below this target.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
-    best_cells: [Cell; RELAYS],
+    best_cells: Cells<RELAYS>,
     /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for the best chain's
     /// highest target starts there, so that the improvement is not repeated. `None` if a repetition would give
     /// another chain.
@@ -140,53 +156,165 @@ pub struct Solver<const RELAYS: usize, const SEGMENTS: usize> {
     loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
-    cells: [Cell; RELAYS],
+    cells: Cells<RELAYS>,
 }
 
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
+    /// State before the first portion. All its bytes are 0, so it takes no flash.
+    const NEW: Self = Self {
+        number: 0,
+        start: Start::Arch {
+            aside: 0.0,
+            up: 0.0,
+        },
+        best: None,
+        highest: 0.0,
+        best_cells: Cells::NEW,
+        best_judged: None,
+        judged_at: None,
+        is_whole: false,
+        again: false,
+        ascent: Ascent::NONE,
+        work: Work::Begin,
+        pass: ForwardPass::NONE,
+        holds_back: false,
+        walled: false,
+        moving: 0,
+        moved: 0,
+        kept: Cell::NONE,
+        loaded_segment: None,
+        stages: [Stage::NONE; STAGES],
+        marks: [Mark::NONE; SEGMENTS],
+        cells: Cells::NEW,
+    };
+
+    fn step(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+    ) -> Poll<Result<f32, Infeasible>> {
+        match self.work {
+            Work::Begin => self.begin(chain),
+            Work::Seek(seek, purpose) => self.seek(chain, seek, purpose),
+            Work::Settle(sigma, purpose) => self.settle(chain, sigma, purpose),
+            Work::HoldBack(segment, place_m, seek, purpose) => {
+                self.try_hold_back(chain, segment, place_m, seek, purpose)
+            }
+            Work::Polish(sigma) => self.polish(chain, sigma),
+            Work::Back(segment) => {
+                self.back(chain, segment);
+                Poll::Pending
+            }
+            Work::Forward(share, sigma, kept) => {
+                self.forward(chain, share, sigma, kept);
+                Poll::Pending
+            }
+        }
+    }
+
+    fn restart(&mut self) {
+        self.pass = ForwardPass::NONE;
+    }
+
+    /// Stores the lateral offset and altitude `cell` of relay `index`. If a segment begins with this relay, it also
+    /// stores `x_m`, the x of the relay before it, m.
+    #[inline(never)] // called from several places
+    fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
+        if let Some(mark) = self.mark(index) {
+            mark.x_m = x_m;
+        }
+        self.cells.set(index, cell);
+    }
+
+    /// Returns the stored state of the segment that begins with relay `index`; `None` if none does.
+    fn mark(&mut self, index: u16) -> Option<&mut Mark> {
+        let at = usize::from(index).wrapping_sub(1);
+        self.marks
+            .get_mut(at / SEGMENT)
+            .filter(|_| at.is_multiple_of(SEGMENT))
+    }
+}
+
+/// Number of states for both directions: 0 without the features `altitude` and `reverse`.
+const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
+    1
+} else {
+    0
+};
+
+/// States of the two solvers, which share their memory.
+#[cfg_attr(
+    feature = "altitude",
+    expect(
+        clippy::large_enum_variant,
+        reason = "there is one of it, and nothing allocates"
+    )
+)]
+#[repr(u8)]
+#[derive(Clone, Debug)]
+enum Way<const RELAYS: usize, const SEGMENTS: usize> {
+    OneWay(OneWay<RELAYS, SEGMENTS>),
+    Both([Both<RELAYS, SEGMENTS>; BOTH]),
+}
+
+/// Joint solver of a chain of at most `RELAYS` relays, for one direction or both.
+///
+/// `SEGMENTS` is at least a tenth of `RELAYS`, since a segment has ten relays.
+#[derive(Clone, Debug)]
+pub struct Solver<const RELAYS: usize, const SEGMENTS: usize>(Way<RELAYS, SEGMENTS>);
+
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+    /// Solver before [`Solver::begin`].
+    pub(crate) const NEW: Self = Self(Way::OneWay(OneWay::NEW));
+
     /// Creates a joint solver. `None` in an interference field, for more than `RELAYS` relays, or without the feature
     /// `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
+        let mut solver = Self::NEW;
+        solver.begin(mission).then_some(solver)
+    }
+
+    /// Selects the directions of `mission`, in place. False if the chain cannot be solved.
+    #[inline(never)] // it may build the state on the stack first
+    pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
+        if mission.reverse() > 0.0 {
+            self.0 = Way::Both([const { Both::NEW }; BOTH]);
+        }
         let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
-        (fits && mission.interferer().is_some()).then(|| Self {
-            number: 0,
-            start: Start::Far,
-            best: None,
-            highest: f32::NEG_INFINITY,
-            best_cells: [Cell::default(); RELAYS],
-            best_judged: None,
-            judged_at: None,
-            is_whole: true,
-            again: false,
-            ascent: Ascent::new(1.0, 0.0, 0.0, 0.0),
-            work: Work::Begin,
-            pass: ForwardPass::default(),
-            holds_back: false,
-            walled: false,
-            moving: 0,
-            moved: 0,
-            kept: Cell::default(),
-            loaded_segment: None,
-            stages: [Stage::default(); STAGES],
-            marks: [Mark::default(); SEGMENTS],
-            cells: [Cell::default(); RELAYS],
-        })
+        fits && mission.interferer().is_some()
+    }
+
+    fn cells(&self) -> Option<&Cells<RELAYS>> {
+        match &self.0 {
+            Way::OneWay(solver) => Some(&solver.cells),
+            Way::Both(solver) => solver.first().map(|both| &both.interior.cells),
+        }
     }
 
     /// Returns the lateral offset and altitude of relay `index`, once the chain is solved. `seat` is that relay's
     /// profile.
     pub fn at(&self, index: u16, seat: Seat) -> CrossSection {
-        self.cell(index).place(seat.room)
+        let cell = self.cells().map(|cells| cells.get(index));
+        cell.unwrap_or_default().place(seat.room)
     }
 
-    #[inline(never)] // called from many places
-    fn cell(&self, index: u16) -> Cell {
-        let at = usize::from(index).wrapping_sub(1);
-        self.cells.get(at).copied().unwrap_or_default()
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
+    ///
+    /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used.
+    pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
+        let cells = self.cells();
+        cells.map_or(0.0, |cells| cells.end_m(mission, seat_of, index))
+    }
+
+    /// Returns true if some relays have to stay short of their farthest position to meet the target found.
+    pub const fn holds_back(&self) -> bool {
+        match &self.0 {
+            Way::OneWay(solver) => solver.holds_back,
+            Way::Both(_) => true,
+        }
     }
 
     /// Continues to solve the chain by one bounded step. A step takes ten relays of a pass that moves them, or twenty
-    /// relays of any other pass.
+    /// relays of any other pass. For both directions it takes two relays of Algorithm 1.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
@@ -207,53 +335,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             seat_of: &seat_of,
             gain: mission.relay_gain(mission.config().common.power_w),
         };
-        match self.work {
-            Work::Begin => self.begin(&chain),
-            Work::Seek(seek, purpose) => self.seek(&chain, seek, purpose),
-            Work::Settle(sigma, purpose) => self.settle(&chain, sigma, purpose),
-            Work::HoldBack(segment, place_m, seek, purpose) => {
-                self.try_hold_back(&chain, segment, place_m, seek, purpose)
-            }
-            Work::Polish(sigma) => self.polish(&chain, sigma),
-            Work::Back(segment) => {
-                self.back(&chain, segment);
-                Poll::Pending
-            }
-            Work::Forward(share, sigma, kept) => {
-                self.forward(&chain, share, sigma, kept);
-                Poll::Pending
-            }
+        match &mut self.0 {
+            Way::OneWay(solver) => solver.step(&chain),
+            Way::Both(solver) => match solver.first_mut() {
+                Some(solver) => solver.step(&chain),
+                None => Poll::Ready(Err(Infeasible)),
+            },
         }
-    }
-
-    fn restart(&mut self) {
-        self.pass = ForwardPass::default();
-    }
-
-    /// Stores the lateral offset and altitude `cell` of relay `index`. If a segment begins with this relay, it also
-    /// stores `x_m`, the x of the relay before it, m.
-    #[inline(never)] // called from several places
-    fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
-        if let Some(mark) = self.mark(index) {
-            mark.x_m = x_m;
-        }
-        let at = usize::from(index).wrapping_sub(1);
-        if let Some(kept) = self.cells.get_mut(at) {
-            *kept = cell;
-        }
-    }
-
-    /// Returns the stored state of the segment that begins with relay `index`; `None` if none does.
-    fn mark(&mut self, index: u16) -> Option<&mut Mark> {
-        let at = usize::from(index).wrapping_sub(1);
-        self.marks
-            .get_mut(at / SEGMENT)
-            .filter(|_| at.is_multiple_of(SEGMENT))
-    }
-
-    /// Returns true if some relays have to stay short of their farthest position to meet the target found.
-    pub const fn holds_back(&self) -> bool {
-        self.holds_back
     }
 }
 
@@ -269,7 +357,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 mod tests {
     use core::task::Poll;
 
-    use super::{Seat, Solver};
+    use super::{Seat, Solver, Way};
     use crate::channel::{AirGround, Channel};
     use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
@@ -354,7 +442,7 @@ mod tests {
         let mut solver = Solver::<50, 5>::new(mission).expect("it fits");
         let mut portions = 1;
         let target = loop {
-            if once_more {
+            if once_more && let Way::OneWay(solver) = &mut solver.0 {
                 solver.best_judged = None;
             }
             if let Poll::Ready(target) = solver.step(mission, seat) {

@@ -4,19 +4,19 @@
 //! and whether they have to hold back.
 
 use super::chain::{SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of};
-use super::{ForwardPass, Purpose, Solver, Work};
+use super::{ForwardPass, OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::AscentStep;
 use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
-use crate::optimiser::joint::site::{Cell, Room, Site};
+use crate::optimiser::joint::site::{Cell, Cells, Room, Site};
 use crate::optimiser::joint::starts::Start;
 use crate::optimiser::spacing::{Hop, RequiredPosition};
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use core::task::Poll;
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     pub(super) fn look_back(&mut self, mission: &Mission) -> Work {
         self.ascent.look_back();
         Work::Back(last_of(mission))
@@ -38,7 +38,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let mut from = before;
         for (k, index) in relays_of(segment, relays) {
             let room = (chain.seat_of)(index).room;
-            let wanted = self.cell(index).place(room);
+            let wanted = self.cells.get(index).place(room);
             let to = self
                 .link(chain, index, from, room)
                 .at(target, from.x_m, wanted)?;
@@ -106,7 +106,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             .marks
             .get(usize::from(segment))
             .map_or(0.0, |mark| mark.x_m);
-        self.at(index, (chain.seat_of)(index)).at(x_m)
+        let room = (chain.seat_of)(index).room;
+        self.cells.get(index).place(room).at(x_m)
     }
 
     /// Runs the forward pass through one more segment, or first computes the relays' moves there. The pass tries the
@@ -166,7 +167,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             let Seat { room, .. } = (chain.seat_of)(index);
             let Stage { x_m, policy } = *self.stages.get(k)?;
             let policy = policy.policy();
-            let nominal = self.cell(index).place(room).at(x_m);
+            let nominal = self.cells.get(index).place(room).at(x_m);
             let change: Triple = minus(triple(from), triple(old));
             let link = self.link(chain, index, from, room);
             let wanted = link.wanted(target, from, nominal, &policy, share, change);
@@ -194,7 +195,7 @@ const PLAIN: u16 = 20;
 /// penalty is for relays too near the interferer.
 const FORGIVEN: f32 = 5e-5;
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Continues a pass that computes the x of the relays for the target `sigma`, in ln(SIR). Lateral offsets and
     /// altitudes stay. Stores the chain if `kept`. Ready with the spare length at Rx, m, or with `None` if a hop
     /// cannot meet the target.
@@ -208,7 +209,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let target = libm::expf(sigma);
         let relays = chain.mission.relays();
         if purpose.is_sweep() && self.pass.done == 0 {
-            self.pass.end_m = self.end_m(chain.mission, chain.seat_of, 0);
+            self.pass.end_m = self.cells.end_m(chain.mission, chain.seat_of, 0);
         }
         for _ in 0..PLAIN {
             let index = self.pass.done + 1;
@@ -230,8 +231,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
             let wanted = self.shaped(chain, index, room, target, purpose);
             let from = self.pass.from;
             let place = if purpose.is_sweep() {
-                let step = self.least_step(chain.mission, chain.seat_of, index);
-                self.pass.end_m = Self::end_after(chain.mission, self.pass.end_m, step);
+                let step = self.cells.least_step(chain.mission, chain.seat_of, index);
+                self.pass.end_m = end_after(chain.mission, self.pass.end_m, step);
                 if let Some(mark) = self.mark(index) {
                     // The slope is unused between two backward passes, so it stores x.
                     mark.slope = [from.x_m, 0.0, 0.0];
@@ -277,7 +278,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
+impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Returns the hop to relay `index` of the current chain, computed as the relay does from its messages. The hop
     /// ends at x = `end_m`, m, at most.
     pub(super) fn hop(
@@ -286,7 +287,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         index: u16,
         end_m: f32,
     ) -> Hop {
-        let at = |index| self.at(index, (chain.seat_of)(index));
+        let at = |index| (self.cells.get(index)).place((chain.seat_of)(index).room);
         let before = if index > 1 {
             at(index - 1)
         } else {
@@ -304,36 +305,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         .ending(end_m)
     }
 
-    /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
-    pub(super) fn least_step(
-        &self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
-        index: u16,
-    ) -> f32 {
-        if index <= 1 {
-            return 0.0;
-        }
-        let at = |index| self.at(index, seat_of(index));
-        let across = at(index).apart_squared(at(index - 1));
-        mission.step_with_room(across)
-    }
-
-    /// Returns the largest x of relay `index`, m, with enough space for the separation of later relays.
-    ///
-    /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used.
-    pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
-        let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
-        let first = mission.config().distance_m - steps.clone().sum::<f32>();
-        steps
-            .take(index.into())
-            .fold(first, |end_m, step| Self::end_after(mission, end_m, step))
-    }
-
-    pub(super) fn end_after(mission: &Mission, end_m: f32, step: f32) -> f32 {
-        (end_m + step).min(mission.config().distance_m)
-    }
-
     /// Returns the x, m, that the relay before `segment` must take to meet the target. The segment's last relay is at
     /// x = `place_m`.
     ///
@@ -347,15 +318,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     ) -> Option<f32> {
         let relays = chain.mission.relays();
         let [mut x_m, ..] = self.marks.get(usize::from(segment))?.slope;
-        let mut end_m = self.end_m(
+        let mut end_m = self.cells.end_m(
             chain.mission,
             chain.seat_of,
             u16::from(segment) * SEGMENT_RELAYS,
         );
         let mut before = [(0.0, 0.0); SEGMENT];
         for (k, index) in relays_of(segment, relays) {
-            let step = self.least_step(chain.mission, chain.seat_of, index);
-            end_m = Self::end_after(chain.mission, end_m, step);
+            let step = self.cells.least_step(chain.mission, chain.seat_of, index);
+            end_m = end_after(chain.mission, end_m, step);
             *before.get_mut(k)? = (x_m, end_m);
             x_m = self.hop(chain, index, end_m).outermost(target, x_m)?;
         }
@@ -371,4 +342,39 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
         Some(place_m)
     }
+}
+
+impl<const RELAYS: usize> Cells<RELAYS> {
+    /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
+    pub(super) fn least_step(
+        &self,
+        mission: &Mission,
+        seat_of: &impl Fn(u16) -> Seat,
+        index: u16,
+    ) -> f32 {
+        if index <= 1 {
+            return 0.0;
+        }
+        let at = |index| self.get(index).place(seat_of(index).room);
+        let across = at(index).apart_squared(at(index - 1));
+        mission.step_with_room(across)
+    }
+
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
+    pub(super) fn end_m(
+        &self,
+        mission: &Mission,
+        seat_of: &impl Fn(u16) -> Seat,
+        index: u16,
+    ) -> f32 {
+        let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
+        let first = mission.config().distance_m - steps.clone().sum::<f32>();
+        steps
+            .take(index.into())
+            .fold(first, |end_m, step| end_after(mission, end_m, step))
+    }
+}
+
+pub(super) fn end_after(mission: &Mission, end_m: f32, step: f32) -> f32 {
+    (end_m + step).min(mission.config().distance_m)
 }

@@ -1,0 +1,241 @@
+//! Logarithms of both SIRs of a hop, with their derivatives.
+//!
+//! Lengths are in units of D. With v = p' - p the hop, l = |v|^2, and w the position of a receiver relative to the interferer,
+//! s = |w|^2 and nu the noise as in [`spacing`](crate::optimiser::spacing)
+//!
+//! ```text
+//! ln F = a - ln l + ln q(p'),    ln (B / r) = a' - ln l + ln q(p),    ln q = ln s - ln(1 + nu s)
+//! ```
+//!
+//! where ln q is 0 at Rx and at Tx. With q1 = 1 / (s (1 + nu s)) and q2 = (nu / (1 + nu s))^2 - 1 / s^2, the derivatives of ln q
+//! by s, the gradients and second derivatives are
+//!
+//! ```text
+//! -ln l:  -2 v / l,    -(2 / l) I + (4 / l^2) v v'        ln q:  2 q1 w,    2 q1 I + 4 q2 w w'
+//! ```
+//!
+//! The first has a convex direction, along the hop, and the second all across the direction to the interferer. In *convex* mode
+//! those are left out, so that the matrix of [`newton`](super::newton) is positive definite.
+
+use super::super::hop::{Triple, minus};
+use super::super::solver::{Seat, SolverContext};
+use crate::sir::{Sender, transmitter_gain};
+
+/// Square of a length below which a hop counts as longer, in units of D^2. Relays may share a position.
+const SHORTEST: f32 = 1e-8;
+
+/// Symmetric matrix: xx, xy, xh, yy, yh, hh.
+pub(super) type Symmetric = [f32; 6];
+
+#[inline(never)]
+pub(super) fn dot([a, b, c]: &Triple, [x, y, z]: &Triple) -> f32 {
+    a * x + b * y + c * z
+}
+
+/// Adds `weight` v v' to `to`.
+#[inline(never)]
+pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: &Triple, weight: f32) {
+    let (a, b) = (weight * x, weight * y);
+    let [xx, xy, xh, yy, yh, hh] = to;
+    *xx += a * x;
+    *xy += a * y;
+    *xh += a * h;
+    *yy += b * y;
+    *yh += b * h;
+    *hh += weight * h * h;
+}
+
+/// Adds `weight` v to `to`.
+#[inline(never)]
+pub(super) fn add_scaled([x, y, h]: &mut Triple, [a, b, c]: &Triple, weight: f32) {
+    *x += weight * a;
+    *y += weight * b;
+    *h += weight * c;
+}
+
+fn add_to_diagonal([xx, _, _, yy, _, hh]: &mut Symmetric, value: f32) {
+    *xx += value;
+    *yy += value;
+    *hh += value;
+}
+
+/// Logarithms of the gains of a chain, for lengths in units of D.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gains {
+    /// Position of the interferer.
+    source: Triple,
+    /// nu, for squared lengths in units of D^2.
+    noise: f32,
+    common_w: f32,
+    /// ln of the gains from a relay of the common power to a relay, Rx and Tx.
+    relay: f32,
+    to_rx: f32,
+    to_tx: f32,
+    /// ln of the gains from Tx and from Rx.
+    from_tx: f32,
+    from_rx: f32,
+    /// ln r.
+    reverse: f32,
+}
+
+impl Gains {
+    pub(super) const NONE: Self = Self {
+        source: [0.0; 3],
+        noise: 0.0,
+        common_w: 0.0,
+        relay: 0.0,
+        to_rx: 0.0,
+        to_tx: 0.0,
+        from_tx: 0.0,
+        from_rx: 0.0,
+        reverse: 0.0,
+    };
+
+    pub(super) fn new(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Self {
+        let (mission, interferer) = (chain.mission, chain.interferer);
+        let d = mission.config().distance_m;
+        let common_w = mission.config().common.power_w;
+        let on_ground = |gain: f32| libm::logf(gain / d / d);
+        let from_rx = Sender::receiver(mission).gain.value();
+        Self {
+            source: [interferer.x_m / d, interferer.y_m / d, 0.0],
+            noise: mission.noise_at_a_metre() * d * d,
+            common_w,
+            relay: libm::logf(mission.relay_gain(common_w).value()),
+            to_rx: on_ground(mission.receiver_gain(common_w)),
+            to_tx: on_ground(transmitter_gain(mission, common_w)),
+            from_tx: libm::logf(mission.tx_gain().value()),
+            from_rx: libm::logf(from_rx),
+            reverse: libm::logf(mission.reverse()),
+        }
+    }
+
+    /// Returns ln of the gains a and a' of hop `k`, 1..=N + 1, of `relays`.
+    fn of(&self, k: u16, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> [f32; 2] {
+        let relays = chain.mission.relays();
+        let power = |index: u16| {
+            let power_w = (chain.seat_of)(index).power_w;
+            if power_w.to_bits() == self.common_w.to_bits() {
+                0.0
+            } else {
+                libm::logf(power_w / self.common_w)
+            }
+        };
+        let there = match k {
+            1 => self.from_tx,
+            _ if k > relays => self.to_rx + power(k - 1),
+            _ => self.relay + power(k - 1),
+        };
+        let back = match k {
+            _ if k > relays => self.from_rx,
+            1 => self.to_tx + power(k),
+            _ => self.relay + power(k),
+        };
+        [there, back - self.reverse]
+    }
+
+    /// Returns ln q at `at`.
+    pub(super) fn quiet(&self, at: Triple) -> f32 {
+        let w = minus(at, self.source);
+        let s = dot(&w, &w) + SHORTEST * SHORTEST;
+        libm::logf(s / (1.0 + self.noise * s))
+    }
+
+    /// Returns ln F and ln (B / r) of hop `k` from `from` to `to`, with ln q at both.
+    pub(super) fn levels(
+        &self,
+        k: u16,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        [from, to]: [Triple; 2],
+        [quiet_from, quiet_to]: [f32; 2],
+    ) -> [f32; 2] {
+        let v = minus(to, from);
+        let length = libm::logf(dot(&v, &v) + SHORTEST);
+        let [there, back] = self.of(k, chain);
+        let there = there
+            + if k > chain.mission.relays() {
+                0.0
+            } else {
+                quiet_to
+            };
+        let back = back + if k > 1 { quiet_from } else { 0.0 };
+        [there - length, back - length]
+    }
+
+    /// Returns the derivatives of both SIR levels of hop `k`. The second ones are summed by the `weights`.
+    pub(super) fn derivatives(
+        &self,
+        k: u16,
+        relays: u16,
+        [from, to]: [Triple; 2],
+        weights: [f32; 2],
+        convex: bool,
+    ) -> Derivatives {
+        let v = minus(to, from);
+        let l = dot(&v, &v) + SHORTEST;
+        let slope = v.map(|x| -2.0 * x / l);
+        let [there, back] = weights;
+        let flat = 2.0 * (there + back) / l;
+        let mut bend = [0.0; 6];
+        add_square(
+            &mut bend,
+            &v,
+            if convex { -flat / l } else { -2.0 * flat / l },
+        );
+        add_to_diagonal(&mut bend, flat);
+        let mut hop = Derivatives {
+            by_from: [slope.map(|x| -x); 2],
+            by_to: [slope; 2],
+            bend_from: bend,
+            bend_to: bend,
+            bend,
+        };
+        let [by_to, _] = &mut hop.by_to;
+        if k <= relays {
+            self.add_quiet(to, there, convex, by_to, &mut hop.bend_to);
+        }
+        let [_, by_from] = &mut hop.by_from;
+        if k > 1 {
+            self.add_quiet(from, back, convex, by_from, &mut hop.bend_from);
+        }
+        hop
+    }
+
+    /// Adds the derivatives of ln q at `at`; the second ones are multiplied by -`weight`.
+    fn add_quiet(
+        &self,
+        at: Triple,
+        weight: f32,
+        convex: bool,
+        slope: &mut Triple,
+        bend: &mut Symmetric,
+    ) {
+        let w = minus(at, self.source);
+        let s = dot(&w, &w) + SHORTEST * SHORTEST;
+        let inverse = 1.0 / (1.0 + self.noise * s);
+        let (first, second) = (
+            inverse / s,
+            (self.noise * inverse) * (self.noise * inverse) - 1.0 / (s * s),
+        );
+        add_scaled(slope, &w, 2.0 * first);
+        if convex {
+            let radial = -weight * (2.0 * first + 4.0 * second * s);
+            add_square(bend, &w, radial.max(0.0) / s);
+        } else {
+            add_square(bend, &w, -4.0 * weight * second);
+            add_to_diagonal(bend, -2.0 * weight * first);
+        }
+    }
+}
+
+/// Derivatives of ln F and ln (B / r) of a hop by the positions of its ends. The second ones are negative, and
+/// summed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Derivatives {
+    pub(super) by_from: [Triple; 2],
+    pub(super) by_to: [Triple; 2],
+    pub(super) bend_from: Symmetric,
+    pub(super) bend_to: Symmetric,
+    /// Part of both by the length, which is the negative of the mixed ones by both ends.
+    pub(super) bend: Symmetric,
+}

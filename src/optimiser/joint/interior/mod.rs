@@ -1,0 +1,684 @@
+//! Interior-point method for the positions that maximise the worst SIR of both directions.
+//!
+//! Differential dynamic programming follows one reach per hop. With a way back a hop has two, and in a sixth of the chains some
+//! hop is limited by both at once, where neither has a derivative. So all positions move together here. With the levels
+//! c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the method maximises
+//!
+//! ```text
+//! merit = T + mu (sum of ln(c_i - T) + sum of ln(distances to the box)),    sum of mu / (c_i - T) = 1
+//! ```
+//!
+//! over the positions, for a falling mu; the second equation is the maximum over T, which is below every level by at least mu. At
+//! the maximum for one mu, a concave problem of m levels has its optimum within m mu. Each iteration is a primal-dual Newton step
+//! (see `newton`): the multipliers lambda_i follow their own linear equation instead of mu / (c_i - T), and remain within a factor
+//! of that. A step ends before the box and is shortened until the merit does not fall.
+//!
+//! | file | content |
+//! | --- | --- |
+//! | `hop` | levels of a hop and their derivatives |
+//! | `newton` | block tridiagonal system of a step |
+//!
+//! This file has the state and one portion of the work. Lengths are in units of D; across the line the positions are stored as
+//! those of the other solver, six bytes each. The memory of a segment of ten relays has its front during the elimination, and
+//! then its steps.
+
+mod hop;
+mod newton;
+
+use super::hop::{Triple, minus};
+use super::outlook::{upper_half, widened};
+use super::site::{Cell, Cells};
+use super::solver::{Seat, SolverContext};
+use crate::place::{CrossSection, Placement};
+use core::task::Poll;
+use hop::{Derivatives, Gains, add_scaled, dot};
+use newton::{Factor, Front, Sums, Weights};
+
+/// First mu, from a distant and from a close start, and last mu; times the number of levels.
+const FIRST_MU: f32 = 0.03;
+const CLOSE_MU: f32 = 3e-3;
+const LAST_MU: f32 = 1e-4;
+
+/// Factor from one mu to the next.
+const LESS: f32 = 0.3;
+
+/// Gain of merit, in units of m mu, below which mu falls. First after a step of more than half, then after any step.
+const SETTLED: f32 = 0.1;
+const STUCK: f32 = 1e-3;
+
+const ITERATIONS: u8 = 60;
+
+/// Fraction of the way to the box that a step may take, and the factor between tries.
+const NEAR_BOX: f32 = 0.98;
+const SHORTER: f32 = 0.4;
+const TRIES: u8 = 6;
+
+/// Factor between a multiplier and mu / s.
+const APART: f32 = 5.0;
+
+/// Steps of T in a portion and altogether, and the relative error of the sum at which they end.
+const STEPS: u8 = 4;
+const TARGETS: u8 = 12;
+const EXACT: f32 = 5e-4;
+
+/// Relays of a segment, of its first part, and of the second one.
+const AT_ONCE: u16 = 10;
+const FIRST: usize = 6;
+const SECOND: usize = 4;
+const FIRST_RELAYS: u16 = 6;
+
+/// Levels of a hop, and their multipliers with three digits.
+#[derive(Clone, Copy, Debug)]
+struct Hop {
+    level: [f32; 2],
+    lambda: [u16; 2],
+}
+
+impl Hop {
+    const NONE: Self = Self {
+        level: [0.0; 2],
+        lambda: [0; 2],
+    };
+}
+
+/// x of a relay, and the hop to it.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    x: f32,
+    hop: Hop,
+}
+
+/// Step of a relay, with three digits.
+type Step = [u16; 3];
+
+#[derive(Clone, Copy, Debug)]
+enum Segment {
+    /// Rows of the segment's first relay.
+    Front(Front),
+    /// Steps of its relays.
+    Steps([Step; FIRST], [Step; SECOND]),
+}
+
+/// Position of a node, and the corners of its box.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    at: Triple,
+    low: Triple,
+    high: Triple,
+}
+
+impl Spot {
+    const fn fixed(at: Triple) -> Self {
+        Self {
+            at,
+            low: at,
+            high: at,
+        }
+    }
+
+    /// Returns the distances to the lower corner.
+    fn below(&self) -> Triple {
+        minus(self.at, self.low)
+    }
+
+    /// Returns the distances to the upper corner.
+    fn above(&self) -> Triple {
+        minus(self.high, self.at)
+    }
+
+    /// Moves the position into the box, with a `margin` as a fraction of its width.
+    fn enclose(&mut self, margin: f32) {
+        let limits = self.low.iter().zip(&self.high);
+        for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
+            let margin = margin * (high - low);
+            *cell = cell.max(low + margin).min(high - margin);
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Work {
+    /// Levels of this hop and the next ones, after a fraction of the step.
+    Levels(u16),
+    /// T of these levels, after some steps.
+    Target(u8),
+    /// Merit, from this hop on.
+    Merit(u16),
+    /// Positions and multipliers, from this hop on.
+    Accept(u16),
+    /// Elimination of a segment.
+    Eliminate(u16),
+    /// Factors of one part of a segment, and then its steps. `true` for the second part.
+    Substitute(u16, bool),
+}
+
+/// Relays, whose positions are the variables, and the current step.
+#[derive(Clone, Debug)]
+pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
+    gains: Gains,
+    /// Lateral offsets and altitudes of the relays.
+    pub(super) cells: Cells<RELAYS>,
+    nodes: [Node; RELAYS],
+    last: Hop,
+    segments: [Segment; SEGMENTS],
+    /// Steps of the second part of the segment that is substituted, and that of the relay after the current one.
+    second: [Step; SECOND],
+    ahead: Triple,
+    work: Work,
+    mu: f32,
+    target: f32,
+    least: f32,
+    /// Merit of the positions, and the one that is summed.
+    merit: f32,
+    sum: f32,
+    /// Fraction of the step, 0 for the positions themselves.
+    share: f32,
+    sums: Sums,
+    by_target: f32,
+    /// Multipliers mu / s in place of the stored ones.
+    resets: bool,
+    convex: bool,
+    tries: u8,
+    iterations: u8,
+}
+
+impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
+    pub(super) const NEW: Self = Self {
+        gains: Gains::NONE,
+        cells: Cells::NEW,
+        nodes: [Node {
+            x: 0.0,
+            hop: Hop::NONE,
+        }; RELAYS],
+        last: Hop::NONE,
+        segments: [Segment::Front(Front::NONE); SEGMENTS],
+        second: [[0; 3]; SECOND],
+        ahead: [0.0; 3],
+        work: Work::Levels(0),
+        mu: 0.0,
+        target: 0.0,
+        least: 0.0,
+        merit: 0.0,
+        sum: 0.0,
+        share: 0.0,
+        sums: Sums::NONE,
+        by_target: 0.0,
+        resets: false,
+        convex: false,
+        tries: 0,
+        iterations: 0,
+    };
+
+    /// Starts from the positions given by [`Interior::put`], which may be `close` to the result.
+    pub(super) fn start(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        is_close: bool,
+    ) {
+        self.gains = Gains::new(chain);
+        self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
+        self.iterations = 0;
+        self.convex = false;
+        self.look(true);
+    }
+
+    /// Sets the position of relay `index`, with a margin to the box as a fraction of its width.
+    pub(super) fn put(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+        place: Placement,
+        margin: f32,
+    ) {
+        let mut spot = self.spot(chain, index);
+        let unit = 1.0 / chain.distance_m();
+        spot.at = [place.x_m, place.y_m, place.altitude_m].map(|m| m * unit);
+        spot.enclose(margin);
+        self.settle(chain, index, spot.at);
+    }
+
+    /// Stores the position of relay `index`.
+    #[inline(never)]
+    fn settle(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+        [x, y, h]: Triple,
+    ) {
+        let distance_m = chain.distance_m();
+        let at = CrossSection {
+            y_m: y * distance_m,
+            altitude_m: h * distance_m,
+        };
+        (self.cells).set(index, Cell::of(at, (chain.seat_of)(index).room));
+        if let Some(node) = self.node(index) {
+            node.x = x;
+        }
+    }
+
+    /// Stores two lengths for relay `index` while no step is computed.
+    pub(super) fn note(&mut self, index: u16, lengths_m: [f32; 2]) {
+        if let Some(node) = self.node(index) {
+            node.hop.level = lengths_m;
+        }
+    }
+
+    /// Returns the two lengths stored for relay `index`; 0 for Tx.
+    pub(super) fn noted(&self, index: u16) -> [f32; 2] {
+        let node = self.nodes.get(usize::from(index).wrapping_sub(1));
+        node.map_or([0.0; 2], |node| node.hop.level)
+    }
+
+    fn node(&mut self, index: u16) -> Option<&mut Node> {
+        self.nodes.get_mut(usize::from(index).wrapping_sub(1))
+    }
+
+    /// Returns the position and the box of node `index`, 0 for Tx and N + 1 for Rx.
+    #[inline(never)]
+    fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
+        if index > chain.mission.relays() {
+            return Spot::fixed([1.0, 0.0, 0.0]);
+        }
+        let Some(node) = self.nodes.get(usize::from(index).wrapping_sub(1)) else {
+            return Spot::fixed([0.0; 3]);
+        };
+        let unit = 1.0 / chain.distance_m();
+        let room = (chain.seat_of)(index).room;
+        let at = self.cells.get(index).place(room);
+        let (lateral, band) = (room.lateral, room.band);
+        Spot {
+            at: [node.x, at.y_m * unit, at.altitude_m * unit],
+            low: [0.0, lateral.least_m * unit, band.least_m * unit],
+            high: [1.0, lateral.most_m * unit, band.most_m * unit],
+        }
+    }
+
+    /// Returns the step of relay `index`.
+    fn step_of(&self, index: u16) -> Triple {
+        let at = usize::from(index).wrapping_sub(1);
+        let (segment, k) = (at / (FIRST + SECOND), at % (FIRST + SECOND));
+        let step = match self.segments.get(segment) {
+            Some(Segment::Steps(first, second)) => {
+                first.get(k).or_else(|| second.get(k.wrapping_sub(FIRST)))
+            }
+            _ => None,
+        };
+        step.map_or([0.0; 3], |step| step.map(widened))
+    }
+
+    /// Returns the position of node `index` after the fraction of its step.
+    #[inline(never)]
+    fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
+        let mut spot = self.spot(chain, index);
+        if self.share > 0.0 {
+            add_scaled(&mut spot.at, &self.step_of(index), self.share);
+            spot.enclose(0.0);
+        }
+        spot
+    }
+
+    /// Returns hop `k`, 1..=N + 1.
+    #[inline(never)]
+    fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
+        match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
+            Some(node) if k <= relays => &mut node.hop,
+            _ => &mut self.last,
+        }
+    }
+
+    /// Computes the levels of the positions themselves, with new multipliers or the stored ones.
+    const fn look(&mut self, resets: bool) {
+        self.share = 0.0;
+        self.resets = resets;
+        self.try_step();
+    }
+
+    const fn try_step(&mut self) {
+        self.least = f32::INFINITY;
+        self.sum = 0.0;
+        self.work = Work::Levels(1);
+    }
+
+    /// Processes one portion of the work; ready with T, the logarithm of an SIR, at the end.
+    pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+        let relays = chain.mission.relays();
+        let done = match self.work {
+            Work::Levels(k) => {
+                self.levels(chain, k);
+                Some(())
+            }
+            Work::Target(steps) => {
+                self.approach(relays, steps);
+                Some(())
+            }
+            Work::Merit(k) => {
+                let end = k.saturating_add(2 * AT_ONCE).min(relays + 2);
+                for k in k..end {
+                    let target = self.target;
+                    let [a, b] = self.hop(relays, k).level;
+                    self.sum += libm::logf((a - target) * (b - target));
+                }
+                self.work = Work::Merit(end);
+                if end > relays + 1 {
+                    return self.judge(chain);
+                }
+                Some(())
+            }
+            Work::Accept(k) => {
+                let end = k.saturating_add(2 * AT_ONCE).min(relays + 2);
+                for k in k..end {
+                    self.accept(chain, k);
+                }
+                self.work = Work::Accept(end);
+                if end > relays + 1 {
+                    return self.continue_with(chain);
+                }
+                Some(())
+            }
+            Work::Eliminate(segment) => self.forward(chain, segment).or_else(|| {
+                self.work = Work::Eliminate(0);
+                (!core::mem::replace(&mut self.convex, true)).then_some(())
+            }),
+            Work::Substitute(segment, is_second) => self.substitute(chain, segment, is_second),
+        };
+        match done {
+            Some(()) => Poll::Pending,
+            None => Poll::Ready(self.target),
+        }
+    }
+
+    /// Computes levels from hop `k` on, and the logarithms of the distances to the box.
+    fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
+        let relays = chain.mission.relays();
+        let end = k.saturating_add(AT_ONCE).min(relays + 2);
+        let mut from = self.moved(chain, k - 1).at;
+        let mut quiet = self.gains.quiet(from);
+        for k in k..end {
+            let spot = self.moved(chain, k);
+            let to = spot.at;
+            let ahead = self.gains.quiet(to);
+            let both = self.gains.levels(k, chain, [from, to], [quiet, ahead]);
+            let [a, b] = both;
+            self.least = self.least.min(a).min(b);
+            self.hop(relays, k).level = both;
+            let mut inside = 1.0;
+            for (a, b) in spot.below().iter().zip(&spot.above()) {
+                if *a > 0.0 && *b > 0.0 {
+                    inside *= a * b;
+                }
+            }
+            self.sum += libm::logf(inside);
+            (from, quiet) = (to, ahead);
+        }
+        self.work = if end > relays + 1 {
+            self.target = self.least - self.mu;
+            Work::Target(0)
+        } else {
+            Work::Levels(end)
+        };
+    }
+
+    /// Computes T from its equation, by Newton's method for the inverse of the sum.
+    ///
+    /// That inverse is concave, and T starts beyond the solution, so T falls to it.
+    fn approach(&mut self, relays: u16, steps: u8) {
+        let end = steps + STEPS;
+        self.work = Work::Target(end);
+        for step in steps..end {
+            let (mut sum, mut slope) = (0.0, 0.0);
+            for k in 1..relays + 2 {
+                let target = self.target;
+                let [a, b] = self.hop(relays, k).level;
+                let (a, b) = (1.0 / (a - target), 1.0 / (b - target));
+                sum += a + b;
+                slope += a * a + b * b;
+            }
+            let (sum, slope) = (self.mu * sum, self.mu * slope);
+            self.target -= (sum * sum - sum) / slope;
+            if sum <= 1.0 + EXACT || step >= TARGETS {
+                self.target = self.target.min(self.least - 0.5 * self.mu);
+                self.work = Work::Merit(1);
+                return;
+            }
+        }
+    }
+
+    /// Returns the slacks and multipliers of hop `k`.
+    fn weights(&mut self, relays: u16, k: u16) -> Weights {
+        let (target, mu) = (self.target, self.mu);
+        let Hop { level, lambda } = *self.hop(relays, k);
+        Weights {
+            lambda: lambda.map(widened),
+            slack: level.map(|level| level - target),
+            mu,
+        }
+    }
+
+    /// Accepts or refuses a step.
+    fn judge(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+        if !(self.share > 0.0) || self.summed() >= self.merit {
+            self.work = Work::Accept(1);
+            return Poll::Pending;
+        }
+        self.tries += 1;
+        self.share *= SHORTER;
+        if self.tries < TRIES {
+            self.try_step();
+            return Poll::Pending;
+        }
+        // No step is better: once more without negative curvature, then with a smaller mu.
+        let was_convex = self.convex;
+        self.convex = true;
+        if was_convex {
+            return self.lower(chain, true);
+        }
+        self.look(true);
+        Poll::Pending
+    }
+
+    /// Returns the merit that was summed.
+    fn summed(&self) -> f32 {
+        self.target + self.mu * self.sum
+    }
+
+    /// Stores the new position of relay `k`, and keeps the multipliers of the hop to it close to mu / s.
+    fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
+        let relays = chain.mission.relays();
+        if self.share > 0.0 && k <= relays {
+            let spot = self.moved(chain, k);
+            self.settle(chain, k, spot.at);
+        }
+        let central = self.weights(relays, k).central();
+        let resets = self.resets;
+        let hop = self.hop(relays, k);
+        for (lambda, central) in hop.lambda.iter_mut().zip(central) {
+            *lambda = upper_half(if resets {
+                central
+            } else {
+                widened(*lambda).max(central / APART).min(central * APART)
+            });
+        }
+    }
+
+    /// Begins the next step from the accepted positions, or lowers mu.
+    fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+        let merit = self.summed();
+        let gain = (merit - self.merit) / (self.mu * levels(chain));
+        let is_step = self.share > 0.0;
+        self.convex &= !is_step;
+        self.resets = false;
+        if is_step && (self.share > 0.5 && gain < SETTLED || gain < STUCK) {
+            return self.lower(chain, false);
+        }
+        self.merit = merit;
+        if self.iterations >= ITERATIONS {
+            return Poll::Ready(self.target);
+        }
+        self.iterations += 1;
+        self.work = Work::Eliminate(0);
+        Poll::Pending
+    }
+
+    /// Lowers mu, or ends. `resets` is for multipliers that no step was found with.
+    fn lower(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        resets: bool,
+    ) -> Poll<f32> {
+        let whole = self.mu * levels(chain);
+        if whole <= 1.001 * LAST_MU {
+            return Poll::Ready(self.target);
+        }
+        self.mu *= LESS.max(LAST_MU / whole);
+        self.convex = false;
+        self.look(resets);
+        Poll::Pending
+    }
+
+    /// Returns the derivatives and weights of hop `k` between `ends`.
+    #[inline(never)]
+    fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
+        let weights = self.weights(relays, k);
+        let hop = (self.gains).derivatives(k, relays, ends, weights.lambda, self.convex);
+        (hop, weights)
+    }
+
+    /// Eliminates the first `count` relays of `segment`. Returns the rows of the relay after them, and keeps the last
+    /// factors.
+    #[inline(never)]
+    fn eliminate(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u16,
+        count: u16,
+        factors: &mut [Factor; FIRST],
+    ) -> Option<Front> {
+        let first = segment * AT_ONCE;
+        // The first segment begins with Tx.
+        let (from, mut front) = match self.segments.get(usize::from(segment)) {
+            Some(Segment::Front(front)) if segment > 0 => (first + 1, *front),
+            _ => (0, Front::NONE),
+        };
+        let relays = chain.mission.relays();
+        let mut at = self.spot(chain, from).at;
+        let after = first + count + 1;
+        for index in from..after {
+            let spot = self.spot(chain, index + 1);
+            let (hop, weights) = self.derivatives(relays, index + 1, [at, spot.at]);
+            at = spot.at;
+            let (convex, sums) = (self.convex, &mut self.sums);
+            let factor = front.pass(index > 0, &hop, &weights, &spot, convex, sums)?;
+            // Tx has no factors, which are kept nowhere.
+            let k = usize::from(index.wrapping_sub(first + 1)) % FIRST;
+            if let Some(kept) = factors.get_mut(k) {
+                *kept = factor;
+            }
+        }
+        Some(front)
+    }
+
+    /// Eliminates the relays of `segment`, and then begins the next segment or the substitution.
+    fn forward(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u16,
+    ) -> Option<()> {
+        let relays = chain.mission.relays();
+        if segment == 0 {
+            self.sums = Sums::NONE;
+        }
+        let count = AT_ONCE.min(relays - segment * AT_ONCE);
+        let front = self.eliminate(chain, segment, count, &mut [Factor::NONE; FIRST])?;
+        let next = segment + 1;
+        self.work = if let Some(segment) = self.segments.get_mut(usize::from(next))
+            && next * AT_ONCE < relays
+        {
+            *segment = Segment::Front(front);
+            Work::Eliminate(next)
+        } else {
+            self.by_target = self.sums.by_target()?;
+            (self.share, self.tries, self.ahead) = (1.0, 0, [0.0; 3]);
+            Work::Substitute(segment, count > FIRST_RELAYS)
+        };
+        Some(())
+    }
+
+    /// Computes the steps of one part of `segment` from its last relay to its first. `None` if one is not finite.
+    fn substitute(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        segment: u16,
+        is_second: bool,
+    ) -> Option<()> {
+        let first = segment * AT_ONCE;
+        let middle = first + FIRST_RELAYS;
+        let (begin, end) = if is_second {
+            (middle, first + AT_ONCE)
+        } else {
+            (first, middle)
+        };
+        let end = end.min(chain.mission.relays());
+        let relays = chain.mission.relays();
+        let mut factors = [Factor::NONE; FIRST];
+        self.eliminate(chain, segment, end - first, &mut factors)?;
+        let mut steps = [[0; 3]; FIRST];
+        let after = end + 1;
+        let mut to = self.spot(chain, after).at;
+        for index in (begin + 1..after).rev() {
+            let k = usize::from(index - first - 1) % FIRST;
+            let ahead = self.ahead;
+            let step = factors.get(k)?.step(self.by_target, ahead);
+            if !dot(&step, &step).is_finite() {
+                return None;
+            }
+            *steps.get_mut(k)? = step.map(upper_half);
+            let spot = self.spot(chain, index);
+            self.limit(&spot, step);
+            self.follow(relays, index + 1, [spot.at, to], [step, ahead]);
+            (self.ahead, to) = (step, spot.at);
+        }
+        if is_second {
+            let [a, b, c, d, ..] = steps;
+            self.second = [a, b, c, d];
+            self.work = Work::Substitute(segment, false);
+            return Some(());
+        }
+        let kept = self.segments.get_mut(usize::from(segment))?;
+        *kept = Segment::Steps(steps, self.second);
+        if let Some(before) = segment.checked_sub(1) {
+            self.work = Work::Substitute(before, true);
+        } else {
+            self.follow(relays, 1, [[0.0; 3], to], [[0.0; 3], self.ahead]);
+            self.try_step();
+        }
+        Some(())
+    }
+
+    /// Shortens all steps so that the `step` from `spot` stays in the box.
+    fn limit(&mut self, spot: &Spot, step: Triple) {
+        let spans = (spot.below(), spot.above());
+        for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
+            let room = if *step < 0.0 { below } else { above };
+            let most = NEAR_BOX * room / step.abs();
+            if *below > 0.0 && *above > 0.0 && most < self.share {
+                self.share = most;
+            }
+        }
+    }
+
+    /// Updates the multipliers of hop `k`, whose `ends` move by the steps `from` and `to`.
+    fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
+        let (hop, weights) = self.derivatives(relays, k, ends);
+        let ([a, b], [c, d]) = (&hop.by_from, &hop.by_to);
+        let change = [
+            dot(a, &from) + dot(c, &to) - self.by_target,
+            dot(b, &from) + dot(d, &to) - self.by_target,
+        ];
+        self.hop(relays, k).lambda = weights.after(change).map(upper_half);
+    }
+}
+
+/// Returns the number of levels of a chain.
+fn levels(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> f32 {
+    2.0 * f32::from(chain.mission.relays() + 1)
+}
