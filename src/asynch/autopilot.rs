@@ -84,7 +84,7 @@ impl AsyncAutopilot {
         })
     }
 
-    /// Returns true if the drone flies to the relay's setpoint.
+    /// Returns true if the autopilot follows the relay's setpoints, also while the drone hovers at one.
     pub fn is_flown(&self) -> bool {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }

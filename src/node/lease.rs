@@ -91,8 +91,8 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// Creates the lease state of a relay that starts at `now`. The relay may have been in a view that it does not
-    /// remember, so others may rely on it for `dead_after`.
+    /// Creates the lease state of a relay that starts at `now`. Before a restart it may have taken part in a
+    /// lease that it does not remember, so other relays may still count on this relay for `dead_after`.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Pending,

@@ -200,8 +200,10 @@ impl FromRx {
         self.hop.noisy(target * self.reverse, 0.0)
     }
 
-    /// Returns the margin by which the last relay, at `x_m`, receives Rx: (SIR / required SIR - 1) D, m. D is the
-    /// distance from Tx to Rx. The margin is below 0 if `target` is missed, and continuous in the target.
+    /// Returns the SIR margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
+    ///
+    /// `target` determines the required SIR. The factor D, the distance from Tx to Rx, makes the margin a length like
+    /// the other slacks. It is below 0 if the hop misses `target`, and continuous in `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;

@@ -93,8 +93,8 @@ enum Stage {
     /// Collection of measurements without the node of this number. It shows if the other nodes' measurements are
     /// consistent.
     Trying(u16),
-    /// First or second collection that tells the node of this number that its measurements are left out. The `bool`
-    /// is true for the second one, whose measurements are used.
+    /// Collection that tells the node of this number that it is excluded. Two collections do so: the `bool` is false
+    /// for the first one, and true for the second one, from whose other measurements the estimate is computed.
     Announcing(u16, bool),
 }
 

@@ -61,7 +61,7 @@ impl Level {
     }
 }
 
-/// Returns true if `power_w` is a valid interference level, W; 0 means no measurement.
+/// Returns true if `power_w` is a valid interference level, W, or 0, which stands for no measurement.
 pub(crate) fn is_power(power_w: f32) -> bool {
     power_w.to_bits() == 0 || is_level(power_w)
 }

@@ -52,8 +52,9 @@ pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Wir
     refused(view, of, place, relays).with(changes)
 }
 
-/// Returns the decision that refuses a membership view, as only `there` of eight relays have voted. The relay at
-/// position `place` sends it.
+/// Returns the decision message with which the relay at position `place` refuses a membership view.
+///
+/// Its reason: `there` relays have voted for the view, of eight.
 pub(crate) fn refused(
     view: u32,
     (mission, version): (u16, u16),

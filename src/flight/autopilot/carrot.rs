@@ -61,7 +61,7 @@ const BEHIND_MS: u64 = 1_200;
 const HALVES_MS: u64 = 1_387;
 
 /// Maximum number of half-lives that [`Pace::stopping_time`] counts. Eight of them reduce the remaining distance from
-/// 20 m, the longest one near the setpoint, to less than [`SETTLED_M`].
+/// 20 m, the longest one at which the speed is proportional to it, to less than [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
 /// Maximum age of a drone's position from which the drone's lag behind the moving target is computed. The drone's
@@ -127,7 +127,8 @@ impl Pace {
     ///
     /// Intended for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
     ///
-    /// The drone reacts after 1.2 s. The target then decelerates by a down to the speed a / k, and from there in
+    /// The drone reacts after 1.2 s. The moving target that it follows then slows down: first with the deceleration a
+    /// (maximum acceleration) to the speed a / k, where k is the gain near the setpoint, and from there in
     /// proportion to the remaining distance, which is at most 0.25 m after this time. a is the acceleration of this
     /// pace, and k is 0.5 /s. At most 8 steps.
     ///

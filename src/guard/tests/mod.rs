@@ -506,8 +506,10 @@ fn a_restart_is_distinguished_from_late_messages() {
     );
 }
 
-/// Checks that a relay on the wrong side of its downstream neighbour keeps the upstream one in place. Its message to
-/// the upstream neighbour requests a halt, and is flagged so that its x permits no move.
+/// Checks that a relay out of order with its downstream neighbour keeps the upstream one in place.
+///
+/// Its message asks that neighbour to halt. A flag says that the x in the message, otherwise a permission, permits no
+/// move.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);

@@ -146,8 +146,8 @@ impl Damping {
         }
     }
 
-    /// Forgets all losses, at `now`, the relay's start. It works in place, because a copy would need more stack than
-    /// any other step of the start.
+    /// Clears the record of lost links when the relay starts, at `now`. It works in place, because a copy would need
+    /// more stack than any other step of the start.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);

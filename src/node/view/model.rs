@@ -599,9 +599,10 @@ impl Check {
             })
     }
 
-    /// Returns the number of proposals after which the relays in the bit mask `there` agree on a view. Its members
-    /// are exactly these relays. Only the links between them work. `keeps_air` keeps the frames under way. `Some(0)`
-    /// if the relays are no quorum; `None` if [`MAX_PROPOSALS`] are not enough.
+    /// Returns the number of proposals until the relays in the bit mask `there` agree on a view.
+    ///
+    /// The members of that view are exactly these relays. From this state on only the links between these relays work.
+    /// Frames under way are still delivered if `keeps_air` is true, else they are lost. `Some(0)` if the relays are no quorum; `None` if [`MAX_PROPOSALS`] are not enough.
     pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {

@@ -21,11 +21,13 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient of f in the slack (spare length at Rx) that later relays' moves should add, m. f is the fraction
-    /// of their computed moves that is tried. Later relays are those toward Rx.
+    /// Coefficient of f in the predicted gain of slack (spare length at Rx), m.
+    ///
+    /// The gain is predicted for relays toward Rx that make a fraction f of their computed moves.
     pub(crate) linear: f32,
-    /// Coefficient of f^2 in the slack (spare length at Rx) that later relays' moves should add, m. f is the fraction
-    /// of their computed moves that is tried. Later relays are those toward Rx.
+    /// Coefficient of f^2 in the predicted gain of slack (spare length at Rx), m.
+    ///
+    /// The gain is predicted for relays toward Rx that make a fraction f of their computed moves.
     pub(crate) square: f32,
 }
 

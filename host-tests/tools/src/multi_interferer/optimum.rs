@@ -343,9 +343,10 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the feasible hops from a relay whose next relay may be anywhere in `spans`, intervals of x.
+/// Returns the hops by which a relay can reach its next relay.
 ///
-/// `reach` has the hop ranges at which the next relay meets the target SIR. Each hop is at least `apart` metres long.
+/// This is a step of the search from the last relay back. The next relay may be anywhere in `spans`, intervals of x. For each of its x, `reach` has the hop lengths at which it meets
+/// the target SIR. Each hop is at least `apart` metres long.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers

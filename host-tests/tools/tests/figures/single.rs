@@ -94,7 +94,7 @@ fn the_locus_agrees_with_the_reference() {
     }
 }
 
-/// Checks that more Tx power shifts the locus of equal SIR to Rx, a nearer interferer shifts it down.
+/// Checks that the locus of equal SIR moves to Rx with more Tx power and down with a nearer interferer.
 #[test]
 fn the_locus_moves_as_the_text_says() {
     let table = Table::read("locus");

@@ -161,8 +161,9 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Steps of the second part of the segment that is substituted, and that of the relay after the current one.
+    /// Newton steps of the second part of the segment whose steps are computed.
     second: [Step; SECOND],
+    /// Newton step of the relay after the current one.
     ahead: Triple,
     work: Work,
     mu: f32,

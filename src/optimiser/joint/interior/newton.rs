@@ -215,7 +215,7 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of mu (ln a + ln b), where a and b are the distances of a coordinate to its limits.
+/// Adds the derivatives of mu (ln a + ln b); a and b are the distances of a coordinate to its limits.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
