@@ -1,5 +1,18 @@
 //! Positions of Algorithm 1 with a way back, where relays have altitudes and powers of their own or must keep a
 //! separation that binds.
+//!
+//! With a separation that binds Algorithm 1 is exact neither in one direction nor in both: `near_optimal_with_a_separation` in
+//! `tests/exact.rs` is the counterpart for one direction. With a way back and relays at different altitudes it rarely misses that relays
+//! gathered at one x are better off farther from the interferer. With 500 scenes of each kind (`COUNT=500`)
+//!
+//! | scenes | both ways: within 1e-4, within 5 % | one way |
+//! | --- | --- | --- |
+//! | own altitudes and powers, usual | 497, 498 | 500, 500 |
+//! | own altitudes and powers, near an interferer | 500, 500 | 500, 500 |
+//! | separation, usual | 441, 492 | 437, 486 |
+//! | separation, near an interferer | 416, 432 | 404, 410 |
+//! | both, usual | 474, 484 | 477, 485 |
+//! | both, near an interferer | 411, 434 | 420, 428 |
 
 use chacha20::ChaCha8Rng;
 use host_tests::placing::{generator, places, solve, xs};
@@ -9,6 +22,8 @@ use uav_relay_oracle::random::count;
 
 use super::judge::Chain;
 use super::scenes::{ENDS, adversarial, in_noise, log_uniform, mission, narrow, usual};
+
+type Draw = fn(&mut ChaCha8Rng, [f64; 2], f64) -> Chain;
 
 /// Returns the profiles of all relays, by index.
 fn profiles(chain: &Chain) -> Vec<(u16, Profile)> {
@@ -23,7 +38,7 @@ fn profiles(chain: &Chain) -> Vec<(u16, Profile)> {
     (1..=chain.relays()).map(profile).collect()
 }
 
-/// Gives each relay an altitude and a power of its own.
+/// Gives each relay an altitude of 10 to 80 m and a power of 0.3 to 3 W of its own.
 fn with_own(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     for index in 1..=chain.relays() {
         chain.altitudes_m.push(narrow(rng.random_range(10.0..80.0)));
@@ -92,8 +107,7 @@ impl Tally {
 /// Compares the agreed positions in random scenes with the judge's, in both directions and in one.
 fn best_places(seed: u64, what: &str, change: fn(&mut ChaCha8Rng, Chain) -> Chain) {
     let mut rng = generator(seed);
-    let draws: [(&str, fn(&mut ChaCha8Rng, [f64; 2], f64) -> Chain); 2] =
-        [("usual", usual), ("near an interferer", adversarial)];
+    let draws: [(&str, Draw); 2] = [("usual", usual), ("near an interferer", adversarial)];
     for (name, draw) in draws {
         let [mut both, mut one] = [(); 2].map(|()| Tally::default());
         for round in 0..count(60) {
@@ -112,7 +126,8 @@ fn best_places(seed: u64, what: &str, change: fn(&mut ChaCha8Rng, Chain) -> Chai
         }
         both.report(&format!("{what}, {name}, both ways"));
         one.report(&format!("{what}, {name}, one way"));
-        assert!(both.near * 100 >= 80 * both.all);
+        // Algorithm 1 takes a relay's positions for an interval, which they are not always.
+        assert!(both.near * 100 >= both.all * 80);
     }
 }
 
