@@ -18,10 +18,6 @@ use crate::{Interference, Scenario, Source};
 pub enum Refusal {
     /// The scenario has several interferers, and no single hypothetical interferer can replace them.
     NoHypothetical,
-    /// The scenario has several interferers, and SIRs are also required from Rx to Tx.
-    ///
-    /// Plans for several interferers are for the direction from Tx to Rx only.
-    ReverseSources,
     /// The distance from Tx to Rx is too short for that number of relays at their least separation.
     NoRoom {
         /// Number of relays.
@@ -45,9 +41,6 @@ impl fmt::Display for Refusal {
             Self::NoHypothetical => {
                 f.write_str("the [[interferer]] cannot be replaced by a single interferer with the same effect, which the relays need")
             }
-            Self::ReverseSources => f.write_str(
-                "link.reverse above 0 needs exactly one [[interferer]]: plans for several are for one direction; cargo chain flies both, with one that replaces them",
-            ),
             Self::NoRoom {
                 relays,
                 apart_m,

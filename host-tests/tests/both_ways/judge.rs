@@ -7,8 +7,12 @@ pub(crate) struct Chain {
     pub(crate) distance_m: f64,
     /// Powers of Tx, of the relays from Tx on, and of Rx, W.
     pub(crate) powers_w: Vec<f64>,
-    /// Altitude of the relays, m.
+    /// Altitude of the relays without one of their own, m.
     pub(crate) altitude_m: f64,
+    /// Altitudes of the relays from Tx on, m. Empty if all have the common one.
+    pub(crate) altitudes_m: Vec<f64>,
+    /// Least distance between neighbouring relays, m.
+    pub(crate) apart_m: f64,
     /// Interferer: its power in W, and its x and y in m.
     pub(crate) interferer: [f64; 3],
     /// Further interferers, each with its power in W, and its x and y in m.
@@ -36,6 +40,15 @@ impl Chain {
         self.powers_w.len() - 2
     }
 
+    /// Returns the altitude of `node`, m; 0 for Tx and Rx.
+    fn height_m(&self, node: usize) -> f64 {
+        if node == 0 || node > self.relays() {
+            return 0.0;
+        }
+        let own = self.altitudes_m.get(node - 1);
+        own.copied().unwrap_or(self.altitude_m)
+    }
+
     /// Returns the power of interference plus noise at `node`, which is at x = `x`, W.
     fn disturbance_w(&self, node: usize, x: f64) -> f64 {
         if let [first, .., last] | [first @ last] = self.field.as_slice() {
@@ -58,7 +71,7 @@ impl Chain {
         let (h, loss) = if on_ground {
             (0.0, self.loss[1])
         } else {
-            (self.altitude_m, self.loss[0])
+            (self.height_m(node), self.loss[0])
         };
         let sources = [self.interferer]
             .into_iter()
@@ -70,14 +83,16 @@ impl Chain {
 
     /// Returns a hop's two-way SIR: the smaller of its forward SIR and backward SIR / `reverse`.
     ///
-    /// The hop goes from x = `from` to x = `to`, m, and ends at `node` (0 is Tx, N + 1 is Rx).
+    /// The hop goes from x = `from` to x = `to`, m, and ends at `node` (0 is Tx, N + 1 is Rx). The result is 0 if two
+    /// relays are too close.
     pub(crate) fn hop(&self, node: usize, from: f64, to: f64) -> f64 {
-        let climb = if node == 1 || node > self.relays() {
-            self.altitude_m
-        } else {
-            0.0
-        };
-        let gain = 1.0 / (self.loss[0] * ((to - from).powi(2) + climb * climb));
+        let climb = self.height_m(node) - self.height_m(node - 1);
+        let squared = (to - from).powi(2) + climb * climb;
+        let is_between = node > 1 && node <= self.relays();
+        if is_between && squared.sqrt() < self.apart_m - 1e-7 * self.distance_m {
+            return 0.0;
+        }
+        let gain = 1.0 / (self.loss[0] * squared);
         let there = self.powers_w[node - 1] * gain / self.disturbance_w(node, to);
         let back = self.powers_w[node] * gain / self.disturbance_w(node - 1, from);
         there.min(back / self.reverse)
@@ -142,7 +157,11 @@ impl Chain {
     /// Returns the x of the first search's grid, m. It is dense near the interferer and both ends.
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
-        let mut points: Vec<f64> = (0..=GRID).map(|i| d * i as f64 / GRID as f64).collect();
+        // The least separation is a whole number of steps.
+        let step = self.apart_m / (self.apart_m * GRID as f64 / d).ceil().max(1.0);
+        let step = if step > 0.0 { step } else { d / GRID as f64 };
+        let even = (0..).map(|i| step * f64::from(i)).take_while(|x| *x <= d);
+        let mut points: Vec<f64> = even.collect();
         for about in [0.0, d, self.interferer[1]] {
             for i in 0..24 {
                 let off = d * 1e-4 * 1.35_f64.powi(i);
@@ -205,6 +224,8 @@ mod tests {
             distance_m: 1000.0,
             powers_w: vec![1.0; 6],
             altitude_m: 1e-3,
+            altitudes_m: Vec::new(),
+            apart_m: 0.0,
             interferer: [1e-9, 0.0, 1e6],
             others: Vec::new(),
             field: Vec::new(),

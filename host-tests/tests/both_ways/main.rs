@@ -4,6 +4,7 @@ mod field;
 mod flown;
 mod judge;
 mod placed;
+mod profiles;
 mod refused;
 mod scenes;
 mod sensing;

@@ -97,6 +97,8 @@ fn relays_stay_at_tx_where_an_interferer_is_between_them_and_a_weak_rx() {
         distance_m: 1000.0,
         powers_w: vec![1.0; 4],
         altitude_m: 20.0,
+        altitudes_m: Vec::new(),
+        apart_m: 0.0,
         interferer: [32.0, 440.0, 111.0],
         others: Vec::new(),
         field: Vec::new(),

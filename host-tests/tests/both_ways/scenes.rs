@@ -46,7 +46,7 @@ pub(crate) fn mission(chain: &Chain) -> Mission {
     Mission::try_new(MissionConfig {
         relays: chain.relays() as u16,
         distance_m: chain.distance_m as f32,
-        min_separation_m: 0.0,
+        min_separation_m: chain.apart_m as f32,
         tx_power_w: chain.powers_w[0] as f32,
         common: Profile {
             altitude_m: chain.altitude_m as f32,
@@ -76,6 +76,8 @@ pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
         distance_m: 1000.0,
         powers_w,
         altitude_m: 20.0,
+        altitudes_m: Vec::new(),
+        apart_m: 0.0,
         interferer: [
             narrow(log_uniform(rng, 1.0, 100.0)),
             narrow(rng.random_range(-200.0..=1200.0)),

@@ -33,6 +33,8 @@ fn an_interferer_that_is_located_is_placed_for_in_both_directions() {
             distance_m: wild.scenario.distance_m,
             powers_w,
             altitude_m: wild.scenario.altitude_m,
+            altitudes_m: Vec::new(),
+            apart_m: 0.0,
             interferer: [source.power_w, source.x_m, source.y_m].map(narrow),
             others: Vec::new(),
             field: Vec::new(),

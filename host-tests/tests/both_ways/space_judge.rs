@@ -202,6 +202,8 @@ mod tests {
                 distance_m: 1000.0,
                 powers_w: vec![1.0; 5],
                 altitude_m: 0.0,
+                altitudes_m: Vec::new(),
+                apart_m: 0.0,
                 interferer: [1e-9, 0.0, 1e6],
                 loss: [1.0, 1.0],
                 noise_w: 1e-3,

@@ -4,10 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
-use uav_relay::Placement;
 use uav_relay_scenario::deployment::{Companion, Deployment, agree};
 use uav_relay_scenario::link::{Access, BandwidthError, Radio};
-use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission};
 use uav_relay_sim::command::{Failure, number, whole};
 use uav_relay_sim::svg::{Picture, lateral_view};
@@ -225,18 +223,13 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
             &scenario.sources(),
         ),
         hop_sir: plan.sirs.clone(),
-        hop_sir_back: sirs_back(plan, scenario),
+        hop_sir_back: match plan.back {
+            Some(_) => plan.sirs_back(scenario),
+            None => Vec::new(),
+        },
         reverse: scenario.reverse,
         ..Picture::default()
     }
-}
-
-/// Returns the SIR of each hop in the direction from Rx to Tx; empty for a plan of one direction.
-fn sirs_back(plan: &Plan, scenario: &Scenario) -> Vec<f64> {
-    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
-    let places: Vec<Placement> = plan.places.iter().map(|(place, _)| *place).collect();
-    let scene = Scene::new(scenario, relays).filter(|_| plan.back.is_some());
-    scene.map_or_else(Vec::new, |scene| scene.hop_sirs_back(&places))
 }
 
 /// Prints the report as a table or as JSON.

@@ -21,7 +21,7 @@ use uav_relay_sim::report::WorstBack;
 
 use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
-use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source};
+use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
 /// Largest relative excess of time per bit for which a number of relays gets a precise search.
 ///
@@ -115,7 +115,13 @@ impl<'a> Carried<'a> {
                 .map(<[f64]>::to_vec),
         );
         let best = starts.iter().map(|start| times.refined(start));
-        let best = best.min_by(|one, other| one.0.total_cmp(&other.0));
+        let mut best = best.min_by(|one, other| one.0.total_cmp(&other.0));
+        if self.radio.link.access == Access::Fitted
+            && let Some(shorter) =
+                steps::shorter(&times, best.as_ref().map_or(f64::INFINITY, |best| best.0))
+        {
+            best = Some(times.refined(&shorter));
+        }
         let Some((_, x)) = best.filter(|(time, _)| time.is_finite()) else {
             return Ok(by_sir);
         };

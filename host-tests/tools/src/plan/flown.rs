@@ -102,14 +102,7 @@ fn alone(
     };
     let plan = by_method(&with_one(scenario, &one))?;
     let scene = Scene::new(scenario, relays).ok_or_else(source::nothing)?;
-    let sirs = scene.hop_sirs(&plan.chain());
-    Ok(Plan {
-        sirs: sirs
-            .into_iter()
-            .map(|sir| sir.min(f64::from(f32::MAX)))
-            .collect(),
-        ..plan
-    })
+    Ok(plan.against(&scene))
 }
 
 /// Tolerated difference of a coordinate, m, between the file's plan and the recomputed plan.

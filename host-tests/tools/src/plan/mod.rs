@@ -4,9 +4,11 @@
 //! | --- | --- |
 //! | one interferer | `source`: Theorems 1 to 3 for one relay, Algorithm 1 and eq. (Opt) for more |
 //! | one interferer, both directions | `one_both_ways`: closed forms for one relay; `source`: Algorithm 1, with a `bound` that proves it |
-//! | one interferer, data rates | `carried`: positions of the largest rate where they are not those of the largest SIR, by a shortest `path` |
+//! | one interferer, data rates | `carried`: positions of the largest rate where they are not those of the largest SIR, by a shortest `path`; in fitted slots with rate `steps` by a search over exact reaches |
 //! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
+//! | a field, both directions | `source`: Algorithm 4 |
 //! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
+//! | several interferers, both directions | the same; a shortest `path` for the true sum, with a `bound` that proves it |
 //!
 //! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
 //! optimal.
@@ -22,10 +24,12 @@ pub mod path;
 pub mod rate;
 pub mod report;
 mod source;
+mod steps;
 
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;
 use uav_relay_scenario::mission::Refusal;
+use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Scenario, mission};
 use uav_relay_sim::report::{WorstBack, hop_sirs, hop_sirs_back};
 
@@ -50,14 +54,6 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
 
 /// Checks that the options of the request `ask` fit each other and the scenario.
 fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
-    let is_several =
-        matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);
-    if scenario.reverse > 0.0 && is_several {
-        return Err(Refusal::ReverseSources.into());
-    }
-    if matches!(scenario.interference, Interference::Field(_)) {
-        only_one_way(scenario, "a plan in a [field]")?;
-    }
     if ask.x_m.is_some() {
         only_one_way(scenario, "--x-m")?;
     }
@@ -237,6 +233,75 @@ impl Plan {
     fn chain(&self) -> Vec<Placement> {
         self.places.iter().map(|(place, _)| *place).collect()
     }
+
+    /// Returns the SIR of each hop in the direction from Rx to Tx, linear; empty if it is unknown.
+    pub fn sirs_back(&self, scenario: &Scenario) -> Vec<f64> {
+        let relays = u16::try_from(self.places.len()).unwrap_or(u16::MAX);
+        match Scene::new(scenario, relays) {
+            Some(scene) => scene.hop_sirs_back(&self.chain()),
+            None => hop_sirs_back(&self.mission, &self.places),
+        }
+    }
+
+    /// Returns the plan with the SIRs of its positions against all interferers of `scene`.
+    fn against(self, scene: &Scene) -> Self {
+        let chain = self.chain();
+        // Relays at the same position have an infinite SIR.
+        let [sirs, back] = [scene.hop_sirs(&chain), scene.hop_sirs_back(&chain)].map(|sirs| {
+            let limited = sirs.into_iter().map(|sir| sir.min(f64::from(f32::MAX)));
+            limited.collect::<Vec<f64>>()
+        });
+        Self {
+            back: WorstBack::of(&self.mission, &sirs, &back),
+            sirs,
+            ..self
+        }
+    }
+}
+
+/// Returns the plan with the fewest relays whose SIR, by `sir`, is at least `target`. `plan` computes the plan of a number of
+/// relays.
+///
+/// It assumes that more relays do no worse.
+fn fewest_of<T>(
+    target: f64,
+    mut plan: impl FnMut(u16) -> Result<T, NoPlan>,
+    sir: impl Fn(&T) -> f64,
+) -> Result<T, NoPlan> {
+    let mut most: f64 = 0.0;
+    let mut meets = |relays: u16| -> Result<Option<T>, NoPlan> {
+        match plan(relays) {
+            Ok(found) => {
+                most = most.max(sir(&found));
+                Ok((sir(&found) >= target).then_some(found))
+            }
+            Err(NoPlan::Unmet(..)) => Ok(None),
+            Err(wrong) => Err(wrong),
+        }
+    };
+    let (mut too_few, mut enough) = (0, 1);
+    let mut found = loop {
+        if let Some(found) = meets(enough)? {
+            break found;
+        }
+        if enough >= MOST_RELAYS {
+            let why = Why::Short {
+                target,
+                most,
+                relays: None,
+            };
+            return Err(NoPlan::Unmet(why, Some(most)));
+        }
+        (too_few, enough) = (enough, (enough * 2).min(MOST_RELAYS));
+    };
+    while enough - too_few > 1 {
+        let middle = too_few + (enough - too_few) / 2;
+        match meets(middle)? {
+            Some(better) => (enough, found) = (middle, better),
+            None => too_few = middle,
+        }
+    }
+    Ok(found)
 }
 
 /// Largest number of relays that the planner tries when it looks for the number.

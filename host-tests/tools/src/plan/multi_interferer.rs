@@ -1,16 +1,19 @@
 //! Plans against several interferers.
 //!
 //! A hypothetical interferer replaces them, so that relays can find their positions by themselves. These positions are judged
-//! against the true sum; if they lose more than a hundredth to the best against that sum, the latter are used.
+//! against the true sum; if they lose more than a hundredth to the best against that sum, the latter are used. For both directions
+//! the best are those of a shortest path.
 
 use uav_relay::Placement;
 
+use super::bound::{Targets, excludes};
+use super::path::{Table, Times};
 use super::{
-    Fitted, LOSS, MOST_RELAYS, NoPlan, Number, Plan, PlanRequest, ProfiledMission, Why, altitude,
-    source,
+    Fitted, LOSS, NoPlan, Number, Plan, PlanRequest, ProfiledMission, altitude, fewest_of, source,
 };
 use crate::multi_interferer::{best_common_altitude, optimum, polish};
 use uav_relay_scenario::hypothetical::Hypothetical;
+use uav_relay_scenario::link::{Access, Link, Radio, RateModel};
 use uav_relay_scenario::mission::{self, Refusal};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
@@ -120,6 +123,9 @@ impl Planner<'_> {
         if let Some(x_m) = self.ask.x_m {
             return at(scene, x_m);
         }
+        if scene.reverse > 0.0 {
+            return both_ways(scene, start, self.ask.tolerance);
+        }
         if !self.ask.free_altitude
             && let Some(chain) = optimum(scene)
         {
@@ -197,39 +203,7 @@ impl Planner<'_> {
     /// Returns the plan with the fewest relays that give every hop the SIR `target`. The search assumes that more
     /// relays do no worse.
     fn fewest(&self, target: f64) -> Result<Plan, NoPlan> {
-        let mut most: f64 = 0.0;
-        let mut meets = |relays: u16| -> Result<Option<Candidates>, NoPlan> {
-            match self.candidates(relays) {
-                Ok(found) => {
-                    most = most.max(found.sir());
-                    Ok((found.sir() >= target).then_some(found))
-                }
-                Err(NoPlan::Unmet(..)) => Ok(None),
-                Err(wrong) => Err(wrong),
-            }
-        };
-        let (mut too_few, mut enough) = (0, 1);
-        let mut found = loop {
-            if let Some(found) = meets(enough)? {
-                break found;
-            }
-            if enough >= MOST_RELAYS {
-                let why = Why::Short {
-                    target,
-                    most,
-                    relays: None,
-                };
-                return Err(NoPlan::Unmet(why, Some(most)));
-            }
-            (too_few, enough) = (enough, (enough * 2).min(MOST_RELAYS));
-        };
-        while enough - too_few > 1 {
-            let middle = too_few + (enough - too_few) / 2;
-            match meets(middle)? {
-                Some(better) => (enough, found) = (middle, better),
-                None => too_few = middle,
-            }
-        }
+        let found = fewest_of(target, |relays| self.candidates(relays), Candidates::sir)?;
         found.chosen(self, Some(target))
     }
 }
@@ -256,8 +230,16 @@ impl Candidates {
             kept: is_kept,
         };
         let most = target.map(|_| self.sir());
-        // With fewer relays not even the best chain meets the target.
-        let is_fewest = target.is_some() && self.by_all.as_ref().is_some_and(|best| best.proven);
+        let is_best = self.by_all.as_ref().is_some_and(|best| best.proven);
+        let is_fewest = match target {
+            // Different powers may do better with fewer relays: they are excluded one number after the other.
+            Some(target) if self.scene.reverse > 0.0 => (1..self.relays)
+                .rev()
+                .all(|fewer| source::is_excluded_both_ways(planner.scenario, fewer, target)),
+            // With fewer relays not even the best chain meets the target.
+            Some(_) => is_best,
+            None => false,
+        };
         let plan = match (self.by_one, self.by_all) {
             (Some((plan, _)), _) if is_kept => Plan {
                 how: "the hypothetical interferer",
@@ -270,20 +252,15 @@ impl Candidates {
                     self.relays,
                     planner.ask.tolerance,
                 )?;
-                briefed.plan(&best.places, "the true sum of the interferers", best.proven)
+                let proven = if target.is_some() { is_fewest } else { is_best };
+                briefed.plan(&best.places, "the true sum of the interferers", proven)
             }
             _ => return Err(source::nothing()),
         };
-        // Relays at the same position have an infinite SIR.
-        let sirs = self.scene.hop_sirs(&plan.chain());
         Ok(Plan {
-            sirs: sirs
-                .into_iter()
-                .map(|sir| sir.min(f64::from(f32::MAX)))
-                .collect(),
             most,
             fitted: Some(fitted),
-            ..plan
+            ..plan.against(&self.scene)
         })
     }
 }
@@ -308,6 +285,40 @@ impl Best {
             proven,
         }
     }
+}
+
+/// Returns the best chain for both directions that a shortest path along the line finds.
+///
+/// `None` if every SIR is 0. `start` are other positions to start from.
+fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best> {
+    // With so large a gap Shannon's rate is proportional to the SIR, and the best rate is that of the best SIR.
+    let link = Link {
+        access: Access::Channels,
+        bandwidth_hz: None,
+        model: RateModel::Shannon { gap_db: 300.0 },
+    };
+    let radio = Radio {
+        link,
+        bandwidth_hz: 1.0,
+    };
+    let times = Times::new(scene, &radio, scene.reverse);
+    let relays = u16::try_from(scene.relays.len()).ok()?;
+    let table = Table::new(&times);
+    let along = |plan: &Plan| plan.chain().iter().map(|at| at.x_m.into()).collect();
+    let starts: [Option<Vec<f64>>; 2] =
+        [table.start(relays).map(<[f64]>::to_vec), start.map(along)];
+    let refined = starts.iter().flatten().map(|start| times.refined(start));
+    let (time, x) = refined.min_by(|one, other| one.0.total_cmp(&other.0))?;
+    if !time.is_finite() {
+        return None;
+    }
+    let places = x.iter().zip(&scene.relays);
+    let places: Vec<(f64, f64)> = places.map(|(&x, relay)| (x, relay.altitude_m)).collect();
+    let best = Best::new(scene, &places, false);
+    let there = best.sir * (1.0 + 2.0 * tolerance);
+    let back = scene.reverse * there;
+    let proven = excludes(scene, Targets { there, back });
+    Some(Best { proven, ..best })
 }
 
 fn places(plan: &Plan) -> Vec<Place> {

@@ -58,18 +58,18 @@ const GUIDE: f64 = 1e-3;
 /// The unit is s Hz: the time in s for a bandwidth of 1 Hz.
 #[derive(Clone, Debug)]
 pub struct Times<'a> {
-    scene: &'a Scene,
+    pub(super) scene: &'a Scene,
     radio: &'a Radio,
-    reverse: f64,
+    pub(super) reverse: f64,
     /// Rate steps of the radio: each with its least SINR, linear, and its bit/s/Hz. Empty for Shannon's formula.
-    steps: Vec<(f64, f64)>,
+    pub(super) steps: Vec<(f64, f64)>,
 }
 
 /// Possible position of a node: its x, m, and the interference plus noise there, W.
 #[derive(Clone, Copy, Debug)]
-struct Point {
-    x: f64,
-    disturbance_w: f64,
+pub(super) struct Point {
+    pub(super) x: f64,
+    pub(super) disturbance_w: f64,
 }
 
 impl<'a> Times<'a> {
@@ -98,7 +98,7 @@ impl<'a> Times<'a> {
         }
     }
 
-    const fn relays(&self) -> usize {
+    pub(super) const fn relays(&self) -> usize {
         self.scene.relays.len()
     }
 
@@ -107,7 +107,7 @@ impl<'a> Times<'a> {
     }
 
     /// Returns the position `x`, m, of `node` with its interference plus noise. Node 0 is Tx; a number above N is Rx.
-    fn point(&self, node: usize, x: f64) -> Point {
+    pub(super) fn point(&self, node: usize, x: f64) -> Point {
         let interference_w = match self.relay(node) {
             Some(relay) => self.scene.interference_w((x, relay.altitude_m)),
             None => self.scene.interference_on_ground_w(x),
@@ -118,16 +118,16 @@ impl<'a> Times<'a> {
         }
     }
 
-    fn tx(&self) -> Point {
+    pub(super) fn tx(&self) -> Point {
         self.point(0, 0.0)
     }
 
-    fn rx(&self) -> Point {
+    pub(super) fn rx(&self) -> Point {
         self.point(usize::MAX, self.scene.distance_m)
     }
 
     /// Returns the hop from relay `from` to relay `to`, counted from 1. `None` stands for Tx or Rx.
-    fn hop(&self, from: Option<usize>, to: Option<usize>) -> Hop {
+    pub(super) fn hop(&self, from: Option<usize>, to: Option<usize>) -> Hop {
         let [low, high] = [from, to].map(|node| node.and_then(|node| self.relay(node)));
         let climb =
             low.map_or(0.0, |relay| relay.altitude_m) - high.map_or(0.0, |relay| relay.altitude_m);
@@ -155,18 +155,30 @@ impl<'a> Times<'a> {
 
     /// Returns the time of a hop for one bit, s Hz; infinite if the hop carries nothing or is too short. With `guide`
     /// a radio's rate steps get a small extra time that falls as the SIR rises, to decide between equal times.
-    fn time(&self, hop: &Hop, from: Point, to: Point, guide: bool) -> f64 {
+    pub(super) fn time(&self, hop: &Hop, from: Point, to: Point, guide: bool) -> f64 {
         let apart = to.x - from.x;
         if apart < hop.least_m - ROUNDING * self.scene.distance_m || apart < 0.0 {
             return f64::INFINITY;
         }
+        self.time_at(hop, apart, [from.disturbance_w, to.disturbance_w], guide)
+    }
+
+    /// Returns the time of a hop for one bit, s Hz, as [`Times::time`] does. `apart` is its length along x, m, and
+    /// `disturbances_w` are the interference plus noise at its two nodes.
+    pub(super) fn time_at(
+        &self,
+        hop: &Hop,
+        apart: f64,
+        disturbances_w: [f64; 2],
+        guide: bool,
+    ) -> f64 {
         let gain = 1.0 / (hop.factor * (apart * apart + hop.climb_squared));
         let [there_w, back_w] = hop.powers_w;
-        let there = self.one_way(there_w * gain / to.disturbance_w, guide);
+        let there = self.one_way(there_w * gain / disturbances_w[1], guide);
         if !(self.reverse > 0.0) {
             return there;
         }
-        let back = self.reverse * self.one_way(back_w * gain / from.disturbance_w, guide);
+        let back = self.reverse * self.one_way(back_w * gain / disturbances_w[0], guide);
         match self.radio.link.access {
             Access::Fitted => there + back,
             Access::Slots | Access::Channels => there.max(back),
@@ -289,14 +301,14 @@ impl<'a> Times<'a> {
 
 /// Constants of a hop that do not depend on the x of its two nodes.
 #[derive(Clone, Copy, PartialEq, Debug)]
-struct Hop {
+pub(super) struct Hop {
     /// Transmit powers of the hop's node nearer to Tx, and of its node nearer to Rx, W.
-    powers_w: [f64; 2],
-    factor: f64,
+    pub(super) powers_w: [f64; 2],
+    pub(super) factor: f64,
     levels_m: [f64; 2],
-    climb_squared: f64,
+    pub(super) climb_squared: f64,
     /// Least distance of the two nodes along the line, m, due to the least separation of relays.
-    least_m: f64,
+    pub(super) least_m: f64,
 }
 
 /// Least time of a chain from Tx to a grid point, and the index of the previous relay's grid point.

@@ -66,8 +66,11 @@ impl Rate {
         plan.back?;
         let relays = u16::try_from(plan.places.len()).ok()?;
         let places: Vec<Place> = plan.places.iter().map(|(at, _)| (*at).into()).collect();
-        let scene = Scene::new(scenario, relays)?;
-        Some([scene.hop_sirs(&places), scene.hop_sirs_back(&places)])
+        let there = match Scene::new(scenario, relays) {
+            Some(scene) => scene.hop_sirs(&places),
+            None => plan.sirs.clone(),
+        };
+        Some([there, plan.sirs_back(scenario)])
     }
 
     /// Returns the smaller of the rate to Rx and the rate back divided by `reverse`, bit/s.
@@ -155,7 +158,9 @@ impl Rates {
             let plan = match &searched {
                 Some(searched) => searched.plan(relays),
                 // Without the proof that the positions are best.
-                None if reverse > 0.0 => source::best(scenario, relays, ask.tolerance),
+                None if reverse > 0.0 && is_single(scenario) => {
+                    source::best(scenario, relays, ask.tolerance)
+                }
                 None => super::plan(scenario, &one),
             };
             let plan = match plan {
@@ -207,10 +212,14 @@ impl Rates {
     }
 }
 
+fn is_single(scenario: &Scenario) -> bool {
+    matches!(&scenario.interference, Interference::Sources(sources) if sources.len() == 1)
+}
+
 /// Returns the largest number of relays for which the planner computes the data rate.
 fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
     let is_several =
-        matches!(&scenario.interference, Interference::Sources(sources) if sources.len() > 1);
+        matches!(scenario.interference, Interference::Sources(_)) && !is_single(scenario);
     if ask.x_m.is_some() {
         1
     } else if ask.free_altitude || is_several {

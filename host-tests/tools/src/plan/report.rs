@@ -4,9 +4,7 @@ use std::fmt;
 use std::fmt::Write as _;
 
 use serde::Serialize;
-use uav_relay::Placement;
 use uav_relay_scenario::link::{Access, Radio};
-use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Noise, Scenario};
 use uav_relay_sim::report::{RelayReport, WorstBack, db, hops_table, relays};
 
@@ -427,12 +425,8 @@ impl PlanReport {
     /// Adds the SIR of each hop in the direction from Rx to Tx, if the interference at Tx is known.
     #[must_use]
     pub fn with_way_back(mut self, scenario: &Scenario, plan: &Plan) -> Self {
-        let places: Vec<Placement> = plan.places.iter().map(|(place, _)| *place).collect();
-        let relays = u16::try_from(places.len()).unwrap_or(u16::MAX);
-        let Some(scene) = Scene::new(scenario, relays) else {
-            return self;
-        };
-        let sirs = scene.hop_sirs_back(&places);
+        let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+        let sirs = plan.sirs_back(scenario);
         for (relay, sir) in self.relays.iter_mut().zip(&sirs) {
             relay.sir_back = Some(*sir);
         }
@@ -443,7 +437,7 @@ impl PlanReport {
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let both = Some(scenario.reverse)
             .filter(|reverse| *reverse > 0.0)
-            .and_then(|reverse| WorstBack::with(reverse, &scene.hop_sirs(&places), &sirs));
+            .and_then(|reverse| WorstBack::with(reverse, &plan.sirs, &sirs));
         self.way_back = worst.zip(sirs.last()).map(|((hop, sir), rx_sir)| WayBack {
             rx_sir_back: *rx_sir,
             worst_back: sir,

@@ -11,7 +11,7 @@ use uav_relay_scenario::scene::Scene;
 
 use super::bound::{Targets, excludes};
 use super::{
-    NoPlan, Number, Plan, PlanRequest, ProfiledMission, Theorem, Why, altitude, is_free,
+    NoPlan, Number, Plan, PlanRequest, ProfiledMission, Theorem, Why, altitude, fewest_of, is_free,
     one_both_ways,
 };
 
@@ -59,7 +59,7 @@ fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> 
 /// Returns true if it is proven that no positions of `relays` relays meet `target` in both directions.
 ///
 /// The proof shares no code with Algorithm 1, whose result it confirms.
-fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
+pub(super) fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f64) -> bool {
     let targets = Targets {
         there: target,
         back: scenario.reverse * target,
@@ -301,6 +301,14 @@ pub(super) fn plan_in_field(scenario: &Scenario, ask: &PlanRequest) -> Result<Pl
     };
     match ask.number {
         Number::Of(relays) => best_in_field(scenario, relays, ask.tolerance),
+        Number::Meeting(target) if scenario.reverse > 0.0 => {
+            let plan = |relays| best_in_field(scenario, relays, ask.tolerance);
+            let plan = fewest_of(target, plan, Plan::sir)?;
+            Ok(Plan {
+                most: Some(plan.sir()),
+                ..plan
+            })
+        }
         Number::Meeting(target) => {
             let plan = fewest(scenario, target, ask.tolerance, "Problem 1")?;
             let most = best_in_field(scenario, plan.mission.relays(), ask.tolerance);
@@ -316,6 +324,10 @@ pub(super) fn plan_in_field(scenario: &Scenario, ask: &PlanRequest) -> Result<Pl
 fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let profile = briefed.profile(1);
+    if scenario.reverse > 0.0 {
+        let places = placed(&briefed, solved(&briefed)?).ok_or_else(nothing)?;
+        return Ok(briefed.plan(&places, "Algorithm 4 for both directions", false));
+    }
     if relays == 1 {
         let found =
             without_interferer::best_in_field(&briefed.mission, profile).ok_or_else(nothing)?;

@@ -199,13 +199,40 @@ fn what_has_no_way_back_is_refused_by_name() {
     let line = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{line}");
     assert!(line.contains("link.reverse"), "{line}");
+}
+
+/// Checks that plans in both directions have the SIRs of the sum of all interferers, and of a field.
+#[test]
+fn several_interferers_and_fields_are_planned_both_ways() {
     let several = scenario(
         5.0,
         "reverse = 0.5\n[[interferer]]\npower_w = 1.0\nx_m = 0.0\ny_m = 90.0",
     );
-    let line = String::from_utf8(plan(&several, "--uavs 3").stderr).unwrap();
-    assert!(
-        line.contains("link.reverse above 0 needs exactly one [[interferer]]"),
-        "{line}"
-    );
+    let field = tempfile::NamedTempFile::new().unwrap();
+    let text = std::fs::read_to_string(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/field.toml"
+    ));
+    let text = text.unwrap() + "\n[link]\nreverse = 0.5\n";
+    std::fs::write(field.path(), text).unwrap();
+    for file in [&several, &field] {
+        let report = json(file, "--uavs 3");
+        let [there, back] = sirs(&report);
+        let both = worst(&there).min(worst(&back) / 0.5);
+        let sir = number(&report["sir"]);
+        assert!((both / sir - 1.0).abs() < 1e-5, "{report}");
+        let fewest = json(file, &format!("--target-sir {}", sir * 0.999));
+        assert!(fewest["uavs"].as_u64().unwrap() <= 3, "{fewest}");
+        assert!(number(&fewest["sir"]) >= sir * 0.998, "{fewest}");
+        let rates = json(file, "--uavs 3 --rates --bandwidth-hz 1e6");
+        let bits = |sirs: &[f64]| 1e6 * (1.0 + worst(sirs)).log2() / 8.0;
+        for (rate, sirs) in rates["rate_bps"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip([there, back])
+        {
+            assert!((number(rate) / bits(&sirs) - 1.0).abs() < 1e-5, "{rates}");
+        }
+    }
 }

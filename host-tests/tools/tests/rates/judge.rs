@@ -38,6 +38,12 @@ pub(crate) struct Chain {
 /// Number of grid points over the whole line, beside the dense ones near ends and interferer.
 const EVEN: usize = 171;
 
+/// Number of equal cells of the line in the search for a radio with steps, beside those of the grid.
+const CELLS: usize = 400;
+
+/// Largest number of chains that each cell keeps in that search.
+const KEPT: usize = 4;
+
 /// Inverse of the golden ratio, for golden-section search.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -201,6 +207,90 @@ impl Chain {
         all
     }
 
+    /// Returns the x of relays with the largest rate for a radio with steps, for each number from 1 on.
+    ///
+    /// Each cell of a grid keeps a few starts of chains with the least times, at their exact positions; of two that take as long the farther
+    /// one. From there the next relay is tried at all grid points and where the time of the hop changes, found by bisection.
+    fn by_changes(&self) -> Vec<Vec<f64>> {
+        let mut grid = self.grid();
+        grid.extend((0..=CELLS).map(|i| self.distance_m * i as f64 / CELLS as f64));
+        grid.sort_by(f64::total_cmp);
+        let never = usize::MAX - 1;
+        let mut layers: Vec<Vec<(f64, f64, usize)>> = vec![vec![(0.0, 0.0, 0)]];
+        let mut all = Vec::new();
+        for relays in 1..=self.relays() {
+            let mut cells: Vec<Vec<(f64, f64, usize)>> = vec![Vec::new(); grid.len() + 1];
+            for (before, &(from, sofar, _)) in layers.last().unwrap().iter().enumerate() {
+                let time = |to: f64| self.time(relays, never, from, to);
+                let mut offer = |x: f64, hop: f64| {
+                    let total = sofar + hop;
+                    let cell = &mut cells[grid.partition_point(|edge| *edge <= x)];
+                    let excels = |a: (f64, f64), b: (f64, f64)| a.0 >= b.0 && a.1 < b.1 + 1e-12;
+                    if !total.is_finite() || cell.iter().any(|c| excels((c.0, c.1), (x, total))) {
+                        return;
+                    }
+                    cell.retain(|c| !excels((x, total), (c.0, c.1)));
+                    cell.push((x, total, before));
+                    if cell.len() > KEPT {
+                        cell.sort_by(|a, b| a.1.total_cmp(&b.1));
+                        cell.pop();
+                    }
+                };
+                let first = from + if relays > 1 { self.apart_m } else { 0.0 };
+                let mut low = (first, time(first));
+                offer(first, low.1);
+                for &x in &grid[grid.partition_point(|x| *x <= first)..] {
+                    let at = time(x);
+                    if at != low.1 {
+                        let (mut inside, mut outside) = (low.0, x);
+                        while outside - inside > 1e-9 {
+                            let middle = f64::midpoint(inside, outside);
+                            if time(middle) == low.1 {
+                                inside = middle;
+                            } else {
+                                outside = middle;
+                            }
+                        }
+                        offer(inside, low.1);
+                    }
+                    offer(x, at);
+                    low = (x, at);
+                }
+            }
+            layers.push(cells.into_iter().flatten().collect());
+            let end = |label: &(f64, f64, usize)| {
+                label.1 + self.time(relays + 1, relays + 1, label.0, self.distance_m)
+            };
+            let ends = layers.last().unwrap().iter().enumerate();
+            let best = ends.min_by(|a, b| end(a.1).total_cmp(&end(b.1)));
+            let mut at = best.map_or(usize::MAX, |best| best.0);
+            let mut x = Vec::new();
+            for layer in layers[1..].iter().rev() {
+                let (here, _, before) = layer.get(at).copied().unwrap_or_default();
+                x.push(here);
+                at = before;
+            }
+            x.reverse();
+            all.push(x);
+        }
+        all
+    }
+
+    /// Returns the x of the relays with the largest rate that a search without a start finds, for each number of
+    /// relays from 1.
+    fn searched(&self) -> Vec<Vec<f64>> {
+        let mut all = self.on_grid();
+        if self.fitted && matches!(self.model, Model::Steps(_)) {
+            for (x, other) in all.iter_mut().zip(self.by_changes()) {
+                let chain = self.with(x.len());
+                if chain.rate(&other) > chain.rate(x) {
+                    *x = other;
+                }
+            }
+        }
+        all
+    }
+
     /// Improves the positions `start` by golden-section search. It moves groups of one to four neighbouring relays
     /// together.
     fn improved(&self, start: &[f64]) -> Vec<f64> {
@@ -242,18 +332,19 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rate found with all relays, bit/s/Hz. The search also starts from the positions
+    /// Returns the largest data rate found with all relays, bit/s/Hz, without and with a search that starts from
+    /// the positions
     /// `others`, m.
-    pub(crate) fn best(&self, others: &[f64]) -> f64 {
-        let grid = self.on_grid();
+    pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {
+        let grid = self.searched();
         let starts = [grid.last().unwrap().as_slice(), others];
         let rates = starts.map(|start| self.rate(&self.improved(start)));
-        rates[0].max(rates[1])
+        [rates[0], rates[0].max(rates[1])]
     }
 
     /// Returns the largest data rate found with any number of relays, bit/s/Hz, and that number.
     pub(crate) fn best_number(&self) -> (f64, usize) {
-        let grid = self.on_grid();
+        let grid = self.searched();
         let mut starts: Vec<&Vec<f64>> = grid.iter().collect();
         let rate = |x: &[f64]| self.with(x.len()).rate(x);
         starts.sort_by(|a, b| rate(b).total_cmp(&rate(a)));

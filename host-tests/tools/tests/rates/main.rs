@@ -128,6 +128,7 @@ fn as_good_as_the_judge(access: Access, has_steps: bool) {
     let first = number("SEED", 1);
     let count = number("COUNT", 15);
     let (mut worst, mut short, mut worst_number) = (1.0_f64, 0, 1.0_f64);
+    let (mut missed, mut least_of_judge) = (0, 1.0_f64);
     for seed in first..first + count {
         let (scenario, radio, chain) = drawn(seed, access, has_steps);
         let relays = u16::try_from(chain.relays()).unwrap();
@@ -149,10 +150,20 @@ fn as_good_as_the_judge(access: Access, has_steps: bool) {
             has_steps || (rate / own - 1.0).abs() < 1e-6,
             "SEED={seed}: {rate} {own}"
         );
-        let best = chain.best(&x);
+        let [alone, best] = chain.best(&x);
         if best > 0.0 {
             let share = rate / best;
             worst = worst.min(share);
+            // The judge itself falls short of positions that the planner found.
+            least_of_judge = least_of_judge.min(alone / best);
+            missed += u32::from(alone < 0.999 * best);
+            if alone < 0.999 * best {
+                println!(
+                    "SEED={seed} judge alone {:.6}, {relays} relays r {} at {x:.2?}",
+                    alone / best,
+                    scenario.reverse
+                );
+            }
             if share < 0.999 {
                 short += 1;
                 println!(
@@ -181,7 +192,8 @@ fn as_good_as_the_judge(access: Access, has_steps: bool) {
         }
     }
     println!(
-        "{access:?}, steps {has_steps}: worst {worst:.6}, number {worst_number:.6}, {short} of {count} below 0.999"
+        "{access:?}, steps {has_steps}: worst {worst:.6}, number {worst_number:.6}, {short} of {count} below 0.999; \
+        the judge alone {least_of_judge:.6}, {missed} below 0.999"
     );
     assert!(worst >= 0.999 && worst_number >= 0.999);
 }

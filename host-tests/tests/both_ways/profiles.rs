@@ -1,0 +1,149 @@
+//! Positions of Algorithm 1 for both directions, for relays with own altitudes, powers or a separation.
+//!
+//! With a separation that binds Algorithm 1 is exact neither in one direction nor in both: `near_optimal_with_a_separation` in
+//! `tests/exact.rs` is the counterpart for one direction. With a way back and relays at different altitudes it rarely misses that relays
+//! gathered at one x are better off farther from the interferer. With 500 scenes of each kind (`COUNT=500`)
+//!
+//! | scenes | both ways: within 1e-4, within 5 % | one way |
+//! | --- | --- | --- |
+//! | own altitudes and powers, usual | 497, 498 | 500, 500 |
+//! | own altitudes and powers, near an interferer | 500, 500 | 500, 500 |
+//! | separation, usual | 441, 492 | 437, 486 |
+//! | separation, near an interferer | 416, 432 | 404, 410 |
+//! | both, usual | 474, 484 | 477, 485 |
+//! | both, near an interferer | 411, 434 | 420, 428 |
+
+use chacha20::ChaCha8Rng;
+use host_tests::placing::{generator, places, solve, xs};
+use rand::{Rng, RngExt};
+use uav_relay::Profile;
+use uav_relay_oracle::random::count;
+
+use super::judge::Chain;
+use super::scenes::{ENDS, adversarial, in_noise, log_uniform, mission, narrow, usual};
+
+type Draw = fn(&mut ChaCha8Rng, [f64; 2], f64) -> Chain;
+
+/// Returns the profiles of all relays, by index.
+fn profiles(chain: &Chain) -> Vec<(u16, Profile)> {
+    let profile = |index: usize| {
+        let own = chain.altitudes_m.get(index - 1);
+        let profile = Profile {
+            altitude_m: own.copied().unwrap_or(chain.altitude_m) as f32,
+            power_w: chain.powers_w[index] as f32,
+        };
+        (index as u16, profile)
+    };
+    (1..=chain.relays()).map(profile).collect()
+}
+
+/// Gives each relay an altitude of 10 to 80 m and a power of 0.3 to 3 W of its own.
+fn with_own(rng: &mut impl Rng, mut chain: Chain) -> Chain {
+    for index in 1..=chain.relays() {
+        chain.altitudes_m.push(narrow(rng.random_range(10.0..80.0)));
+        chain.powers_w[index] = narrow(log_uniform(rng, 0.3, 3.0));
+    }
+    chain
+}
+
+/// Requires a separation of 0.2 to 0.98 of the largest one that fits on the line.
+fn with_separation(rng: &mut impl Rng, mut chain: Chain) -> Chain {
+    let gaps = (chain.relays() - 1).max(1) as f64;
+    chain.apart_m = narrow(chain.distance_m / gaps * rng.random_range(0.2..0.98));
+    chain
+}
+
+/// Numbers of scenes: all, those whose SIR is within 1e-4 of the judge's, and those within 5 %. And the worst share.
+#[derive(Debug, Default)]
+struct Tally {
+    all: usize,
+    tight: usize,
+    near: usize,
+    worst: f64,
+}
+
+impl Tally {
+    /// Compares the agreed positions of `chain` with the judge's. The mission has one direction if `one_way`.
+    fn add(&mut self, chain: &Chain, one_way: bool) {
+        let (mut chain, mut known) = (chain.clone(), chain.clone());
+        if one_way {
+            (chain.reverse, known.reverse) = (1e-12, 0.0);
+        }
+        let (mission, own) = (mission(&known), profiles(&chain));
+        let x = solve(&mission, &own).map(|agreed| xs(&places(&mission, &own, agreed.target)));
+        let ours = x.as_ref().map_or(0.0, |x| chain.value(x));
+        let (mut best, mut found) = chain.best();
+        if let Some(x) = &x {
+            let (from_ours, refined) = chain.refined(x);
+            if from_ours > best {
+                (best, found) = (from_ours, refined);
+            }
+        }
+        let share = if best > 0.0 { ours / best } else { 1.0 };
+        if self.all == 0 {
+            self.worst = 1.0;
+        }
+        self.all += 1;
+        self.tight += usize::from(share > 1.0 - 1e-4);
+        self.near += usize::from(share > 0.95);
+        self.worst = self.worst.min(share);
+        if share < 1.0 - 1e-4 && !one_way {
+            println!("{share:.6}: {x:.2?} instead of {found:.2?} in {chain:?}");
+        }
+    }
+
+    fn report(&self, what: &str) {
+        let Self {
+            all,
+            tight,
+            near,
+            worst,
+        } = self;
+        println!("{what}: of {all} {tight} within 1e-4, {near} within 5 %, worst {worst:.6}");
+    }
+}
+
+/// Compares the agreed positions in random scenes with the judge's, in both directions and in one.
+fn best_places(seed: u64, what: &str, change: fn(&mut ChaCha8Rng, Chain) -> Chain) {
+    let mut rng = generator(seed);
+    let draws: [(&str, Draw); 2] = [("usual", usual), ("near an interferer", adversarial)];
+    for (name, draw) in draws {
+        let [mut both, mut one] = [(); 2].map(|()| Tally::default());
+        for round in 0..count(60) {
+            let reverse = if round % 3 == 0 {
+                1.0
+            } else {
+                log_uniform(&mut rng, 0.01, 1.0)
+            };
+            let mut chain = draw(&mut rng, ENDS[round % 3], reverse);
+            chain = change(&mut rng, chain);
+            if round % 2 == 1 {
+                chain = in_noise(&mut rng, chain);
+            }
+            both.add(&chain, false);
+            one.add(&chain, true);
+        }
+        both.report(&format!("{what}, {name}, both ways"));
+        one.report(&format!("{what}, {name}, one way"));
+        // Algorithm 1 takes a relay's positions for an interval, which they are not always.
+        assert!(both.near * 100 >= both.all * 80);
+    }
+}
+
+#[test]
+fn best_places_of_relays_with_their_own_altitudes_and_powers() {
+    best_places(3341, "own altitudes and powers", with_own);
+}
+
+#[test]
+fn best_places_with_a_separation_that_binds() {
+    best_places(3342, "separation", with_separation);
+}
+
+#[test]
+fn best_places_of_own_relays_with_a_separation_that_binds() {
+    best_places(3343, "both", |rng, chain| {
+        let chain = with_own(rng, chain);
+        with_separation(rng, chain)
+    });
+}
