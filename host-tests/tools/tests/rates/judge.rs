@@ -276,8 +276,7 @@ impl Chain {
         all
     }
 
-    /// Returns the x of the relays with the largest rate that a search without a start finds, for each number of
-    /// relays from 1.
+    /// Returns the x of relays with the largest rate found without a start, for each number from 1 on.
     fn searched(&self) -> Vec<Vec<f64>> {
         let mut all = self.on_grid();
         if self.fitted && matches!(self.model, Model::Steps(_)) {
@@ -332,9 +331,9 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rate found with all relays, bit/s/Hz, without and with a search that starts from
-    /// the positions
-    /// `others`, m.
+    /// Returns the largest data rates found with all relays, bit/s/Hz.
+    ///
+    /// The second search starts from the positions `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {
         let grid = self.searched();
         let starts = [grid.last().unwrap().as_slice(), others];
