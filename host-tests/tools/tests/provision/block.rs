@@ -7,7 +7,7 @@ use uav_relay::field::FieldError;
 use uav_relay::flight::course::Course;
 use uav_relay::mission::MissionError;
 use uav_relay::{Adjust, ChannelLoad, Instant, Local, Measure, Method, Relay, Settings, Wiring};
-use uav_relay_scenario::Scenario;
+use uav_relay_scenario::{ListenSpec, Scenario};
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Config, ConfigError, LEN, MAX_POINTS};
 
@@ -393,7 +393,7 @@ fn a_field_out_of_range_is_named() {
 }
 
 #[test]
-fn a_way_back_is_stored_and_is_for_align_and_joint_without_sensing() {
+fn a_way_back_is_stored_and_is_refused_for_joint_with_sensing() {
     let scenario = Scenario {
         reverse: 0.25,
         rx_w: 5.0,
@@ -411,10 +411,17 @@ fn a_way_back_is_stored_and_is_for_align_and_joint_without_sensing() {
         reads(&changed(block, 14, &[1])).map(|config| config.method),
         Ok(Method::Joint)
     );
-    let flight = flight.by(Method::Joint);
-    flight.block(3).unwrap();
-    let adjust = Method::Adjust(Adjust::default());
-    let error = flight.by(adjust).block(3).unwrap_err();
+    for method in [Method::Joint, Method::Adjust(Adjust::default())] {
+        let flight = Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method);
+        let block = flight.block(3).unwrap();
+        flies(&reads(&block).unwrap());
+    }
+    let listening = Scenario {
+        listen: Some(ListenSpec::default()),
+        ..scenario
+    };
+    let flight = Flight::new(&listening, 5, 1e-4, 7).unwrap();
+    let error = flight.by(Method::Joint).block(3).unwrap_err();
     assert_eq!(error, BlockError::Config(ConfigError::Reverse));
     assert!(error.to_string().contains("link.reverse"), "{error}");
     let higher = 1.0_f32.next_up().to_le_bytes();
