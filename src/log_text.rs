@@ -39,19 +39,23 @@ impl defmt::Format for Event {
                 node,
             } => (
                 Some(node),
-                defmt::intern!("upstream does not reply: look for that drone"),
+                defmt::intern!("upstream (toward Tx) does not reply: look for that drone"),
             ),
             Self::NeighbourLost { node, .. } => (
                 Some(node),
-                defmt::intern!("downstream does not reply: look for that drone"),
+                defmt::intern!("downstream (toward Rx) does not reply: look for that drone"),
             ),
             Self::NeighbourBack {
                 side: Side::Upstream,
                 node,
-            } => (Some(node), defmt::intern!("upstream is received")),
-            Self::NeighbourBack { node, .. } => {
-                (Some(node), defmt::intern!("downstream is received"))
-            }
+            } => (
+                Some(node),
+                defmt::intern!("is now the neighbour upstream (toward Tx)"),
+            ),
+            Self::NeighbourBack { node, .. } => (
+                Some(node),
+                defmt::intern!("is now the neighbour downstream (toward Rx)"),
+            ),
             Self::NotHeard { node } => (
                 Some(node),
                 defmt::intern!(
@@ -76,7 +80,9 @@ impl defmt::Format for Event {
             ),
             Self::DuplicateIndex { node } => (
                 Some(node),
-                defmt::intern!("shares its number with another node: land one of the two"),
+                defmt::intern!(
+                    "shares its number with another node: land one of the two, and give it its own number"
+                ),
             ),
             Self::SensorOff { node } => (
                 Some(node),
@@ -87,24 +93,31 @@ impl defmt::Format for Event {
             Self::ViewAccepted => (
                 None,
                 defmt::intern!(
-                    "a new view (membership of the chain) has been agreed: new positions follow"
+                    "the relays have agreed on new members of the chain (view): new positions follow"
                 ),
             ),
             Self::LeaseLapsed => (
                 None,
                 defmt::intern!(
-                    "the lease of the last agreement has expired because not all relays are reachable: this relay keeps its setpoint"
+                    "not all relays are reachable, so the last agreement is no longer used: this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)"
                 ),
             ),
             Self::NoQuorum => (
                 None,
                 defmt::intern!(
-                    "no quorum, because too few relays are reachable: bring the missing relays into range, or land the reachable ones"
+                    "no quorum: too few relays receive each other, so this relay keeps its setpoint: bring the missing relays into range, or land this part of the chain"
                 ),
             ),
-            Self::Uploaded => (None, defmt::intern!("a newer mission has been received")),
+            Self::Uploaded => (
+                None,
+                defmt::intern!("a newer mission has been received by an upload"),
+            ),
             Self::UploadRefused { why } => {
-                return defmt::write!(f, "a newer mission was rejected: {}", why);
+                return defmt::write!(
+                    f,
+                    "a newer mission, received by an upload, was rejected: {}",
+                    why
+                );
             }
             Self::NewEstimate => (
                 None,
@@ -113,7 +126,7 @@ impl defmt::Format for Event {
             Self::InterfererUnclear => (
                 None,
                 defmt::intern!(
-                    "the measurements do not fit one interferer, or are too few: the last estimate is kept"
+                    "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
                 ),
             ),
             Self::Adopted => (None, defmt::intern!("the chain flies the uploaded mission")),
@@ -127,7 +140,7 @@ impl defmt::Format for Event {
 }
 
 texts!(LineError {
-    LineError::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has no sites",
+    LineError::Distance => "the mission's distance must be the distance between its sites (Tx and Rx on earth), or between the sites loaded before flight if it has none",
     LineError::Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
     LineError::Altitude => "the altitudes must be within the relay's own geofence",
     LineError::Lateral => "the lateral range must be within the relay's own geofence",
@@ -147,18 +160,18 @@ mod autopilot {
     });
 
     texts!(State {
-        State::Silent => "no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2",
+        State::Silent => "no heartbeat for 3 s: is the autopilot on, is its cable right, and does its port use MAVLink 2 and this data rate?",
         State::Grounded => "on the ground, or not armed",
-        State::Standby => "in the air, not controlled by the relay",
+        State::Standby => "in the air, and not controlled by the relay",
         State::Engaged => "setpoint control engaged",
-        State::Blind => "no recent position from the autopilot; the last target is kept",
+        State::Blind => "no recent position from the autopilot, so its last target is kept",
     });
 
     texts!(ReleaseCause {
         ReleaseCause::Chosen => "the pilot or a ground station chose another mode",
         ReleaseCause::Failsafe => "failsafe of the autopilot",
         ReleaseCause::Fence => "fence of the autopilot breached",
-        ReleaseCause::Link => "the link was interrupted or late",
+        ReleaseCause::Link => "the link to the autopilot was interrupted or late",
     });
 
     texts!(FlightMode {
@@ -168,7 +181,7 @@ mod autopilot {
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        FlightMode::Other => "a mode unknown to the relay",
+        FlightMode::Other => "another one, such as a mission or a take-off",
     });
 
     impl defmt::Format for Release {
@@ -180,18 +193,18 @@ mod autopilot {
     texts!(WaitReason {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
         WaitReason::Link => "messages from the autopilot arrive late",
-        WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started; choose another mode first",
-        WaitReason::Unseen => "no other mode than OFFBOARD or GUIDED was reported since the relay started",
-        WaitReason::Position => "the position is unknown, or not near the line between transmitter and receiver",
+        WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
+        WaitReason::Unseen => "no other mode than OFFBOARD or GUIDED was reported without a failsafe since the relay started: end the failsafe, or choose another mode",
+        WaitReason::Position => "the drone's position is unknown, or not near the line between transmitter and receiver",
         WaitReason::NotReady => "this drone is on the wrong side of a neighbour along the line; fly it to its own side first",
     });
 
     texts!(Mistrust {
-        Mistrust::NoKey => "signs its frames and ignores unsigned ones; this relay has no autopilot key",
-        Mistrust::SignsOnly => "signs its frames but answers unsigned ones; this relay has no autopilot key",
-        Mistrust::Unsigned => "does not sign its frames, which are ignored; this relay has an autopilot key",
-        Mistrust::OtherKey => "signs with another key than this relay's autopilot key; its frames are ignored",
-        Mistrust::Old => "signs with an old timestamp; its frames are ignored",
+        Mistrust::NoKey => "signs its frames and ignores unsigned ones: give this relay the autopilot's key",
+        Mistrust::SignsOnly => "signs its frames but answers unsigned ones: this relay controls it without a key",
+        Mistrust::Unsigned => "does not sign its frames, which are ignored: give it the key, or take the autopilot's key from this relay",
+        Mistrust::OtherKey => "signs with another key than this relay has for it, so its frames are ignored: give both the same key",
+        Mistrust::Old => "signs with an old timestamp, so its frames are ignored: check its clock",
     });
 
     impl defmt::Format for AutopilotEvent {
@@ -207,7 +220,9 @@ mod autopilot {
                     f,
                     "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
                 ),
-                Self::FenceBreached => defmt::write!(f, "fence breached"),
+                Self::FenceBreached => {
+                    defmt::write!(f, "the drone is outside the autopilot's fence")
+                }
                 Self::OffLine(off) => defmt::write!(
                     f,
                     "the drone is {=u32} m from the line between transmitter and receiver",
@@ -215,17 +230,17 @@ mod autopilot {
                 ),
                 Self::LostCleared { relays, from, .. } => defmt::write!(
                     f,
-                    "lost relays {} have landed, by MAVLink system {=u8}, component {=u8}: this drone keeps clear of them no longer",
-                    named(relays),
+                    "MAVLink system {=u8}, component {=u8} reports the lost relays {} as landed: this drone no longer keeps clear of them",
                     from.system,
-                    from.component
+                    from.component,
+                    named(relays)
                 ),
                 Self::ClearRefused { relays, from } => defmt::write!(
                     f,
-                    "the command to clear the lost relays {} was denied: name all lost relays on one side; by MAVLink system {=u8}, component {=u8}",
-                    named(relays),
+                    "denied MAVLink system {=u8}, component {=u8} to clear the lost relays {}: the command must name every lost relay on that side of this relay, and no other",
                     from.system,
-                    from.component
+                    from.component,
+                    named(relays)
                 ),
                 Self::Mistrusted(why) => defmt::write!(f, "{}", why),
             }

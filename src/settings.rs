@@ -303,14 +303,14 @@ impl core::fmt::Display for SetupError {
                 "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
             }
             Self::Step => "the fixed target step (linear SIR) must be above 0",
-            Self::Method => "method must be Align with an interference field; Joint needs the feature altitude and at most 100 relays, Adjust needs the feature adjust",
-            Self::Reverse => "a mission with a reverse above 0 needs the method Align or Adjust, which place relays for both directions",
-            Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
+            Self::Method => "the method must be Align if the mission has an interference field; otherwise Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust needs the cargo feature `adjust`",
+            Self::Reverse => "the method must be Align or Adjust if the mission's reverse is above 0, because Joint places relays for one direction only",
+            Self::Adjust => "Adjust::explore_m must be within 0 to 1e5, and the grid of Adjust::local at least 2 by 2",
             Self::Measure => {
-                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field is needed"
+                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000; measure needs the cargo feature `field`"
             }
             Self::Listen => {
-                "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1; listen needs the feature sensing and a mission without an interference field"
+                "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1; listen needs the cargo feature `sensing` and a mission without an interference field"
             }
             Self::HopTime => "hop_time must be above 0",
             Self::Epoch => "auth.epoch must be above 0, and above the epoch of every earlier start",
@@ -318,7 +318,7 @@ impl core::fmt::Display for SetupError {
             Self::WithoutQuorum => {
                 "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
             }
-            Self::Guard => "guard needs the feature guard, geofence limits within -1e7 to 1e7 m with least <= most, separation_m within 0 to 1e5, relays within 1 to 1000, and hover_m within 0 to 1e3",
+            Self::Guard => "guard: geofence limits must be within -1e7 to 1e7 m, each lower limit at most its upper limit; separation_m within 0 to 1e5, relays within 1 to 1000, hover_m within 0 to 1e3; guard needs the cargo feature `guard`",
         })
     }
 }

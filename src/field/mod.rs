@@ -38,14 +38,21 @@ pub enum FieldError {
     Upsilon,
 }
 
-impl core::fmt::Display for FieldError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
+impl FieldError {
+    /// Returns the error's text: the value and its range.
+    const fn text(self) -> &'static str {
+        match self {
             Self::Points => "an interference field must have 1 to 1024 points",
             Self::Place => "x_m must be within -1e7 to 1e7",
             Self::Order => "x_m must increase from point to point",
             Self::Upsilon => "upsilon_per_w must be within 1e-9 to 1e32",
-        })
+        }
+    }
+}
+
+impl core::fmt::Display for FieldError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.text())
     }
 }
 
@@ -130,10 +137,7 @@ impl Field {
     pub const fn new(points: &'static [FieldPoint]) -> Self {
         match Self::try_new(points) {
             Ok(field) => field,
-            Err(FieldError::Points) => panic!("an interference field must have 1 to 1024 points"),
-            Err(FieldError::Place) => panic!("x_m must be within -1e7 to 1e7"),
-            Err(FieldError::Order) => panic!("x_m must increase from point to point"),
-            Err(FieldError::Upsilon) => panic!("upsilon_per_w must be within 1e-9 to 1e32"),
+            Err(error) => panic!("{}", error.text()),
         }
     }
 

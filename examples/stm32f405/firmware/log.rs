@@ -139,7 +139,7 @@ pub(crate) fn no_flight() {
 #[cfg(feature = "mavlink-signing")]
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed, and frames that are not signed with its key are ignored"
+        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
     );
 }
 
@@ -253,10 +253,10 @@ pub(crate) fn refused(error: ConfigError) {
 #[cfg(feature = "auth")]
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
-        info!("frames are signed, epoch {=u32}", epoch);
+        info!("frames are signed; epoch (start counter) {=u32}", epoch);
     } else {
         error!(
-            "frames are signed, epoch {=u32}; the epoch cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch (start counter) {=u32}, which cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }
@@ -264,7 +264,7 @@ pub(crate) fn signs(epoch: u32, is_stored: bool) {
 
 #[cfg(feature = "auth")]
 pub(crate) fn unsigned() {
-    warn!("no key: frames are not signed, and anybody in range can forge them");
+    warn!("no key: frames are not signed, so anybody in range can forge them");
 }
 
 #[cfg(feature = "auth")]

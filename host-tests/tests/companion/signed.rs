@@ -85,13 +85,13 @@ fn a_bad_key_or_epoch_is_named() {
             "key",
             text("text"),
             1,
-            "text: must hold a number within 0 to 4294967294",
+            "text: must contain one number within 0 to 4294967294: the epoch of the last start",
         ),
         (
             "key",
             text("last"),
             1,
-            "last: is the largest epoch, and a start needs a larger one",
+            "last: contains the largest epoch, and every start needs a larger one: give all relays a new key, and remove this file",
         ),
         ("key", text("no/folder"), 1, "folder: cannot be written"),
         (

@@ -83,7 +83,7 @@ fn round(channel: &Medium, sockets: &[PathBuf], relays: &mut [Relay; 3]) {
     }
     channel.plug(1);
     fill_disk(third.pid(), false);
-    third.line("is written again, after ");
+    third.line("can be written again, after ");
     for socket in sockets {
         until(socket, of_three);
     }
@@ -165,7 +165,7 @@ fn faults_of_ports_and_disks_end_no_relay() {
     check_logged_once_a_round(&said, parts, rounds);
     let parts = [
         "cannot be written: ",
-        "is written again, after ",
+        "can be written again, after ",
         "hang-up: ",
     ];
     check_logged_once_a_round(&third.stopped(), parts, rounds);

@@ -123,7 +123,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     field.media[0].pull(4);
     rx.line("port lost: --tty ");
     rx.signal(Signal::HUP);
-    rx.line("hang-up: the log file was reopened; the station continues");
+    rx.line("hang-up: the log file was reopened after SIGHUP; the station continues");
     field.media[0].plug(4);
     rx.line("port back: --tty ");
     let is_louder = |said: &Value| said["relay"]["receiver_w"].as_f64().unwrap() > 1.3 * rx_w;

@@ -15,9 +15,9 @@ fn a_port_that_vanishes_is_opened_again() {
     for _ in 0..2 {
         let (_, sleeps) = flight.relay.cost();
         flight.drone.order("unplug");
-        let line = flight
-            .relay
-            .line("device disconnected; retried until it is back");
+        let line = flight.relay.line(
+            "the device was disconnected; opened again as soon as it is back: check its cable",
+        );
         assert!(line.contains("port lost: --autopilot /"), "{line}");
         flight.relay.line("autopilot: no heartbeat");
         std::thread::sleep(Duration::from_millis(1_500));
@@ -33,14 +33,14 @@ fn a_port_that_vanishes_is_opened_again() {
         flight.drone.receive(ReceivedMessage::is_target);
     }
     flight.arrives(place);
-    let gone = flight.relay.lines_with("device disconnected");
+    let gone = flight.relay.lines_with("the device was disconnected");
     assert!(gone.is_empty(), "once each: {gone:?}");
 
     // Messages are requested again from an autopilot that was switched off with its port.
     flight.drone.order("unplug");
     flight
         .relay
-        .line("device disconnected; retried until it is back");
+        .line("the device was disconnected; opened again as soon as it is back: check its cable");
     flight.drone.order("reboot");
     flight.drone.forget();
     flight.drone.order("plug");

@@ -97,7 +97,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     vehicle.run(1_000);
     wait_for_line(
         &mut fleet,
-        "autopilot: in the air, not controlled by the relay",
+        "autopilot: in the air, and not controlled by the relay",
     );
     assert_eq!(vehicle.told.is_empty(), kind == Kind::ArduCopter);
     for told in &vehicle.told {

@@ -32,12 +32,12 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let sides = [
         (
             2,
-            "node 3 downstream does not reply: look for that drone",
+            "node 3 downstream (toward Rx) does not reply: look for that drone",
             asked[0],
         ),
         (
             4,
-            "node 3 upstream does not reply: look for that drone",
+            "node 3 upstream (toward Tx) does not reply: look for that drone",
             asked[1],
         ),
     ];

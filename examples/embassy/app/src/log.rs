@@ -32,16 +32,16 @@ pub(crate) fn begins(config: &Config) {
 }
 
 pub(crate) fn unsigned() {
-    warn!("no key: frames are not signed, and anybody in range can forge them");
+    warn!("no key: frames are not signed, so anybody in range can forge them");
 }
 
 /// Logs the signing epoch, a number that rises at every start. `is_stored` is true if the flash has stored it.
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
-        info!("frames are signed, epoch {}", epoch);
+        info!("frames are signed; epoch (start counter) {}", epoch);
     } else {
         error!(
-            "frames are signed, epoch {}; the epoch cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch (start counter) {}, which cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }
@@ -63,7 +63,7 @@ pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
 
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed, and frames that are not signed with its key are ignored"
+        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
     );
 }
 

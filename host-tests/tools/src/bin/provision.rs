@@ -81,7 +81,7 @@ fn run(options: &Options) -> Result<String, String> {
     };
     if secret.is_none() {
         command::print_line(
-            "no --key-file: frames are not signed, and anybody in range can forge them",
+            "no --key-file: frames are not signed, so anybody in range can forge them",
         );
     }
     Ok(said)

@@ -67,7 +67,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(
         said,
-        "no --key-file: frames are not signed, and anybody in range can forge them\n"
+        "no --key-file: frames are not signed, so anybody in range can forge them\n"
     );
     assert_eq!(block(), paper());
 
