@@ -36,7 +36,7 @@ impl Tty {
             Errno::ACCESS => format!(
                 "{name}: permission denied: on most systems only members of the group dialout may open it"
             ),
-            Errno::INVAL => format!("{name}: does not support {baud} bit/s"),
+            Errno::INVAL => format!("{name}: this device does not support {baud} bit/s"),
             error => format!("{name}: {error}"),
         })?;
         Ok(Self {

@@ -68,7 +68,7 @@ fn a_later_upload_is_based_on_the_flown_mission() {
     let ended = bench.uploads("1", moved).succeeds();
     assert_eq!(
         lines_of_event(&ended, "current"),
-        ["relay 1 flies the mission with which it was loaded"]
+        ["relay 1 flies the mission loaded before flight"]
     );
     let changes = lines_of_event(&ended, "change");
     assert_eq!(
@@ -254,7 +254,7 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
     let mut bench = Bench::new();
     bench.agreed();
     let new = "--new-interferer 80,700,-300";
-    let line = "--version 1: the upload cannot be confirmed, because standard input is not a terminal: give --yes, or --dry-run to see its changes";
+    let line = "--version 1: nobody can confirm the upload, because standard input is not a terminal: give --yes to upload without a question, or --dry-run to see the changes only";
     assert_eq!(bench.uploads("1", new).refused(2), line);
     let question = "Upload version 1? [y/N] ";
     for answer in ["n\n", "\n"] {

@@ -158,7 +158,7 @@ fn wrong_options_of_a_station_are_named() {
     let files = Files::new();
     let (signed, tty) = (files.signed("key", "ground"), crate::pty::Pty::new());
     let folder = files.text("");
-    let udp = "must be udp:PORT or udp:HOST:PORT, PORT within 1 to 65535";
+    let udp = "must be udp:PORT or udp:HOST:PORT, with PORT within 1 to 65535";
     let mut cases = vec![
         (String::new(), 2, "--version".to_owned()),
         (

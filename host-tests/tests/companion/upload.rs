@@ -163,7 +163,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
         rx.tty(1)
     ));
     let line = station.line("adopted: ");
-    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; polling it until the others do, too";
+    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; the station asks it until the others do, too";
     assert!(line.ends_with(first), "{line}");
     assert_eq!(*state.lock().unwrap(), Wire::Cut);
     // Several polls later the others still do not fly it.
@@ -247,9 +247,13 @@ fn the_ground_gives_up_after_its_time_limit() {
     let (files, wire) = (Files::new(), Medium::new(1, QUIET));
     let more = format!("--end tx --tty {} --timeout 2", wire.tty(0));
     let line = ground(&files, "7", &more).refused(1);
-    let reports = "--timeout 2: no relay has reported the mission that it flies: ";
+    let reports =
+        "--timeout 2: not finished after 2 s: no relay has reported the mission that it flies: ";
     assert!(line.starts_with(reports), "{line}");
-    assert!(line.ends_with("; 0 frames refused"), "{line}");
+    assert!(
+        line.ends_with("; 0 received frames were rejected"),
+        "{line}"
+    );
 }
 
 /// Checks that relays with a geofence refuse an altitude outside it, and name the permitted range.
@@ -282,14 +286,17 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         );
         let far = format!("farthest outside is relay 1, at altitude {altitude}.0 m");
         let line = ground(&chain.files, "5", &more).refused(1);
-        assert_eq!(line, format!("--version 5: {why}; {far}"));
+        assert_eq!(
+            line,
+            format!("--version 5: {why}; {far}; --no-fence uploads it nevertheless")
+        );
         let relays = &mut chain.relays;
         assert!(
             !relays[0].has_printed("upload refused: "),
             "nothing was sent"
         );
         let line = ground(&chain.files, "5", &format!("{more} --no-fence")).refused(1);
-        let by = "relay 1, or a relay beyond it, rejects the upload";
+        let by = "relay 1, or a relay behind it, rejects the upload";
         assert_eq!(line, format!("--version 5: {by}: {why}"));
         let own = "upload refused: the altitudes must be within the relay's own geofence, ";
         relays[0].line(&format!("{own}{range}"));
