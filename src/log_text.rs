@@ -6,7 +6,6 @@
 )]
 
 use crate::event::Event;
-use crate::geodetic::LineError;
 use crate::side::Side;
 
 /// Implements `defmt::Format` for an enum, with one text for each variant.
@@ -25,127 +24,93 @@ macro_rules! texts {
 
 impl defmt::Format for Event {
     fn format(&self, f: defmt::Formatter<'_>) {
-        let (node, text) = match *self {
-            Self::SetpointChanged => (None, defmt::intern!("the setpoint has changed")),
-            Self::Converged => (None, defmt::intern!("the relays have agreed on positions")),
-            Self::Infeasible => (
-                None,
-                defmt::intern!(
-                    "no positions of the relays meet any target SIR: all relays keep their positions"
-                ),
+        match (*self, node(*self)) {
+            (Self::UploadRefused { why }, _) => defmt::write!(
+                f,
+                "a newer mission, received by an upload, was rejected: {}",
+                why
             ),
-            Self::NeighbourLost {
-                side: Side::Upstream,
-                node,
-            } => (
-                Some(node),
-                defmt::intern!("upstream (toward Tx) does not reply: look for that drone"),
-            ),
-            Self::NeighbourLost { node, .. } => (
-                Some(node),
-                defmt::intern!("downstream (toward Rx) does not reply: look for that drone"),
-            ),
-            Self::NeighbourBack {
-                side: Side::Upstream,
-                node,
-            } => (
-                Some(node),
-                defmt::intern!("is now the neighbour upstream (toward Tx)"),
-            ),
-            Self::NeighbourBack { node, .. } => (
-                Some(node),
-                defmt::intern!("is now the neighbour downstream (toward Rx)"),
-            ),
-            Self::NotHeard { node } => (
-                Some(node),
-                defmt::intern!(
-                    "does not receive this relay: check this relay's transmitter and that node's receiver"
-                ),
-            ),
-            Self::MissionMismatch { node } => (
-                Some(node),
-                defmt::intern!("has another mission: load the same mission into both"),
-            ),
-            Self::KeyMismatch { node } => (
-                Some(node),
-                defmt::intern!(
-                    "signs with another key, or an attacker uses its number: give both the same key"
-                ),
-            ),
-            Self::EpochWentBack { node } => (
-                Some(node),
-                defmt::intern!(
-                    "has started with an epoch (start counter) that is not above its last one, and its frames are rejected: increase its epoch and restart it"
-                ),
-            ),
-            Self::DuplicateIndex { node } => (
-                Some(node),
-                defmt::intern!(
-                    "shares its number with another node: land one of the two, and give it its own number"
-                ),
-            ),
-            Self::SensorOff { node } => (
-                Some(node),
-                defmt::intern!(
-                    "measures interference that does not fit the other measurements, and is ignored: check its receiver"
-                ),
-            ),
-            Self::ViewAccepted => (
-                None,
-                defmt::intern!(
-                    "the relays have agreed on new members of the chain (view): new positions follow"
-                ),
-            ),
-            Self::LeaseLapsed => (
-                None,
-                defmt::intern!(
-                    "not all relays are reachable, so the last agreement is no longer used: this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)"
-                ),
-            ),
-            Self::NoQuorum => (
-                None,
-                defmt::intern!(
-                    "no quorum: too few relays receive each other, so this relay keeps its setpoint: bring the missing relays into range, or land this part of the chain"
-                ),
-            ),
-            Self::Uploaded => (
-                None,
-                defmt::intern!("a newer mission has been received by an upload"),
-            ),
-            Self::UploadRefused { why } => {
-                return defmt::write!(
-                    f,
-                    "a newer mission, received by an upload, was rejected: {}",
-                    why
-                );
-            }
-            Self::NewEstimate => (
-                None,
-                defmt::intern!("the interference estimate has changed: new positions follow"),
-            ),
-            Self::InterfererUnclear => (
-                None,
-                defmt::intern!(
-                    "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
-                ),
-            ),
-            Self::Adopted => (None, defmt::intern!("the chain flies the uploaded mission")),
-        };
-        if let Some(node) = node {
-            defmt::write!(f, "node {=u16} {=istr}", node, text);
-        } else {
-            defmt::write!(f, "{=istr}", text);
+            (event, Some(node)) => defmt::write!(f, "node {=u16} {=istr}", node, text(event)),
+            (event, None) => defmt::write!(f, "{=istr}", text(event)),
         }
     }
 }
 
-texts!(LineError {
-    LineError::Distance => "the mission's distance must be the distance between its sites (Tx and Rx on earth), or between the sites loaded before flight if it has none",
-    LineError::Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
-    LineError::Altitude => "the altitudes must be within the relay's own geofence",
-    LineError::Lateral => "the lateral range must be within the relay's own geofence",
-    LineError::Length => "the distance must be within the relay's own geofence",
-});
+/// Returns the node that the event concerns, if any.
+const fn node(event: Event) -> Option<u16> {
+    match event {
+        Event::NeighbourLost { node, .. }
+        | Event::NeighbourBack { node, .. }
+        | Event::NotHeard { node }
+        | Event::MissionMismatch { node }
+        | Event::KeyMismatch { node }
+        | Event::EpochWentBack { node }
+        | Event::DuplicateIndex { node }
+        | Event::SensorOff { node } => Some(node),
+        _ => None,
+    }
+}
+
+/// Returns the text of an event; of one that concerns a node, the text behind the node's number.
+fn text(event: Event) -> defmt::Str {
+    match event {
+        Event::SetpointChanged => defmt::intern!("the setpoint has changed"),
+        Event::Converged => defmt::intern!("the relays have agreed on positions"),
+        Event::Infeasible => defmt::intern!(
+            "no positions of the relays meet any target SIR: all relays keep their positions"
+        ),
+        Event::NeighbourLost {
+            side: Side::Upstream,
+            ..
+        } => defmt::intern!("upstream (toward Tx) does not reply: look for that drone"),
+        Event::NeighbourLost { .. } => {
+            defmt::intern!("downstream (toward Rx) does not reply: look for that drone")
+        }
+        Event::NeighbourBack {
+            side: Side::Upstream,
+            ..
+        } => defmt::intern!("is now the neighbour upstream (toward Tx)"),
+        Event::NeighbourBack { .. } => {
+            defmt::intern!("is now the neighbour downstream (toward Rx)")
+        }
+        Event::NotHeard { .. } => defmt::intern!(
+            "does not receive this relay: check this relay's transmitter and that node's receiver"
+        ),
+        Event::MissionMismatch { .. } => {
+            defmt::intern!("has another mission: load the same mission into both")
+        }
+        Event::KeyMismatch { .. } => defmt::intern!(
+            "signs with another key, or an attacker uses its number: give both the same key"
+        ),
+        Event::EpochWentBack { .. } => defmt::intern!(
+            "has started with an epoch (start counter) that is not above its last one, and its frames are rejected: increase its epoch and restart it"
+        ),
+        Event::DuplicateIndex { .. } => defmt::intern!(
+            "shares its number with another node: land one of the two, and give it its own number"
+        ),
+        Event::SensorOff { .. } => defmt::intern!(
+            "measures interference that does not fit the other measurements, and is ignored: check its receiver"
+        ),
+        Event::ViewAccepted => defmt::intern!(
+            "the relays have agreed on new members of the chain (view): new positions follow"
+        ),
+        Event::LeaseLapsed => defmt::intern!(
+            "not all relays are reachable, so the last agreement is no longer used: this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)"
+        ),
+        Event::NoQuorum => defmt::intern!(
+            "no quorum: too few relays receive each other, so this relay keeps its setpoint: bring the missing relays into range, or land this part of the chain"
+        ),
+        Event::Uploaded => defmt::intern!("a newer mission has been received by an upload"),
+        Event::NewEstimate => {
+            defmt::intern!("the interference estimate has changed: new positions follow")
+        }
+        Event::InterfererUnclear => defmt::intern!(
+            "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
+        ),
+        Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
+        Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
+    }
+}
 
 /// Log texts of the autopilot's states, modes, events and reasons.
 #[cfg(feature = "flight")]
@@ -221,7 +186,7 @@ mod autopilot {
                     "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
                 ),
                 Self::FenceBreached => {
-                    defmt::write!(f, "the drone is outside the autopilot's fence")
+                    defmt::write!(f, "the drone is outside the autopilot's fence");
                 }
                 Self::OffLine(off) => defmt::write!(
                     f,

@@ -34,7 +34,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         None => Scenario::default(),
     };
     if !scenario.knows_interference() {
-        let line = "interferer: is missing: a scenario with [listen] but without [[interferer]] is for cargo provision only";
+        let line = "[[interferer]]: is missing: only `cargo provision` accepts a scenario with [listen] and without [[interferer]]";
         return Err(Failure::input(line.to_owned()));
     }
     let number = options.number();

@@ -150,7 +150,8 @@ fn a_key_file_that_others_can_read_is_refused() {
             continue;
         }
         let text = refusal(&keyed);
-        let words = format!("--key-file {file}: mode {mode:04o}: other users of this computer");
+        let words =
+            format!("--key-file {file}: has the mode {mode:04o}, so other users of this computer");
         assert!(text.contains(&words), "{text}");
         assert!(text.contains(&format!("type: chmod 600 {file}")), "{text}");
     }
