@@ -98,7 +98,7 @@ fn text(event: Event) -> defmt::Str {
             "not all relays are reachable, so the last agreement is no longer used: this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)"
         ),
         Event::NoQuorum => defmt::intern!(
-            "no quorum: too few relays receive each other, so this relay keeps its setpoint: bring the missing relays into range, or land this part of the chain"
+            "no quorum: too few relays receive each other to agree on the chain's members: bring the missing relays into range, or land this part of the chain"
         ),
         Event::Uploaded => defmt::intern!("a newer mission has been received by an upload"),
         Event::NewEstimate => {

@@ -91,6 +91,6 @@ fn a_drone_without_the_key_takes_no_part() {
     );
     assert_eq!(
         fleet.after_start(4).nth(2).unwrap().text,
-        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+        "no sites (positions of Tx and Rx on earth): no autopilot is controlled, and drones are not kept apart while they move"
     );
 }

@@ -49,7 +49,7 @@ pub(crate) fn signs(epoch: u32, is_stored: bool) {
 
 pub(crate) fn unguarded() {
     warn!(
-        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+        "no sites (positions of Tx and Rx on earth): no autopilot is controlled, and drones are not kept apart while they move"
     );
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's membership restored from flash");
     } else {
-        error!("votes on the chain's membership in flash are from another firmware, and ignored");
+        error!("votes on the chain's membership in flash are in another firmware's format, and ignored");
     }
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn refused(why: Refused) {
             );
         }
         Refused::NoEpoch => {
-            error!("frames cannot be signed: the epoch (start counter) has reached its maximum");
+            error!("frames cannot be signed: the epoch (start counter) has reached its maximum: provision all drones with a new key");
         }
         Refused::NoAutopilot => {
             error!(
