@@ -203,7 +203,7 @@ impl Hostile {
             .chain(self.flight.begins());
         match all.find(|(_, at)| *at >= end) {
             Some((option, _)) => Err(Failure::input(format!(
-                "{option}: has no effect, because --soak {} ends the run earlier",
+                "{option}: has no effect, because --soak {} ends the run by then",
                 seconds(end)
             ))),
             None => Ok(()),
