@@ -371,7 +371,7 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
             return log_command(now, log, Ok(text), relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
-            let text = "denied: the command must name every lost relay on one side of this relay, and no other";
+            let text = "the command must name every lost relay on one side of this relay, and no other";
             return log_command(now, log, Err(text.to_owned()), relays, from);
         }
         AutopilotEvent::FenceBreached => "the drone is outside the autopilot's fence".to_owned(),

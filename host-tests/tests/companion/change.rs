@@ -132,7 +132,7 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     bench.agreed();
     let more = "--new-altitude 50 --new-band 50,50 --yes";
     let (ended, error) = bench.uploads("1", more).fails(1);
-    let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m";
+    let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m; --no-fence uploads it nevertheless";
     assert_eq!(error, line);
     assert_eq!(
         lines_of_event(&ended, "change")[0],

@@ -80,7 +80,10 @@ fn invalid_position_lines_are_counted_and_logged_once() {
     let said = relay.stopped();
     let times = |part: &str| said.iter().filter(|line| line.contains(part)).count();
     assert_eq!(times("is not x_m"), 1, "{said:?}");
-    assert!(times("position: 8 invalid lines") > 0, "{said:?}");
+    assert!(
+        times("position: 8 lines of --positions were invalid") > 0,
+        "{said:?}"
+    );
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn three_signing_relays_settle_like_the_simulation() {
 fn a_relay_with_a_different_key_is_ignored() {
     let chain = Chain::on_wires(2, QUIET);
     let (mut one, _other) = (start(&chain, 1, "key"), start(&chain, 2, "other"));
-    one.line("lost: relay 2 downstream does not reply");
+    one.line("lost: relay 2 downstream (toward Rx) does not reply");
     assert!(!one.has_printed("setpoint: "));
     let last = one.stopped().pop().unwrap();
     assert!(

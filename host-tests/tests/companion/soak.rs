@@ -97,7 +97,7 @@ fn reports_of_dropped_lines(first: &Relay, reader: PipeReader, dropped: u64) -> 
         first.signal(Signal::USR1);
         std::thread::sleep(Duration::from_millis(20));
         let told = lines.try_iter();
-        let told = told.filter(|it| it.contains(" lines dropped: the output"));
+        let told = told.filter(|it| it.contains(" log lines dropped: the disk was full"));
         let told = told.count();
         if told > 0 {
             return told;

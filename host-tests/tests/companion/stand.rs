@@ -218,7 +218,7 @@ fn a_running_station_uploads_and_keeps_running() {
         )
     };
     let (mut first, level, capture) = station("2", "first");
-    first.line("flown: 1 of 1 relays fly version 2 in view ");
+    first.line("flown: 1 of 1 relays fly version 2, as relay 1 reports for the present members of the chain (view ");
     relay.line("adopted: the chain flies version 2");
     write(&level, "1e-9\n");
     first.line("measurement: 1.000e-9 W by ");

@@ -23,9 +23,12 @@ fn a_port_that_vanishes_is_opened_again() {
         std::thread::sleep(Duration::from_millis(1_500));
         let (_, after) = flight.relay.cost();
         assert!(after - sleeps < 500, "{} wake-ups", after - sleeps);
-        assert!(flight.relay.lines_with("is back").is_empty(), "it is not");
+        assert!(
+            flight.relay.lines_with("is open again").is_empty(),
+            "it is not"
+        );
         flight.drone.order("plug");
-        flight.relay.line("is back");
+        flight.relay.line("is open again");
         // The autopilot is still in GUIDED, and its pilot has to choose that mode again.
         flight.relay.line("autopilot: cannot be engaged");
         flight.drone.order("mode pilot");
@@ -44,6 +47,6 @@ fn a_port_that_vanishes_is_opened_again() {
     flight.drone.order("reboot");
     flight.drone.forget();
     flight.drone.order("plug");
-    flight.relay.line("is back");
+    flight.relay.line("is open again");
     flight.drone.wait_for_requests(&ASKED);
 }

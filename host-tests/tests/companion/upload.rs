@@ -54,7 +54,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
         assert!(!chain.files.path("upload1").exists());
         let ends = format!("--end tx --tty {}", chain.tx.as_ref().unwrap().tty(0));
         let last = ground(&chain.files, "3", &ends).succeeds().pop().unwrap();
-        let flown = "flown: 2 of 2 relays fly version 3 in view ";
+        let flown = "flown: 2 of 2 relays fly version 3, as relay ";
         assert!(last.contains(flown), "{last}");
         // Both log lines come before the ground station's.
         chain.lines("uploaded: version 3 of the mission was received and stored");
@@ -87,7 +87,7 @@ fn a_relay_without_its_upload_is_offered_it_again() {
     chain.lines("converged: ");
     let ends = format!("--shared --end rx --tty {station}");
     let last = ground(&chain.files, "1", &ends).succeeds().pop().unwrap();
-    let flown = "flown: 2 of 2 relays fly version 1 in view ";
+    let flown = "flown: 2 of 2 relays fly version 1, as relay ";
     assert!(last.contains(flown), "{last}");
     chain.settles_at(&uploaded);
     let kept = chain.files.path("upload2");
@@ -176,7 +176,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
     *state.lock().unwrap() = Wire::Open;
     let line = station.line("flown: ");
     assert!(
-        line.contains("flown: 3 of 3 relays fly version 5 in view "),
+        line.contains("flown: 3 of 3 relays fly version 5, as relay "),
         "{line}"
     );
     station.succeeds();
@@ -212,15 +212,27 @@ fn a_useless_upload_file_is_named_and_ignored() {
     };
     for (bytes, words) in [
         (good.clone(), None),
-        (damaged, Some("is damaged or not an upload; not used")),
+        (
+            damaged,
+            Some(
+                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+            ),
+        ),
         (
             good[..Upload::LENGTH].to_vec(),
-            Some("is damaged or not an upload; not used"),
+            Some(
+                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+            ),
         ),
-        (Vec::new(), Some("is damaged or not an upload; not used")),
+        (
+            Vec::new(),
+            Some(
+                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+            ),
+        ),
         (
             stored(&high, &new()),
-            Some("is for relays that were loaded with the mission of digest 0x"),
+            Some("is an upload for relays that were loaded with the mission of digest 0x"),
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();
