@@ -289,7 +289,7 @@ mod tests {
         assert!(
             other
                 .to_string()
-                .ends_with("sites of this flight, and is its position right?")
+                .ends_with("of this flight, and is the drone's position right?")
         );
         // A longitude above 90 degrees is no latitude, so there is no swapped line.
         let far = off(site(47.40, 138.54), site(47.41, 138.55), drone).expect("off");

@@ -324,7 +324,7 @@ impl fmt::Display for Rule {
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::Flag => f.write_str("true or false"),
             Text => f.write_str("a string that is not empty"),
-            Rule::TtyOrUdp => write!(f, "a string with a tty, or with {FORM}"),
+            Rule::TtyOrUdp => write!(f, "a string: a tty, or {FORM}"),
             Choice(texts) => write!(f, "\"{}\"", texts.join("\" or \"")),
             Rule::Table(keys) => write!(f, "a table with the keys {}", names(*keys)),
             Rule::Tables(keys, 0) => write!(f, "a list of tables with the keys {}", names(*keys)),

@@ -144,7 +144,7 @@ fn the_socket_answers_despite_stuck_clients() {
     std::fs::remove_file(&socket).unwrap();
     files.write("status", "");
     let line = Relay::start(&options).refused(1);
-    assert!(line.contains("another file of that name"), "{line}");
+    assert!(line.contains("another file has this name"), "{line}");
 }
 
 #[test]
