@@ -114,11 +114,11 @@ fn a_drone_with_a_bad_configuration_stays_out_and_logs_why() {
         "configuration refused: the block is damaged (its CRC does not match): provision the drone again",
         "configuration refused: the block has another version or length than this firmware reads: provision the drone again",
         "configuration refused: the relay's index must be within 1 to the number of relays",
-        "configuration refused: mission: Distance",
+        "configuration refused: mission: distance_m must be within 1 to 1e6",
         "configuration refused: this relay's altitude must be within 0.1 to 1e5 m, its power within 1e-6 to 1e6 W",
-        "configuration refused: channel: Carrier",
-        "configuration refused: mission: Band",
-        "configuration refused: mission: Lateral",
+        "configuration refused: channel: carrier frequency must be within 1e6 to 1e12 Hz",
+        "configuration refused: mission: the altitude band, band.least_m to band.most_m, must be within 0.1 to 1e5 and include common.altitude_m",
+        "configuration refused: mission: lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
         "configuration refused: the method must be align with an interference field, and otherwise align, joint or adjust",
         "configuration refused: byte 15 (keep the altitude) must be 0 or 1",
         "configuration refused: with the method adjust rounds must be within 1 to 65535 and explore_m within 0 to 1e5, with any other method both 0",
@@ -126,7 +126,7 @@ fn a_drone_with_a_bad_configuration_stays_out_and_logs_why() {
         "configuration refused: the interference field has more points than the block can hold",
         "configuration refused: the bytes after the last point of the interference field must be 0",
         "configuration refused: it has both an interferer and an interference field: leave one out",
-        "configuration refused: interference field: Upsilon",
+        "configuration refused: interference field: upsilon_per_w must be within 1e-9 to 1e32",
     ];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
     fleet.wait("word from every drone", |lines| {
