@@ -79,7 +79,7 @@ pub fn log_overrides(overrides: &[Override], log: &Log) {
             Instant::ZERO,
             "override",
             json!({ "option": option, "instead_of": instead, "file": file }),
-            format_args!("{option} replaces {instead} of the file {file}"),
+            format_args!("{option} replaces {instead} of {file}"),
         );
     }
 }

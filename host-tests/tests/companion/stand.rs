@@ -221,7 +221,7 @@ fn a_running_station_uploads_and_keeps_running() {
     first.line("flown: 1 of 1 relays fly version 2, as relay 1 reports for the present members of the chain (view ");
     relay.line("adopted: the chain flies version 2");
     write(&level, "1e-9\n");
-    first.line("measurement: 1.000e-9 W by ");
+    first.line("measurement: 1.000e-9 W from ");
     first.stopped();
     let said = std::fs::metadata(capture).unwrap().len();
     assert!(said > 500, "{said} bytes in the capture");
