@@ -259,7 +259,7 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
     let question = "Upload version 1? [y/N] ";
     for answer in ["n\n", "\n"] {
         let (status, shown) = at_a_terminal(&bench.options("1", new), answer);
-        let refused = "--version 1: not confirmed, nothing was uploaded\n";
+        let refused = "--version 1: not confirmed, so nothing was uploaded\n";
         assert_eq!((status, shown), (Some(1), format!("{question}{refused}")));
     }
     assert!(!bench.0.relays[0].has_printed("uploaded: "));

@@ -27,7 +27,11 @@ fn three_signing_relays_settle_like_the_simulation() {
         let mut chain = Chain::on_wires(3, noise);
         chain.files.write("epoch2", "41\n");
         chain.relays = (1..=3).map(|index| start(&chain, index, "key")).collect();
-        assert!(chain.relays[1].line("signed: ").ends_with("epoch 42"));
+        assert!(
+            chain.relays[1]
+                .line("signed: ")
+                .ends_with("epoch (start counter) 42")
+        );
         assert_eq!(epoch(&chain.files, "epoch2"), 42);
         // The relay writes the file before the log line.
         chain.relays[0].line("signed: ");
@@ -44,7 +48,11 @@ fn three_signing_relays_settle_like_the_simulation() {
             let fresh = start(&chain, index, "key");
             chain.relays.insert(index - 1, fresh);
         }
-        assert!(chain.relays[1].line("signed: ").ends_with("epoch 43"));
+        assert!(
+            chain.relays[1]
+                .line("signed: ")
+                .ends_with("epoch (start counter) 43")
+        );
         assert_eq!(chain.relays[0].settled(), expected[0]);
         assert_eq!(chain.relays[1].settled(), expected[1]);
     }
@@ -131,7 +139,7 @@ fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     chain.relays.remove(1).stopped();
     chain.files.write("epoch2", "5\n");
     let mut back = start(&chain, 2, "key");
-    assert!(back.line("signed: ").ends_with("epoch 6"));
+    assert!(back.line("signed: ").ends_with("epoch (start counter) 6"));
     let line = chain.relays[0].line("epoch: ");
     let remedy = "epoch: relay 2 has started with an epoch (start counter) that is not above its last one, and its frames are rejected; raise the number in its --epoch-file and restart it";
     assert!(line.ends_with(remedy), "{line}");

@@ -87,7 +87,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     let started = tx.line("\"event\":\"started\"");
     assert!(started.contains("\"end\":\"transmitter\""));
     rx.line("started: receiver of a chain of 3 relays, ");
-    rx.line("measurement: \"nonsense\" is not POWER or receiver POWER, a power within 1e-30 to 1e6 W, or that in dBm");
+    rx.line("measurement: \"nonsense\" is not POWER or receiver POWER, a power within 1e-30 to 1e6 W, or in dBm with the unit");
     let meter = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     // Notation of a spectrum analyser.
     let tx_dbm = format!("{} dBm", 10.0 * f64::log10(tx_w) + 30.0);
