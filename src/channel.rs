@@ -34,7 +34,6 @@ pub struct Channel {
 
 /// Reason why channel parameters are rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ChannelError {
     /// The carrier frequency is not within 1 MHz to 1 THz.
@@ -47,18 +46,12 @@ pub enum ChannelError {
     Weight,
 }
 
-impl core::fmt::Display for ChannelError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Carrier => "carrier frequency must be within 1e6 to 1e12 Hz",
-            Self::ExcessLoss => "excess loss factors must be within 1 to 1e20 (0 to 200 dB)",
-            Self::LossOrder => "the excess loss without line of sight must be at least the excess loss with line of sight",
-            Self::Weight => "weight of line of sight must be within 0 to 1",
-        })
-    }
-}
-
-impl core::error::Error for ChannelError {}
+error_texts!(ChannelError {
+    Carrier => "carrier frequency must be within 1e6 to 1e12 Hz",
+    ExcessLoss => "excess loss factors must be within 1 to 1e20 (0 to 200 dB)",
+    LossOrder => "the excess loss without line of sight must be at least the excess loss with line of sight",
+    Weight => "weight of line of sight must be within 0 to 1",
+});
 
 impl Channel {
     /// Creates a channel at `carrier_hz`, 1e6 to 1e12. The excess losses `excess_los` and `excess_nlos` are *factors*, 1 to 1e20.

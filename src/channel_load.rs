@@ -195,7 +195,7 @@ impl core::fmt::Display for ChannelFull {
         let ms = self.least_probe_after.as_micros() / 1_000;
         write!(
             f,
-            "{} relays in range of each other overload the channel: use at least {} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {} relays in range",
+            "too slow for {} relays in range of each other: use at least {} bit/s, or --probe-after-ms {ms}, or at most {} relays in range of each other",
             self.in_range, self.least_baud, self.most_in_range
         )
     }

@@ -121,19 +121,13 @@ pub enum LineError {
     Length,
 }
 
-impl core::fmt::Display for LineError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has no sites",
-            Self::Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
-            Self::Altitude => "the altitudes must be within the relay's own geofence",
-            Self::Lateral => "the lateral range must be within the relay's own geofence",
-            Self::Length => "the distance must be within the relay's own geofence",
-        })
-    }
-}
-
-impl core::error::Error for LineError {}
+error_texts!(LineError {
+    Distance => "the mission's distance must be the distance between its sites (Tx and Rx on earth), or between the sites loaded before flight if it has none",
+    Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
+    Altitude => "the altitudes must be within the relay's own geofence",
+    Lateral => "the lateral range must be within the relay's own geofence",
+    Length => "the distance must be within the relay's own geofence",
+});
 
 #[cfg(test)]
 mod tests {

@@ -13,6 +13,9 @@
     )
 )]
 
+#[macro_use]
+mod error_text;
+
 #[cfg(feature = "async")]
 pub mod asynch;
 pub mod channel;

@@ -6,7 +6,6 @@
 )]
 
 use crate::event::Event;
-use crate::geodetic::LineError;
 use crate::side::Side;
 
 /// Implements `defmt::Format` for an enum, with one text for each variant.
@@ -25,114 +24,93 @@ macro_rules! texts {
 
 impl defmt::Format for Event {
     fn format(&self, f: defmt::Formatter<'_>) {
-        let (node, text) = match *self {
-            Self::SetpointChanged => (None, defmt::intern!("the setpoint has changed")),
-            Self::Converged => (None, defmt::intern!("the relays have agreed on positions")),
-            Self::Infeasible => (
-                None,
-                defmt::intern!(
-                    "no positions of the relays meet any target SIR: all relays keep their positions"
-                ),
+        match (*self, node(*self)) {
+            (Self::UploadRefused { why }, _) => defmt::write!(
+                f,
+                "a newer mission, received by an upload, was rejected: {}",
+                why
             ),
-            Self::NeighbourLost {
-                side: Side::Upstream,
-                node,
-            } => (
-                Some(node),
-                defmt::intern!("upstream does not reply: look for that drone"),
-            ),
-            Self::NeighbourLost { node, .. } => (
-                Some(node),
-                defmt::intern!("downstream does not reply: look for that drone"),
-            ),
-            Self::NeighbourBack {
-                side: Side::Upstream,
-                node,
-            } => (Some(node), defmt::intern!("upstream is received")),
-            Self::NeighbourBack { node, .. } => {
-                (Some(node), defmt::intern!("downstream is received"))
-            }
-            Self::NotHeard { node } => (
-                Some(node),
-                defmt::intern!(
-                    "does not receive this relay: check this relay's transmitter and that node's receiver"
-                ),
-            ),
-            Self::MissionMismatch { node } => (
-                Some(node),
-                defmt::intern!("has another mission: load the same mission into both"),
-            ),
-            Self::KeyMismatch { node } => (
-                Some(node),
-                defmt::intern!(
-                    "signs with another key, or an attacker uses its number: give both the same key"
-                ),
-            ),
-            Self::EpochWentBack { node } => (
-                Some(node),
-                defmt::intern!(
-                    "has started with an epoch (start counter) that is not above its last one, and its frames are rejected: increase its epoch and restart it"
-                ),
-            ),
-            Self::DuplicateIndex { node } => (
-                Some(node),
-                defmt::intern!("shares its number with another node: land one of the two"),
-            ),
-            Self::SensorOff { node } => (
-                Some(node),
-                defmt::intern!(
-                    "measures interference that does not fit the other measurements, and is ignored: check its receiver"
-                ),
-            ),
-            Self::ViewAccepted => (
-                None,
-                defmt::intern!(
-                    "a new view (membership of the chain) has been agreed: new positions follow"
-                ),
-            ),
-            Self::LeaseLapsed => (
-                None,
-                defmt::intern!(
-                    "the lease of the last agreement has expired because not all relays are reachable: this relay keeps its setpoint"
-                ),
-            ),
-            Self::NoQuorum => (
-                None,
-                defmt::intern!(
-                    "no quorum, because too few relays are reachable: bring the missing relays into range, or land the reachable ones"
-                ),
-            ),
-            Self::Uploaded => (None, defmt::intern!("a newer mission has been received")),
-            Self::UploadRefused { why } => {
-                return defmt::write!(f, "a newer mission was rejected: {}", why);
-            }
-            Self::NewEstimate => (
-                None,
-                defmt::intern!("the interference estimate has changed: new positions follow"),
-            ),
-            Self::InterfererUnclear => (
-                None,
-                defmt::intern!(
-                    "the measurements do not fit one interferer, or are too few: the last estimate is kept"
-                ),
-            ),
-            Self::Adopted => (None, defmt::intern!("the chain flies the uploaded mission")),
-        };
-        if let Some(node) = node {
-            defmt::write!(f, "node {=u16} {=istr}", node, text);
-        } else {
-            defmt::write!(f, "{=istr}", text);
+            (event, Some(node)) => defmt::write!(f, "node {=u16} {=istr}", node, text(event)),
+            (event, None) => defmt::write!(f, "{=istr}", text(event)),
         }
     }
 }
 
-texts!(LineError {
-    LineError::Distance => "the mission's distance must be the distance between its sites, or between the loaded sites if it has no sites",
-    LineError::Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
-    LineError::Altitude => "the altitudes must be within the relay's own geofence",
-    LineError::Lateral => "the lateral range must be within the relay's own geofence",
-    LineError::Length => "the distance must be within the relay's own geofence",
-});
+/// Returns the node that the event concerns, if any.
+const fn node(event: Event) -> Option<u16> {
+    match event {
+        Event::NeighbourLost { node, .. }
+        | Event::NeighbourBack { node, .. }
+        | Event::NotHeard { node }
+        | Event::MissionMismatch { node }
+        | Event::KeyMismatch { node }
+        | Event::EpochWentBack { node }
+        | Event::DuplicateIndex { node }
+        | Event::SensorOff { node } => Some(node),
+        _ => None,
+    }
+}
+
+/// Returns the text of an event; of one that concerns a node, the text behind the node's number.
+fn text(event: Event) -> defmt::Str {
+    match event {
+        Event::SetpointChanged => defmt::intern!("the setpoint has changed"),
+        Event::Converged => defmt::intern!("the relays have agreed on positions"),
+        Event::Infeasible => defmt::intern!(
+            "no positions of the relays meet any target SIR: all relays keep their positions"
+        ),
+        Event::NeighbourLost {
+            side: Side::Upstream,
+            ..
+        } => defmt::intern!("upstream (toward Tx) does not reply: look for that drone"),
+        Event::NeighbourLost { .. } => {
+            defmt::intern!("downstream (toward Rx) does not reply: look for that drone")
+        }
+        Event::NeighbourBack {
+            side: Side::Upstream,
+            ..
+        } => defmt::intern!("is now the neighbour upstream (toward Tx)"),
+        Event::NeighbourBack { .. } => {
+            defmt::intern!("is now the neighbour downstream (toward Rx)")
+        }
+        Event::NotHeard { .. } => defmt::intern!(
+            "does not receive this relay: check this relay's transmitter and that node's receiver"
+        ),
+        Event::MissionMismatch { .. } => {
+            defmt::intern!("has another mission: load the same mission into both")
+        }
+        Event::KeyMismatch { .. } => defmt::intern!(
+            "signs with another key, or an attacker uses its number: give both the same key"
+        ),
+        Event::EpochWentBack { .. } => defmt::intern!(
+            "has started with an epoch (start counter) that is not above its last one, and its frames are rejected: increase its epoch and restart it"
+        ),
+        Event::DuplicateIndex { .. } => defmt::intern!(
+            "shares its number with another node: land one of the two, and give it its own number"
+        ),
+        Event::SensorOff { .. } => defmt::intern!(
+            "measures interference that does not fit the other measurements, and is ignored: check its receiver"
+        ),
+        Event::ViewAccepted => defmt::intern!(
+            "the relays have agreed on new members of the chain (view): new positions follow"
+        ),
+        Event::LeaseLapsed => defmt::intern!(
+            "not all relays are reachable, so the last agreement is no longer used: this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)"
+        ),
+        Event::NoQuorum => defmt::intern!(
+            "no quorum: too few relays receive each other to agree on the chain's members: bring the missing relays into range, or land this part of the chain"
+        ),
+        Event::Uploaded => defmt::intern!("a newer mission has been received by an upload"),
+        Event::NewEstimate => {
+            defmt::intern!("the interference estimate has changed: new positions follow")
+        }
+        Event::InterfererUnclear => defmt::intern!(
+            "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
+        ),
+        Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
+        Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
+    }
+}
 
 /// Log texts of the autopilot's states, modes, events and reasons.
 #[cfg(feature = "flight")]
@@ -147,18 +125,18 @@ mod autopilot {
     });
 
     texts!(State {
-        State::Silent => "no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2",
+        State::Silent => "no heartbeat for 3 s: is the autopilot on, is its cable right, and does its port use MAVLink 2 and this data rate?",
         State::Grounded => "on the ground, or not armed",
-        State::Standby => "in the air, not controlled by the relay",
+        State::Standby => "in the air, and not controlled by the relay",
         State::Engaged => "setpoint control engaged",
-        State::Blind => "no recent position from the autopilot; the last target is kept",
+        State::Blind => "no recent position from the autopilot, so its last target is kept",
     });
 
     texts!(ReleaseCause {
         ReleaseCause::Chosen => "the pilot or a ground station chose another mode",
         ReleaseCause::Failsafe => "failsafe of the autopilot",
         ReleaseCause::Fence => "fence of the autopilot breached",
-        ReleaseCause::Link => "the link was interrupted or late",
+        ReleaseCause::Link => "the link to the autopilot was interrupted or late",
     });
 
     texts!(FlightMode {
@@ -168,7 +146,7 @@ mod autopilot {
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        FlightMode::Other => "a mode unknown to the relay",
+        FlightMode::Other => "another one, such as a mission or a take-off",
     });
 
     impl defmt::Format for Release {
@@ -180,18 +158,18 @@ mod autopilot {
     texts!(WaitReason {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
         WaitReason::Link => "messages from the autopilot arrive late",
-        WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started; choose another mode first",
-        WaitReason::Unseen => "no other mode than OFFBOARD or GUIDED was reported since the relay started",
-        WaitReason::Position => "the position is unknown, or not near the line between transmitter and receiver",
+        WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
+        WaitReason::Unseen => "no other mode than OFFBOARD or GUIDED was reported without a failsafe since the relay started: end the failsafe, or choose another mode",
+        WaitReason::Position => "the drone's position is unknown, or not near the line between transmitter and receiver",
         WaitReason::NotReady => "this drone is on the wrong side of a neighbour along the line; fly it to its own side first",
     });
 
     texts!(Mistrust {
-        Mistrust::NoKey => "signs its frames and ignores unsigned ones; this relay has no autopilot key",
-        Mistrust::SignsOnly => "signs its frames but answers unsigned ones; this relay has no autopilot key",
-        Mistrust::Unsigned => "does not sign its frames, which are ignored; this relay has an autopilot key",
-        Mistrust::OtherKey => "signs with another key than this relay's autopilot key; its frames are ignored",
-        Mistrust::Old => "signs with an old timestamp; its frames are ignored",
+        Mistrust::NoKey => "signs its frames and ignores unsigned ones: give this relay the autopilot's key",
+        Mistrust::SignsOnly => "signs its frames but answers unsigned ones: this relay controls it without a key",
+        Mistrust::Unsigned => "does not sign its frames, which are ignored: give it the key, or take the autopilot's key from this relay",
+        Mistrust::OtherKey => "signs with another key than this relay has for it, so its frames are ignored: give both the same key",
+        Mistrust::Old => "signs with an old timestamp, so its frames are ignored: check its clock",
     });
 
     impl defmt::Format for AutopilotEvent {
@@ -207,7 +185,9 @@ mod autopilot {
                     f,
                     "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
                 ),
-                Self::FenceBreached => defmt::write!(f, "fence breached"),
+                Self::FenceBreached => {
+                    defmt::write!(f, "the drone is outside the autopilot's fence");
+                }
                 Self::OffLine(off) => defmt::write!(
                     f,
                     "the drone is {=u32} m from the line between transmitter and receiver",
@@ -215,17 +195,17 @@ mod autopilot {
                 ),
                 Self::LostCleared { relays, from, .. } => defmt::write!(
                     f,
-                    "lost relays {} have landed, by MAVLink system {=u8}, component {=u8}: this drone keeps clear of them no longer",
-                    named(relays),
+                    "MAVLink system {=u8}, component {=u8} reports the lost relays {} as landed: this drone no longer keeps clear of them",
                     from.system,
-                    from.component
+                    from.component,
+                    named(relays)
                 ),
                 Self::ClearRefused { relays, from } => defmt::write!(
                     f,
-                    "the command to clear the lost relays {} was denied: name all lost relays on one side; by MAVLink system {=u8}, component {=u8}",
-                    named(relays),
+                    "denied MAVLink system {=u8}, component {=u8} to clear the lost relays {}: the command must name every lost relay on that side of this relay, and no other",
                     from.system,
-                    from.component
+                    from.component,
+                    named(relays)
                 ),
                 Self::Mistrusted(why) => defmt::write!(f, "{}", why),
             }

@@ -260,7 +260,6 @@ impl Settings {
 
 /// Error: a parameter of an [`Identity`] or of [`Settings`] is out of its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SetupError {
     /// The identity's `index` is not within 1 to the mission's number of relays.
@@ -295,35 +294,21 @@ pub enum SetupError {
     Guard,
 }
 
-impl core::fmt::Display for SetupError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Index => "index must be within 1 to the mission's number of relays",
-            Self::Profile => {
-                "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6"
-            }
-            Self::Step => "the fixed target step (linear SIR) must be above 0",
-            Self::Method => "method must be Align with an interference field; Joint needs the feature altitude and at most 100 relays, Adjust needs the feature adjust",
-            Self::Reverse => "a mission with a reverse above 0 and the method Joint needs a known interferer: listen must be None",
-            Self::Adjust => "method.explore_m must be within 0 to 1e5, its grid at least 2 by 2",
-            Self::Measure => {
-                "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000, and the feature field is needed"
-            }
-            Self::Listen => {
-                "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1; listen needs the feature sensing and a mission without an interference field"
-            }
-            Self::HopTime => "hop_time must be above 0",
-            Self::Epoch => "auth.epoch must be above 0, and above the epoch of every earlier start",
-            Self::Silence => "probe_after must be above 0 and dead_after above probe_after",
-            Self::WithoutQuorum => {
-                "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4"
-            }
-            Self::Guard => "guard needs the feature guard, geofence limits within -1e7 to 1e7 m with least <= most, separation_m within 0 to 1e5, relays within 1 to 1000, and hover_m within 0 to 1e3",
-        })
-    }
-}
-
-impl core::error::Error for SetupError {}
+error_texts!(SetupError {
+    Index => "index must be within 1 to the mission's number of relays",
+    Profile => "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6",
+    Step => "the fixed target step (linear SIR) must be above 0",
+    Method => "the method must be Align if the mission has an interference field; otherwise Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust needs the cargo feature `adjust`",
+    Reverse => "Joint needs a known interferer if the mission's reverse is above 0: listen must be None, or the method Align or Adjust",
+    Adjust => "Adjust::explore_m must be within 0 to 1e5, and the grid of Adjust::local at least 2 by 2",
+    Measure => "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000; measure needs the cargo feature `field`",
+    Listen => "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1; listen needs the cargo feature `sensing` and a mission without an interference field",
+    HopTime => "hop_time must be above 0",
+    Epoch => "auth.epoch must be above 0, and above the epoch of every earlier start",
+    Silence => "probe_after must be above 0 and dead_after above probe_after",
+    WithoutQuorum => "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4",
+    Guard => "guard: geofence limits must be within -1e7 to 1e7 m, each lower limit at most its upper limit; separation_m within 0 to 1e5, relays within 1 to 1000, hover_m within 0 to 1e3; guard needs the cargo feature `guard`",
+});
 
 pub(crate) fn check(
     mission: &Mission,

@@ -42,7 +42,7 @@ impl FileOnlySettings {
             |one: &&Override| one.has_name("--altitude") || one.has_name("--uav-power");
         self.overrides.iter().find(is_passed_over).map_or(Ok(()), |one| {
             Err(format!(
-                "{}: relay {index} has values of its own in a [[relay]] of --config; state it there",
+                "{}: has no effect, because the --config file has a [[relay]] for relay {index}: give the value there",
                 one.option
             ))
         })
@@ -132,7 +132,7 @@ impl FileOptions {
             .find_map(|(option, key)| Some((key, file_value(option)?.1.as_ref()?)));
         key.map_or(Ok(()), |(key, value)| {
             Err(format!(
-                "companion.{key} = {}: needs companion.autopilot, a tty or {FORM}; add that, or leave {key} out",
+                "companion.{key} = {}: needs companion.autopilot, a tty, or {FORM}; add it, or leave {key} out",
                 value.to_string_lossy()
             ))
         })

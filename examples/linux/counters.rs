@@ -72,7 +72,7 @@ impl RejectionReasons {
             (
                 foreign >= MANY,
                 foreign,
-                "are of another network number: is --network the same at all relays?",
+                "have another network number: is --network the same at all relays?",
             ),
             (
                 forged >= MANY && more(|stats| stats.handshakes) == 0,

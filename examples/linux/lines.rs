@@ -15,8 +15,7 @@ use crate::log::Log;
 pub const LONGEST: usize = 200;
 
 /// Description of the permitted powers, for error messages.
-pub const POWER: &str =
-    "a power within 1e-30 to 1e6 W, or that in dBm with the unit behind it, as -95 dBm";
+pub const POWER: &str = "a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm";
 
 /// Parses a power from the words of a line: a number in W, or a number in dBm followed by that unit. Returns it in W;
 /// `None` outside 1e-30 to 1e6 W.
@@ -53,7 +52,9 @@ impl InvalidLines {
         self.0 += 1;
         if self.0 == 1 {
             let text = String::from_utf8_lossy(line);
-            let what = format_args!("{text:?} is not {expected}; further ones are only counted");
+            let what = format_args!(
+                "{text:?} is not {expected}; further invalid lines are counted, but not logged"
+            );
             log.line(now, event, what);
         }
     }

@@ -104,7 +104,7 @@ impl Log {
         std::thread::Builder::new()
             .name("log".to_owned())
             .spawn(move || writer.serve(&taken))
-            .map_err(|error| format!("cannot start the log: {error}"))?;
+            .map_err(|error| format!("cannot start the thread that writes the log: {error}"))?;
         Ok(Self {
             orders,
             shared,
@@ -127,7 +127,7 @@ impl Log {
 
     /// Logs that frames are signed, and the epoch, a number that rises at every start.
     pub fn signed(&self, epoch: u32) {
-        let what = format_args!("frames are signed, epoch {epoch}");
+        let what = format_args!("frames are signed; epoch (start counter) {epoch}");
         self.event(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
     }
 
@@ -198,7 +198,9 @@ impl Writer {
         if dropped > self.reported_drops {
             let more = dropped - self.reported_drops;
             let fields = json!({ "dropped": dropped });
-            let notice = format!("{more} lines dropped: the output was full or closed");
+            let notice = format!(
+                "{more} log lines dropped: the disk was full, or the reader of the log too slow or gone"
+            );
             text += &self.format.line(now, "log", fields, &notice);
         }
         text += line;

@@ -161,12 +161,15 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
         band,
         ..
     } = config;
+    // The error about gaps needs two relays or more.
+    let gaps = relays.saturating_sub(1).max(1);
     Mission::try_new(config).map_err(|error| match error {
         MissionError::TooManyForDistance => format!(
-            "{prefix}min-separation {min_separation_m}: must be at most {prefix}distance {distance_m} / (--of {relays} - 1)"
+            "{prefix}min-separation {min_separation_m}: must be at most {} m: {prefix}distance {distance_m} divided by {gaps}, the gaps between {relays} relays",
+            distance_m / f32::from(gaps)
         ),
         MissionError::Band => format!(
-            "{prefix}band {},{}: must be from LEAST to MOST, with {prefix}altitude {} among them",
+            "{prefix}band {},{}: must be LEAST,MOST with LEAST at most {prefix}altitude {} and MOST at least that",
             band.least_m, band.most_m, common.altitude_m
         ),
         other => other.to_string(),

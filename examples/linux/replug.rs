@@ -70,7 +70,8 @@ impl Replug {
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
-            let what = format_args!("{failure}; retried until it is back");
+            let what =
+                format_args!("{failure}; opened again as soon as it is back: check its cable");
             log.event(now, "port lost", self.fields(), what);
             self.tty = None;
             self.counts.times_gone = self.counts.times_gone.saturating_add(1);
@@ -81,7 +82,7 @@ impl Replug {
         {
             let fields = json!({ "fault": fault, "left_out": tap.left_out() });
             let what = format_args!(
-                "--capture cannot be written: {fault}; the capture ends, and everything else continues"
+                "--capture cannot be written: {fault}; the capture ends here, and the program continues without it; its next start begins a new capture"
             );
             log.event(now, "capture ended", fields, what);
         }
@@ -94,7 +95,7 @@ impl Replug {
                     now,
                     "port back",
                     self.fields(),
-                    format_args!("{self} is back"),
+                    format_args!("{self} is open again"),
                 );
             }
         }

@@ -90,7 +90,7 @@ impl Service {
         let log = &self.log;
         if std::mem::take(&mut self.hangup) {
             log.reopen();
-            let what = format_args!("the log file was reopened; the {who} continues");
+            let what = format_args!("the log file was reopened after SIGHUP; the {who} continues");
             log.line(time, "hang-up", what);
         }
         if std::mem::take(&mut self.asks_status) {

@@ -78,7 +78,7 @@ pub fn degrees(at: Geodetic) -> String {
 /// # Errors
 /// The expected form.
 pub fn site(text: &str) -> Result<Geodetic, String> {
-    let form = "must be LAT,LON,AMSL: degrees within -90 to 90 and -180 to 180, and metres within -1000 to 10000";
+    let form = "must be LAT,LON,AMSL: LAT within -90 to 90 degrees, LON within -180 to 180 degrees, AMSL within -1000 to 10000 m";
     let numbers: Option<Vec<f64>> = text
         .split(',')
         .map(|part| part.trim().parse().ok())

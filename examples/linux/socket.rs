@@ -55,7 +55,9 @@ impl StatusSocket {
             |error: &dyn std::fmt::Display| format!("--status-socket {}: {error}", path.display());
         if let Ok(there) = path.symlink_metadata() {
             if !there.file_type().is_socket() {
-                return Err(named(&"there is another file of that name"));
+                return Err(named(
+                    &"another file has this name: choose another one, or remove it",
+                ));
             }
             if UnixStream::connect(path).is_ok() {
                 return Err(named(&"is already in use"));

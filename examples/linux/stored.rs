@@ -54,10 +54,12 @@ pub fn next_epoch(file: &Path) -> Result<u32, String> {
         Err(error) if error.kind() == ErrorKind::NotFound => Some(seconds()),
         Err(error) => return Err(named(&format!("cannot be read: {error}"))),
     };
-    let last: u32 = last.ok_or_else(|| named("must hold a number within 0 to 4294967294"))?;
+    let last: u32 = last.ok_or_else(|| {
+        named("must contain one number within 0 to 4294967294: the epoch of the last start")
+    })?;
     let epoch = last
         .checked_add(1)
-        .ok_or_else(|| named("is the largest epoch, and a start needs a larger one"))?;
+        .ok_or_else(|| named("contains the largest epoch, and every start needs a larger one: give all relays a new key, and remove this file"))?;
     replace(file, format!("{epoch}\n").as_bytes())
         .map_err(|error| named(&format!("cannot be written: {error}")))?;
     Ok(epoch)
@@ -202,13 +204,13 @@ impl StoredFile {
             Ok(()) => {
                 self.writes += 1;
                 let failures = self.failures;
-                format!("is written again, after {failures} failures")
+                format!("can be written again, after {failures} failures")
             }
             Err(error) => {
                 self.failures += 1;
                 self.again_at = now + AGAIN;
                 format!(
-                    "cannot be written: {error}; the relay flies on, and tries again every second"
+                    "cannot be written: {error}; the relay flies on, and tries to write it again every second"
                 )
             }
         };

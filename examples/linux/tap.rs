@@ -82,7 +82,7 @@ impl Tap {
             .state
             .fault
             .get()
-            .map_or("its writer thread has ended", |it| it);
+            .map_or("the thread that writes it has stopped", |it| it);
         (!was_reported).then_some(fault)
     }
 

@@ -31,12 +31,12 @@ impl Tty {
         let fd = configured(path, baud).map_err(|error| match error {
             Errno::WOULDBLOCK => format!("{name}: is already in use"),
             Errno::NOTTY => format!("{name}: is not a tty"),
-            Errno::NOENT => format!("{name}: No such file: is it plugged in?"),
+            Errno::NOENT => format!("{name}: there is no such device: is it plugged in?"),
             Errno::ISDIR => format!("{name}: is a directory, not a tty"),
             Errno::ACCESS => format!(
-                "{name}: permission denied; on most systems members of the group dialout may open it"
+                "{name}: permission denied: on most systems only members of the group dialout may open it"
             ),
-            Errno::INVAL => format!("{name}: does not support {baud} bit/s"),
+            Errno::INVAL => format!("{name}: this device does not support {baud} bit/s"),
             error => format!("{name}: {error}"),
         })?;
         Ok(Self {
@@ -60,7 +60,7 @@ impl Tty {
     /// and would otherwise cause a busy loop.
     pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
-            self.fail("device disconnected");
+            self.fail("the device was disconnected");
         }
     }
 
@@ -81,7 +81,7 @@ impl Tty {
             Ok(count) => Ok(Some(count)),
             Err(Errno::AGAIN | Errno::INTR) => Ok(None),
             Err(Errno::IO | Errno::NXIO | Errno::NODEV) => {
-                self.fail("device disconnected");
+                self.fail("the device was disconnected");
                 Err(Fault::Other)
             }
             Err(error) => {
@@ -107,7 +107,7 @@ impl SerialPort for Tty {
         let count = self.done(result)?;
         if count == Some(0) {
             // With VMIN = 1 an end of file means that the other end hung up.
-            self.fail("device disconnected");
+            self.fail("the device was disconnected");
         }
         Ok(count.unwrap_or(0))
     }

@@ -128,7 +128,7 @@ impl Companion {
             ),
         );
         if self.plan.key.is_some() {
-            let what = "frames to the autopilot are signed; frames that are not signed with the same key are ignored";
+            let what = "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored";
             log.line(Instant::ZERO, EVENT, what);
         }
     }
@@ -137,7 +137,7 @@ impl Companion {
         let refused = self.link.refused();
         if refused > 0 {
             let what = format_args!(
-                "{refused} frames from the autopilot rejected because of their signatures"
+                "{refused} frames from the autopilot were rejected because of their signatures: compare its key with --autopilot-key-file"
             );
             log.line(now, EVENT, what);
         }
@@ -261,7 +261,7 @@ impl Companion {
                 format!("no answer at {}", datagrams.silence())
             }
             (Received::Nothing, Port::Tty(tty)) => format!(
-                "no answer at {}, {} bit/s: is the autopilot on, is its TX wired to this RX and its RX to this TX, and is that its baud rate?",
+                "no answer at {}, {} bit/s: is the autopilot on, is its TX wired to this RX and its RX to this TX, and is that its data rate there?",
                 tty.path().display(),
                 tty.baud()
             ),
@@ -270,7 +270,8 @@ impl Companion {
                 self.plan.port,
                 match port {
                     Port::Udp(_) => "is that the autopilot's port".to_owned(),
-                    Port::Tty(tty) => format!("is {} bit/s the autopilot's baud rate", tty.baud()),
+                    Port::Tty(tty) =>
+                        format!("is {} bit/s the autopilot's data rate there", tty.baud()),
                 }
             ),
             (Received::Others, _) => format!(
@@ -350,12 +351,12 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
         AutopilotEvent::State(state) => {
             let what = match state {
                 State::Silent => {
-                    "no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2"
+                    "no heartbeat for 3 s: is the autopilot on, is its cable right, and does its port use MAVLink 2 and this data rate?"
                 }
                 State::Grounded => "on the ground, or not armed",
-                State::Standby => "in the air, not controlled by the relay",
+                State::Standby => "in the air, and not controlled by the relay",
                 State::Engaged => "setpoint control engaged",
-                State::Blind => "no recent position from the autopilot; the last target is kept",
+                State::Blind => "no recent position from the autopilot, so its last target is kept",
             };
             return log.event(now, EVENT, json!({ "state": word(state) }), what);
         }
@@ -370,10 +371,10 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
             return log_command(now, log, Ok(text), relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
-            let text = "the command must name all lost relays of one side, and no others";
+            let text = "the command must name every lost relay on one side of this relay, and no other";
             return log_command(now, log, Err(text.to_owned()), relays, from);
         }
-        AutopilotEvent::FenceBreached => "fence breached".to_owned(),
+        AutopilotEvent::FenceBreached => "the drone is outside the autopilot's fence".to_owned(),
         AutopilotEvent::Mistrusted(why) => mistrusted(why).to_owned(),
         other => format!("{other:?}"),
     };
@@ -404,8 +405,8 @@ const fn cause(cause: ReleaseCause) -> &'static str {
         ReleaseCause::Chosen => "the pilot or a ground station chose another mode",
         ReleaseCause::Failsafe => "failsafe of the autopilot",
         ReleaseCause::Fence => "fence of the autopilot breached",
-        ReleaseCause::Link => "the link was interrupted or late",
-        _ => "the reason is unknown",
+        ReleaseCause::Link => "the link to the autopilot was interrupted or late",
+        _ => "for a reason unknown to this program",
     }
 }
 
@@ -417,7 +418,7 @@ const fn mode(mode: FlightMode) -> &'static str {
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        _ => "unknown to this program",
+        _ => "another one, such as a mission or a take-off",
     }
 }
 
@@ -426,13 +427,13 @@ const fn wait_reason(reason: WaitReason) -> &'static str {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
         WaitReason::Link => "messages from the autopilot arrive late",
         WaitReason::Found => {
-            "it was in OFFBOARD or GUIDED before this program started; choose another mode first"
+            "it was in OFFBOARD or GUIDED before this program started: choose another mode, then OFFBOARD or GUIDED again"
         }
         WaitReason::Unseen => {
-            "no other mode than OFFBOARD or GUIDED was reported since this program started"
+            "no other mode than OFFBOARD or GUIDED was reported without a failsafe since this program started: end the failsafe, or choose another mode"
         }
         WaitReason::Position => {
-            "the position is unknown, or not near the line between transmitter and receiver"
+            "the drone's position is unknown, or not near the line between transmitter and receiver"
         }
         WaitReason::NotReady => {
             "this drone is on the wrong side of a neighbour along the line; fly it to its own side first"
@@ -458,12 +459,12 @@ const fn mistrusted(why: Mistrust) -> &'static str {
             "signs its frames but answers unsigned ones: it is controlled without --autopilot-key-file"
         }
         Mistrust::Unsigned => {
-            "does not sign its frames, which are ignored: set its key, or leave out --autopilot-key-file"
+            "does not sign its frames, which are ignored: give it the key of --autopilot-key-file, or leave out that option"
         }
         Mistrust::OtherKey => {
-            "signs with another key than that of --autopilot-key-file; its frames are ignored"
+            "signs with another key than that of --autopilot-key-file, so its frames are ignored: give both the same key"
         }
-        Mistrust::Old => "signs with an old timestamp; its frames are ignored: check its clock",
+        Mistrust::Old => "signs with an old timestamp, so its frames are ignored: check its clock",
         _ => "is not trusted",
     }
 }

@@ -31,7 +31,7 @@ impl Datagrams {
         let peer = resolved
             .map_err(|error| format!("HOST {host} is not found: {error}"))?
             .next()
-            .ok_or_else(|| format!("HOST {host} is not found: it has no address"))?;
+            .ok_or_else(|| format!("HOST {host} has no address"))?;
         let any = if peer.is_ipv4() { "0.0.0.0" } else { "::" };
         let socket = UdpSocket::bind((any, *local)).map_err(|error| unbound(*local, &error))?;
         socket
@@ -39,7 +39,7 @@ impl Datagrams {
             .map_err(|error| format!("{peer} cannot be reached: {error}"))?;
         if socket.local_addr().is_ok_and(|own| own == peer) {
             return Err(format!(
-                "{peer} is this program's own port: LOCAL must differ from PORT, within 1 to 65535"
+                "{peer} is this program's own port: LOCAL must be another one than PORT, within 1 to 65535"
             ));
         }
         let ready = socket.set_nonblocking(true);
@@ -92,11 +92,11 @@ impl Datagrams {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {
             return format!(
-                "{peer} (from local port {local}): connection refused, so no program listens there; is the autopilot on, and is that its port?"
+                "{peer} (from local port {local}): connection refused, because no program listens there: is the autopilot on, and is that its port?"
             );
         }
         format!(
-            "{peer} (from local port {local}): is the autopilot on, and does it send to this port? A PX4 keeps the first address and port it has received from until it restarts; state that port by udp:HOST:PORT@LOCAL"
+            "{peer} (from local port {local}): is the autopilot on, and does it send to this port? Until it restarts, a PX4 sends to the first port it has received from: give that one as LOCAL in udp:HOST:PORT@LOCAL"
         )
     }
 
@@ -120,10 +120,10 @@ impl Datagrams {
 fn unbound(local: u16, error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::AddrInUse => format!(
-            "local port {local} is in use by another program; end that one, or state another as udp:HOST:PORT@LOCAL, within 1 to 65535"
+            "local port {local} is in use by another program: end that program, or give another port as LOCAL in udp:HOST:PORT@LOCAL, within 1 to 65535"
         ),
         ErrorKind::PermissionDenied => format!(
-            "local port {local} may not be used by this user; state another as udp:HOST:PORT@LOCAL, within 1024 to 65535"
+            "local port {local} may not be used by this user: give another port as LOCAL in udp:HOST:PORT@LOCAL, within 1024 to 65535"
         ),
         _ => format!("local port {local} cannot be used: {error}"),
     }

@@ -83,27 +83,31 @@ fn describe(reason: HoldReason, whom: &str) -> String {
     match reason {
         HoldReason::Unheard => {
             format!(
-                "setpoint control is not engaged at {whom}, or its position has not been received yet"
+                "{whom} is not under setpoint control, or its position has not been received yet"
             )
         }
         HoldReason::Order => format!(
-            "this drone is on the wrong side of {whom} along the line, or too close to it to be sure; fly one of the two drones to its own side by hand"
+            "this drone is on the wrong side of {whom} along the line, or too close to it to be sure: fly one of the two drones to its own side by hand"
         ),
         HoldReason::Close => {
             format!("the agreed position is too close to the present position of {whom}")
         }
         HoldReason::Lost => {
-            format!("a lost relay may still hover between this drone and {whom}")
+            format!(
+                "a lost relay may still hover between this drone and {whom}: once it has landed, send clear-lost"
+            )
         }
         HoldReason::NotFlown => {
-            format!("setpoint control is not engaged at {whom}, which is in the way")
+            format!(
+                "{whom} is in the way, and not under setpoint control: its pilot has to move it or to choose OFFBOARD or GUIDED"
+            )
         }
         HoldReason::Pending => {
-            format!("{whom} has not left the space that this drone moves into yet")
+            format!("{whom} has not left the space yet that this drone is to move into")
         }
         HoldReason::Halted => {
             format!(
-                "a relay beyond {whom} is on the wrong side of a neighbour; the log of that relay has the reason"
+                "a relay beyond {whom} is on the wrong side of a neighbour: see the log of that relay"
             )
         }
     }

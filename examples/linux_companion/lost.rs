@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 use uav_relay::{Event, Instant, Relay, Side};
 
+use crate::report::direction;
 use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
@@ -63,7 +64,7 @@ impl Lost {
         let mut words = command.split_whitespace();
         if words.next() != Some(CLEAR) {
             return Err(format!(
-                "unknown command `{command}`: the only command is {CLEAR} N, with the numbers of all lost relays on one side that have landed"
+                "unknown command `{command}`: the only one is `{CLEAR} N ..`, with the numbers of every lost relay on one side of this relay, once all of them have landed"
             ));
         }
         let named: BTreeSet<u16> = words
@@ -74,12 +75,12 @@ impl Lost {
             (_, Some(last)) if *last < self.index => Side::Upstream,
             (None, _) => {
                 return Err(format!(
-                    "{CLEAR} names no relay: give the numbers of all lost relays on one side that have landed, as in {CLEAR} 3"
+                    "{CLEAR} names no relay: once every lost relay on one side of this relay has landed, send their numbers, as in `{CLEAR} 3`"
                 ));
             }
             _ => {
                 return Err(format!(
-                    "{CLEAR} names relays on both sides of relay {}: clear one side at a time",
+                    "{CLEAR} names relays on both sides of relay {}: send one command for each side",
                     self.index
                 ));
             }
@@ -89,7 +90,7 @@ impl Lost {
         let missing: Vec<u16> = missing.copied().filter(|it| !named.contains(it)).collect();
         if !missing.is_empty() {
             return Err(format!(
-                "{} lost on the same side: if all of these have landed, name all of them",
+                "{} lost, too, on that side of this relay: once every lost relay of that side has landed, name all of them in one command",
                 listed(missing)
             ));
         }
@@ -112,13 +113,13 @@ impl Lost {
         };
         if number == self.index {
             return Err(format!(
-                "relay {number} is this relay, which cannot be lost to itself"
+                "relay {number} is this relay: name lost relays only"
             ));
         }
         let is_heard = relay.neighbours().contains(&Some(number)) && !self.nodes.contains(&number);
         if is_heard {
             return Err(format!(
-                "relay {number} is received and not lost; switch it off first if it has landed"
+                "relay {number} is not lost, because this relay receives it: if it has landed, switch it off first"
             ));
         }
         Ok(number)
@@ -146,13 +147,10 @@ pub(crate) fn log_command(
 
 /// Returns the log text about the lost relays `named` on one side that the operator reports as landed.
 pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
-    let stream = match side {
-        Side::Upstream => "upstream",
-        Side::Downstream => "downstream",
-    };
     format!(
-        "{} cleared: no lost relay {stream} limits this relay any more",
-        listed(named)
+        "{} cleared: this relay no longer keeps clear of lost relays {}",
+        listed(named),
+        direction(side)
     )
 }
 

@@ -184,7 +184,7 @@ impl OffLineReport {
     pub(crate) fn for_operator(&self) -> Option<String> {
         (self.kind == Kind::Line).then(|| {
             format!(
-                "relay: the drone is {} from its line",
+                "relay: drone is {} off the line Tx-Rx",
                 RoundedDistance(self.away_m)
             )
         })
@@ -205,7 +205,7 @@ impl fmt::Display for OffLineReport {
         match (self.kind, self.is_swapped) {
             (Kind::Line, true) => f.write_str(": are latitude and longitude swapped?"),
             (Kind::Line, false) => {
-                f.write_str(": are these the sites of this flight, and is its position right?")
+                f.write_str(": are these the sites (Tx and Rx) of this flight, and is the drone's position right?")
             }
             (Kind::Fence, _) => {
                 write!(
@@ -289,7 +289,7 @@ mod tests {
         assert!(
             other
                 .to_string()
-                .ends_with("sites of this flight, and is its position right?")
+                .ends_with("of this flight, and is the drone's position right?")
         );
         // A longitude above 90 degrees is no latitude, so there is no swapped line.
         let far = off(site(47.40, 138.54), site(47.41, 138.55), drone).expect("off");

@@ -310,8 +310,10 @@ fn channel_load(options: &Options) -> Result<ChannelLoad, String> {
     let load = ChannelLoad::of_radios(options.of);
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
         .map_err(|full| {
-            let (baud, least) = (options.baud, full.least_baud);
-            format!("--baud {baud}: must be within {least} to 4000000: {full}")
+            format!(
+                "--baud {}: {full}; --dead-after-ms should be three times --probe-after-ms",
+                options.baud
+            )
         })?;
     Ok(load)
 }

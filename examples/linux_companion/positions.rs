@@ -77,7 +77,7 @@ impl Positions {
             log.line(
                 now,
                 "position",
-                format_args!("{bad} invalid lines of --positions ignored"),
+                format_args!("{bad} lines of --positions were invalid, and ignored"),
             );
         }
     }
@@ -88,11 +88,11 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
         let what = format_args!(
-            "setpoints keep drones apart while they move; this drone's positions come from {fifo}"
+            "drones are kept apart while they move; this drone's positions are read from {fifo}"
         );
         log.line(now, "guarded", what);
     } else {
-        let what = "no --positions: drones are not kept apart while they move";
+        let what = "no --positions and no --autopilot: drones are not kept apart while they move";
         log.line(now, "unguarded", what);
     }
 }

@@ -36,7 +36,7 @@ pub(crate) fn resume_views(
     if let Some(bytes) = &bytes {
         stored = record(bytes, ViewRecord::LENGTH);
         let votes = stored.and_then(ViewRecord::from_bytes).ok_or_else(|| {
-            refused("is damaged or not a record of votes: before a new flight remove the file, and start again")
+            refused("is damaged, or not a file of votes: before a new flight remove the file, and start again; in the same flight the relay cannot rejoin the chain")
         })?;
         relay.resume_view(now, &votes).map_err(|error| match error {
             RecordError::Base => refused(&format!(
@@ -61,7 +61,11 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
         None => Ok(false),
     });
     resumed.unwrap_or_else(|why| {
-        log.line(Instant::ZERO, "file", format_args!("{why}; not used"));
+        log.line(
+            Instant::ZERO,
+            "file",
+            format_args!("{why}; the relay starts with the mission of its options"),
+        );
         false
     })
 }
@@ -72,11 +76,11 @@ fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Upload>, String>
         return Ok(None);
     };
     let upload = record(&bytes, Upload::LENGTH).and_then(Upload::decode);
-    let upload = upload.ok_or_else(|| named("is damaged or not an upload"))?;
+    let upload = upload.ok_or_else(|| named("is damaged, or not an uploaded mission"))?;
     let (base, loaded) = (upload.base(), mission.digest());
     if base != loaded || upload.config().relays != mission.relays() {
         return Err(named(&format!(
-            "is for relays that were loaded with the mission of digest 0x{base:04x}, but this relay has 0x{loaded:04x}"
+            "is an upload for relays that were loaded with the mission of digest 0x{base:04x}, but this relay was loaded with 0x{loaded:04x}"
         )));
     }
     Ok(Some(upload))

@@ -75,7 +75,7 @@ impl Report {
                 "version": env!("CARGO_PKG_VERSION"),
             }),
             format_args!(
-                "relay {index} of {relays}, network {network}, mission digest 0x{digest:04x}, {names}, {baud} baud"
+                "relay {index} of {relays}, network {network}, mission digest 0x{digest:04x}, {names}, {baud} bit/s"
             ),
         );
     }
@@ -87,7 +87,7 @@ impl Report {
             None => self.log.line(
                 Instant::ZERO,
                 "unsigned",
-                "no --key-file: frames are not signed, and anybody in range can forge them",
+                "no --key-file: frames are not signed, so anybody in range can forge them",
             ),
         }
     }
@@ -99,7 +99,7 @@ impl Report {
             Instant::ZERO,
             "resumed",
             json!({ "version": version }),
-            format_args!("this relay flies version {version} of the mission, which was uploaded before this start"),
+            format_args!("this relay flies version {version} of the mission, which it received by an upload before this start"),
         );
     }
 
@@ -108,7 +108,7 @@ impl Report {
         self.log.line(
             Instant::ZERO,
             "restored",
-            "this relay's earlier votes on the chain's membership were read from --view-file; remove that file before another flight",
+            "this relay's votes on the chain's membership before this start were read from --view-file; remove that file before another flight",
         );
     }
 
@@ -130,11 +130,11 @@ impl Report {
             Event::NewEstimate => self.log_estimate(now, relay.interference_estimate()),
             Event::LeaseLapsed => tell(
                 "lease expired",
-                "not all relays are reachable, so the last agreement is no longer used; this relay keeps its setpoint and requests a new membership of the chain (view)",
+                "not all relays are reachable, so the last agreement is no longer used; this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)",
             ),
             Event::NoQuorum => tell(
                 "no quorum",
-                "too few relays are reachable to agree on a membership of the chain; this relay keeps its setpoint; bring the missing relays into range, or land the reachable ones",
+                "too few relays receive each other to agree on the chain's members, so this relay keeps its setpoint: bring the missing relays into range, or land this part of the chain",
             ),
             Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {
@@ -148,7 +148,7 @@ impl Report {
             }
             Event::InterfererUnclear => tell(
                 "interferer unclear",
-                "the measurements do not fit one interferer on the ground, or are too few; the last estimate is kept",
+                "the measurements do not fit a single interferer on the ground, or are too few; the relays keep their last estimate",
             ),
             other => self.node_event(now, other, relay),
         }
@@ -197,16 +197,16 @@ impl Report {
             other => return self.log.line(now, "event", format_args!("{other:?}")),
         };
         let name = self.name(node);
-        let stream = side.map_or("", stream);
-        let fields = json!({ "node": node, "name": name, "side": side.map(|_| stream) });
+        let toward = side.map_or("", direction);
+        let fields = json!({ "node": node, "name": name, "side": side.map(stream) });
         let say = |word: &str, text: fmt::Arguments<'_>| self.log.event(now, word, fields, text);
         match event {
             Event::NeighbourLost { .. } => say(
                 "lost",
-                format_args!("{name} {stream} does not reply; look for that drone"),
+                format_args!("{name} {toward} does not reply; look for that drone"),
             ),
             Event::NeighbourBack { .. } => {
-                say("back", format_args!("{name} {stream} is received"));
+                say("back", format_args!("{name} is now the neighbour {toward}"));
             }
             Event::NotHeard { .. } => say(
                 "not heard",
@@ -357,6 +357,14 @@ impl Report {
                 self.log.line(now, "estimate", what);
             }
         }
+    }
+}
+
+/// Returns the direction of the neighbours on `side`, for the log.
+pub(crate) const fn direction(side: Side) -> &'static str {
+    match side {
+        Side::Upstream => "upstream (toward Tx)",
+        Side::Downstream => "downstream (toward Rx)",
     }
 }
 

@@ -42,7 +42,7 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
         ("receiver", site(basis.line.map(|line| line.rx))),
         ("distance", format!("{distance_m} m")),
         ("altitude", format!("{} m", common.altitude_m)),
-        ("altitudes to choose from", range(band)),
+        ("range of altitudes", range(band)),
         ("lateral range", range(lateral)),
         ("power of the transmitter", format!("{tx_power_w} W")),
         ("power of a relay", format!("{} W", common.power_w)),
@@ -57,13 +57,13 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
             },
         ),
         ("noise", format!("{noise_w} W")),
-        ("least separation", format!("{min_separation_m} m")),
+        ("minimum separation", format!("{min_separation_m} m")),
     ]
 }
 
 pub(crate) fn log_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
     let Some(moves) = moves else {
-        let what = "the moves of the relays are unknown in advance: the relays measure the interference, or no positions fit the new mission";
+        let what = "the moves of the relays cannot be computed in advance: either the relays measure the interference, or the new mission has no positions with an SIR above 0";
         log.line(now, "move", what);
         return;
     };

@@ -100,7 +100,7 @@ impl Measurements {
             log.line(
                 now,
                 "measurement",
-                format_args!("none from {name} for {seconds} s"),
+                format_args!("no measurement from {name} for {seconds} s"),
             );
         }
         let newest_w = self.newest_w.take_if(|_| self.next_at <= now)?;
@@ -154,7 +154,7 @@ impl Measurements {
                 now,
                 "measurement",
                 fields,
-                format_args!("{power_w:.3e} W by {name}; further ones are reported without a line"),
+                format_args!("{power_w:.3e} W from {name}; further measurements are passed to the relays, but not logged"),
             );
         }
     }
@@ -222,7 +222,7 @@ impl Watched {
 /// Binds a UDP socket for measurements, on the loopback address if no host is given.
 fn socket(address: &str) -> std::io::Result<UdpSocket> {
     let wrong =
-        || std::io::Error::other("must be udp:PORT or udp:HOST:PORT, PORT within 1 to 65535");
+        || std::io::Error::other("must be udp:PORT or udp:HOST:PORT, with PORT within 1 to 65535");
     let (host, port) = address.rsplit_once(':').unwrap_or(("127.0.0.1", address));
     let port: u16 = port.parse().map_err(|_| wrong())?;
     if port == 0 || host.is_empty() {

@@ -123,7 +123,7 @@ impl NewOptions {
         let keeps = along_m.is_none() && (sited.is_some() || own.is_some());
         if keeps && config.distance_m.to_bits() != kept_m.to_bits() {
             return Err(format!(
-                "--new-distance {}: must equal --distance, because the relays keep their sites; to change it, give --new-site-tx or --new-site-rx",
+                "--new-distance {}: must be {kept_m}, because Tx and Rx stay at their sites; to change the distance, give --new-site-tx or --new-site-rx",
                 config.distance_m
             ));
         }
@@ -158,7 +158,7 @@ impl NewOptions {
         let (turn, most) = (before.turn_rad(&axis).to_degrees(), most_turn_deg(config));
         if turn > most {
             return Err(named(&format_args!(
-                "turns the line by {turn:.1} degrees: must be within 0 to {most:.1}, so that relays {} m apart keep their order along the line",
+                "turns the line from Tx to Rx by {turn:.1} degrees: must turn it by at most {most:.1}, so that relays {} m apart keep their order along the line",
                 config.min_separation_m
             )));
         }
@@ -223,7 +223,7 @@ fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String
         ""
     };
     Err(format!(
-        "the new line is {:.0} km from the line of the present mission: must be within {:.0} km{hint}",
+        "the new line from Tx to Rx is {:.0} km from that of the present mission: must be at most {:.0} km away{hint}",
         far_m / 1e3,
         most_m / 1e3
     ))

@@ -189,7 +189,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         }
         if !options.yes && !options.dry_run && !std::io::stdin().is_terminal() {
             return Err(format!(
-                "--version {version}: the upload cannot be confirmed, because standard input is not a terminal: give --yes, or --dry-run to see its changes"
+                "--version {version}: nobody can confirm the upload, because standard input is not a terminal: give --yes to upload without a question, or --dry-run to see the changes only"
             ));
         }
     }

@@ -30,7 +30,7 @@ pub(crate) fn started(log: &Log, plan: &Plan, epoch: u32) {
             "version": env!("CARGO_PKG_VERSION"),
         }),
         format_args!(
-            "{end} of a chain of {relays} relays, network {network}, digest of the loaded mission 0x{base:04x}, --tty {tty}, {baud} baud"
+            "{end} of a chain of {relays} relays, network {network}, digest of the loaded mission 0x{base:04x}, --tty {tty}, {baud} bit/s"
         ),
     );
     log.signed(epoch);
@@ -49,14 +49,14 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
         Progress::Stored { by } => log.line(
             now,
             "stored",
-            format_args!("relay {by} has stored version {version}; polling until the chain flies it"),
+            format_args!("relay {by} has stored version {version}; the station asks it until the chain flies that version"),
         ),
         Progress::Adopted { by } => log.event(
             now,
             "adopted",
             json!({ "version": version, "flown_by": 1, "relays": all }),
             format_args!(
-                "relay {by} flies version {version}, as the first of {all} relays; polling it until the others do, too"
+                "relay {by} flies version {version}, as the first of {all} relays; the station asks it until the others do, too"
             ),
         ),
         Progress::Flown { by, view, relays } => log.event(
@@ -64,7 +64,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             "flown",
             json!({ "version": version, "flown_by": relays, "relays": all }),
             format_args!(
-                "{relays} of {all} relays fly version {version} in view {}, according to relay {by}",
+                "{relays} of {all} relays fly version {version}, as relay {by} reports for the present members of the chain (view {})",
                 view.number()
             ),
         ),
@@ -83,7 +83,7 @@ pub(crate) fn outdated(version: u16, held: u16) -> String {
         }
         None => {
             format!(
-                "--version {version}: no version is left, because the relays have version {held}, the largest one"
+                "--version {version}: must be above {held}, the version of the relays, but that is the largest one: load the relays with the new mission before their next flight"
             )
         }
     }
@@ -96,7 +96,7 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     } = *flown;
     let fields = json!({ "relay": by, "version": version, "flies": flies });
     let what = match (version, flies) {
-        (0, _) => format!("relay {by} flies the mission with which it was loaded"),
+        (0, _) => format!("relay {by} flies the mission loaded before flight"),
         (_, true) => format!("relay {by} flies version {version}"),
         (_, false) => format!("relay {by} has stored version {version}, but does not fly it yet"),
     };
@@ -106,10 +106,10 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
 /// Returns the error text for an upload that relay `by` refused. It names the value that most likely caused it.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
-    let who = format!("--version {version}: relay {by}, or a relay beyond it, rejects the upload");
+    let who = format!("--version {version}: relay {by}, or a relay behind it, rejects the upload");
     match FenceViolation::of(plan, upload) {
         Some(FenceViolation { what, .. }) => format!("{who}: {what}"),
-        None => format!("{who}: the log of the rejecting relay gives the reason"),
+        None => format!("{who}; the log of that relay gives the reason"),
     }
 }
 
@@ -212,7 +212,7 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
             format!("relay {by} has stored version {version}, but the chain does not fly it yet")
         }
         Progress::Adopted { by } => format!(
-            "relay {by} flies version {version}, but it is unknown whether all relays of its view do"
+            "relay {by} flies version {version}, but has not reported that all other relays do, too"
         ),
         // The ground has only asked so far.
         Progress::Idle => format!(
@@ -225,7 +225,9 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
         ),
     };
     let refused = ground.refused();
-    format!("--timeout {seconds}: {state}; {refused} frames refused")
+    format!(
+        "--timeout {seconds}: not finished after {seconds} s: {state}; {refused} received frames were rejected"
+    )
 }
 
 /// Returns the most likely reason why no relay has answered as needed, judged by the frame counters.
@@ -234,7 +236,7 @@ fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         (
             stats.mission,
             format!(
-                "hello messages come from relays that were loaded with another mission than 0x{:04x}: give this station the mission that the relays were loaded with",
+                "frames come from relays that were loaded with another mission than this station, whose digest is 0x{:04x}: give it the mission that the relays were loaded with",
                 plan.loaded.mission.digest()
             ),
         ),
@@ -255,7 +257,7 @@ fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         ),
         (
             stats.version,
-            "frames have another version of the frame format: the firmware of the relays and this program must match".to_owned(),
+            "frames have another version of the frame format: use the same software version at the relays and at this station".to_owned(),
         ),
         (
             stats.misaddressed.saturating_add(stats.overheard),
@@ -279,11 +281,11 @@ fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         }
         // A relay with another mission sends only handshakes.
         None if stats.handshakes > 0 => format!(
-            "a relay sends handshakes but no hello messages: it was probably loaded with another mission than 0x{:04x}",
+            "a relay is received, but does not accept this station: it was probably loaded with another mission than this station, whose digest is 0x{:04x}",
             plan.loaded.mission.digest()
         ),
         None => format!(
-            "no frame was received: check that --tty {} leads to the chain, and check --network {}, --baud {}, --end and --key-file; the log of a relay that receives this station gives the reason",
+            "no frame was received: check that --tty {} leads to the chain, and check --network {}, --baud {}, --end and --key-file; a relay that receives this station logs what does not fit",
             plan.options.tty.display(),
             plan.options.network,
             plan.options.baud
@@ -309,7 +311,7 @@ pub(crate) fn stopped(log: &Log, now: Instant, end: Side, ground: &Ground) {
         "stopped",
         counted(stats),
         format_args!(
-            "{}, {} frames sent, {} received, {} refused",
+            "{}, {} frames sent, {} received, {} rejected",
             name(end),
             stats.sent,
             stats.received.saturating_add(stats.handshakes),

@@ -202,7 +202,7 @@ impl<'a> Station<'a> {
         service.tend(time, "station", |log, command| {
             if let Some((command, _)) = command {
                 let text =
-                    format!("{command}: a ground station accepts no commands: send an empty request to read its state");
+                    format!("{command}: a ground station accepts no commands: send an empty line to read its state");
                 return json!({ "done": false, "text": text });
             }
             json!({
@@ -242,7 +242,8 @@ impl<'a> Station<'a> {
     fn stop(&self) -> Result<(), String> {
         if !self.plan.options.stand {
             return Err(
-                "stopped by a signal before the chain was known to fly the new mission".to_owned(),
+                "stopped by a signal before the relays reported that they fly the new mission"
+                    .to_owned(),
             );
         }
         self.service.stopping();

@@ -105,7 +105,7 @@ impl Uploading {
         self.stage = Stage::Ended;
         let version = self.version;
         failed(format!(
-            "--version {version}: not confirmed, nothing was uploaded"
+            "--version {version}: not confirmed, so nothing was uploaded"
         ))
     }
 
@@ -152,7 +152,7 @@ impl Uploading {
                     return self.decide(now, log, plan, ground, flown);
                 }
                 return failed(format!(
-                    "--version {version}: relay {} holds version {} and does not send its values, as an older firmware does not; give --from-loaded, and state all that is to stay as it is flown",
+                    "--version {version}: relay {} has version {} and does not send the values of that mission, because its firmware is older; give --from-loaded, and state every value that must not return to that of the loaded mission",
                     flown.by, flown.version
                 ));
             }
@@ -199,7 +199,9 @@ impl Uploading {
             && !options.no_fence
         {
             let outside = outside.line(moves.as_deref());
-            return failed(format!("--version {version}: {outside}"));
+            return failed(format!(
+                "--version {version}: {outside}; --no-fence uploads it nevertheless"
+            ));
         }
         if options.dry_run {
             let what = format_args!("version {version} was not uploaded");

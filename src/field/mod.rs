@@ -25,7 +25,6 @@ pub struct FieldPoint {
 
 /// Reason why [`Field::try_new`] rejects a table of points.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FieldError {
     /// The table has no point, or more than [`Field::MAX_POINTS`].
@@ -38,18 +37,12 @@ pub enum FieldError {
     Upsilon,
 }
 
-impl core::fmt::Display for FieldError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Points => "an interference field must have 1 to 1024 points",
-            Self::Place => "x_m must be within -1e7 to 1e7",
-            Self::Order => "x_m must increase from point to point",
-            Self::Upsilon => "upsilon_per_w must be within 1e-9 to 1e32",
-        })
-    }
-}
-
-impl core::error::Error for FieldError {}
+error_texts!(FieldError {
+    Points => "an interference field must have 1 to 1024 points",
+    Place => "x_m must be within -1e7 to 1e7",
+    Order => "x_m must increase from point to point",
+    Upsilon => "upsilon_per_w must be within 1e-9 to 1e32",
+});
 
 /// Interference field: a checked table of Upsilon = E[1/I] along x. It is linear between two points, and constant
 /// beyond the ends of the table.
@@ -130,10 +123,7 @@ impl Field {
     pub const fn new(points: &'static [FieldPoint]) -> Self {
         match Self::try_new(points) {
             Ok(field) => field,
-            Err(FieldError::Points) => panic!("an interference field must have 1 to 1024 points"),
-            Err(FieldError::Place) => panic!("x_m must be within -1e7 to 1e7"),
-            Err(FieldError::Order) => panic!("x_m must increase from point to point"),
-            Err(FieldError::Upsilon) => panic!("upsilon_per_w must be within 1e-9 to 1e32"),
+            Err(error) => panic!("{}", error.text()),
         }
     }
 

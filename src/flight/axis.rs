@@ -61,7 +61,7 @@ impl core::fmt::Display for AxisError {
             let Geodetic { lat_e7, lon_e7, .. } = site;
             write!(
                 f,
-                "site {name}: latitude {lat_e7} and longitude {lon_e7} in 1e-7 degrees: must be within ±900000000 and ±1800000000"
+                "site {name}: latitude {lat_e7} must be within ±900000000 and longitude {lon_e7} within ±1800000000, in 1e-7 degrees"
             )
         };
         match self {

@@ -91,7 +91,6 @@ impl MissionConfig {
 
 /// Parameter of a [`MissionConfig`] that is rejected, and its range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MissionError {
     /// `relays` is not within 1 to [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
@@ -131,39 +130,25 @@ pub enum MissionError {
     Tolerance,
 }
 
-impl core::fmt::Display for MissionError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Relays => "relays must be within 1 to 1000",
-            Self::Distance => "distance_m must be within 1 to 1e6",
-            Self::Separation => "min_separation_m must be within 0 to 1e5",
-            Self::TooManyForDistance => {
-                "(relays - 1) x min_separation_m must not be above distance_m"
-            }
-            Self::TxPower => "tx_power_w must be within 1e-6 to 1e6",
-            Self::Common => {
-                "common.altitude_m must be within 0.1 to 1e5, common.power_w within 1e-6 to 1e6"
-            }
-            Self::Band => {
-                "the altitude band, band.least_m to band.most_m, must be within 0.1 to 1e5 and include common.altitude_m"
-            }
-            Self::Lateral => "lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
-            Self::InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
-            Self::InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
-            Self::Noise => {
-                "noise_w must be within 0 to 1, and at most 1e12 times the interferer's power received at 1 m"
-            }
-            Self::NoiseFeature => "a noise_w above 0 needs the feature `noise`",
-            Self::Field => "a field of interference needs the feature `field`",
-            Self::Reverse => "reverse (SIR of the direction Rx to Tx, as a share of that from Tx to Rx) must be within 0 to 1",
-            Self::ReverseFeature => "a reverse above 0 needs the feature `reverse`",
-            Self::RxPower => "rx_power_w must be within 1e-6 to 1e6",
-            Self::Tolerance => "tolerance must be within 1e-6 to 0.1",
-        })
-    }
-}
-
-impl core::error::Error for MissionError {}
+error_texts!(MissionError {
+    Relays => "relays must be within 1 to 1000",
+    Distance => "distance_m must be within 1 to 1e6",
+    Separation => "min_separation_m must be within 0 to 1e5",
+    TooManyForDistance => "(relays - 1) x min_separation_m must be at most distance_m",
+    TxPower => "tx_power_w must be within 1e-6 to 1e6",
+    Common => "common.altitude_m must be within 0.1 to 1e5, common.power_w within 1e-6 to 1e6",
+    Band => "the altitude band, band.least_m to band.most_m, must be within 0.1 to 1e5 and include common.altitude_m",
+    Lateral => "lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
+    InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
+    InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
+    Noise => "noise_w must be within 0 to 1, and at most 1e12 times the interferer's power received at 1 m",
+    NoiseFeature => "a noise_w above 0 needs the cargo feature `noise`",
+    Field => "an interference field needs the cargo feature `field`",
+    Reverse => "reverse (SIR required from Rx to Tx, as a share of the SIR from Tx to Rx) must be within 0 to 1",
+    ReverseFeature => "a reverse above 0 needs the cargo feature `reverse`",
+    RxPower => "rx_power_w must be within 1e-6 to 1e6",
+    Tolerance => "tolerance must be within 1e-6 to 0.1",
+});
 
 /// Interferer on the ground (the paper's MSI): a jammer, a base station, a licensed user.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -524,16 +509,7 @@ impl Mission {
     pub const fn new(config: MissionConfig) -> Self {
         match Self::try_new(config) {
             Ok(mission) => mission,
-            Err(MissionError::Relays) => panic!("relays must be within 1 to 1000"),
-            Err(MissionError::Distance) => panic!("distance_m must be within 1 to 1e6"),
-            Err(MissionError::TooManyForDistance) => {
-                panic!("(relays - 1) x min_separation_m is above distance_m")
-            }
-            Err(MissionError::TxPower) => panic!("tx_power_w must be within 1e-6 to 1e6"),
-            Err(MissionError::Common) => {
-                panic!("common.altitude_m or common.power_w is out of range")
-            }
-            Err(_) => panic!("a mission parameter is out of range"),
+            Err(error) => panic!("{}", error.text()),
         }
     }
 

@@ -59,19 +59,19 @@ pub enum UploadError {
 impl core::fmt::Display for UploadError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Version => "version must be within 1 to 65535",
+            Self::Version => "the upload's version must be within 1 to 65535",
             Self::Relays => {
-                "an upload must have the number of relays of the mission that it replaces"
+                "an upload must have as many relays as the mission that it replaces"
             }
             Self::Field => {
-                "an upload, and the mission it replaces, must have one interferer and no field"
+                "an upload, and the mission that it replaces, must have one interferer and no interference field"
             }
             Self::Mission(error) => return error.fmt(f),
             Self::Base => "the upload is for relays that were loaded with another mission",
             Self::Line(error) => return error.fmt(f),
-            Self::Old => "the version must be above the version of the present mission",
-            Self::Unsigned => "uploads need signed frames",
-            Self::Begun => "the relay has started: only a newer upload is accepted",
+            Self::Old => "the upload's version must be above the version of the present mission",
+            Self::Unsigned => "uploads need signed frames: give the relay a key",
+            Self::Begun => "a stored upload must be resumed before the relay starts",
         })
     }
 }

@@ -103,7 +103,7 @@ pub(crate) fn started(begun: &Begun) {
 
 pub(crate) fn unguarded() {
     warn!(
-        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+        "no sites (positions of Tx and Rx on earth): no autopilot is controlled, and drones are not kept apart while they move"
     );
 }
 
@@ -132,21 +132,21 @@ pub(crate) fn off_course(error: CourseError) {
 #[allow(dead_code, reason = "for an image that tells no autopilot")]
 pub(crate) fn no_flight() {
     error!(
-        "configuration refused: it has sites, but this image was built without the feature flight"
+        "configuration refused: it has sites, but this image was built without the cargo feature flight"
     );
 }
 
 #[cfg(feature = "mavlink-signing")]
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed, and frames that are not signed with its key are ignored"
+        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
     );
 }
 
 #[cfg(all(feature = "flight", not(feature = "mavlink-signing")))]
 pub(crate) fn cannot_sign_to_autopilot() {
     error!(
-        "configuration refused: it has an autopilot's key, but this image was built without the feature mavlink-signing"
+        "configuration refused: it has an autopilot's key, but this image was built without the cargo feature mavlink-signing"
     );
 }
 
@@ -170,17 +170,21 @@ pub(crate) fn autopilot(event: AutopilotEvent) {
 
 pub(crate) fn refused(error: ConfigError) {
     match error {
-        ConfigError::Blank => warn!("no configuration: the configuration block in flash is blank"),
+        ConfigError::Blank => warn!(
+            "no configuration: the configuration block in flash is blank, so this relay does nothing: provision the drone"
+        ),
         ConfigError::Magic => {
             error!("configuration refused: the configuration block does not begin with UAVR");
         }
         ConfigError::Version => {
             error!(
-                "configuration refused: the block's version or length is not the one of this firmware"
+                "configuration refused: the block has another version or length than this firmware reads: provision the drone again"
             );
         }
         ConfigError::Crc => {
-            error!("configuration refused: the block is damaged, its CRC does not match");
+            error!(
+                "configuration refused: the block is damaged (its CRC does not match): provision the drone again"
+            );
         }
         ConfigError::Index => {
             error!(
@@ -188,43 +192,47 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Profile => {
-            error!("configuration refused: this relay's altitude or power is out of range");
+            error!(
+                "configuration refused: this relay's altitude must be within 0.1 to 1e5 m, its power within 1e-6 to 1e6 W"
+            );
         }
         ConfigError::Hold => {
             error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1");
         }
         ConfigError::Method => {
             error!(
-                "configuration refused: the method is unknown, or cannot use an interference field"
+                "configuration refused: the method must be align with an interference field, and otherwise align, joint or adjust"
             );
         }
         ConfigError::Adjust => {
             error!(
-                "configuration refused: rounds or explore_m out of range, or not 0 for another method than adjust"
+                "configuration refused: with the method adjust rounds must be within 1 to 65535 and explore_m within 0 to 1e5, with any other method both 0"
             );
         }
         ConfigError::Measure => {
             error!(
-                "configuration refused: samples or i_max_w of the interference measurement out of range"
+                "configuration refused: samples must be within 100 to 1000000 and i_max_w within 1e-30 to 1e6 W, or both 0"
             );
         }
         ConfigError::Listen => {
             error!(
-                "configuration refused: listen settings (locating the interferer) out of range, or given with an interference field"
+                "configuration refused: listen (locating the interferer) needs times above 0, a relative_error within 1e-3 to 1, and no interference field"
             );
         }
         ConfigError::Reverse => {
             error!("configuration refused: a reverse above 0 needs the method align or adjust");
         }
         ConfigError::Interferer => {
-            error!("configuration refused: it has both an interferer and an interference field");
+            error!(
+                "configuration refused: it has both an interferer and an interference field: leave one out"
+            );
         }
         ConfigError::Points => error!(
             "configuration refused: the interference field has more points than the block can hold"
         ),
         ConfigError::Unused => {
             error!(
-                "configuration refused: bytes after the last point of the interference field are not 0"
+                "configuration refused: the bytes after the last point of the interference field must be 0"
             );
         }
         ConfigError::Secret => {
@@ -253,10 +261,10 @@ pub(crate) fn refused(error: ConfigError) {
 #[cfg(feature = "auth")]
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
-        info!("frames are signed, epoch {=u32}", epoch);
+        info!("frames are signed; epoch (start counter) {=u32}", epoch);
     } else {
         error!(
-            "frames are signed, epoch {=u32}; the epoch cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch (start counter) {=u32}, which cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }
@@ -264,12 +272,14 @@ pub(crate) fn signs(epoch: u32, is_stored: bool) {
 
 #[cfg(feature = "auth")]
 pub(crate) fn unsigned() {
-    warn!("no key: frames are not signed, and anybody in range can forge them");
+    warn!("no key: frames are not signed, so anybody in range can forge them");
 }
 
 #[cfg(feature = "auth")]
 pub(crate) fn no_epoch() {
-    error!("frames cannot be signed: the epoch (start counter) has reached its maximum");
+    error!(
+        "frames cannot be signed: the epoch (start counter) has reached its maximum: provision all drones with a new key"
+    );
 }
 
 /// Logs that a mission uploaded before this start was restored.
@@ -299,7 +309,9 @@ pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's membership restored from flash");
     } else {
-        error!("votes on the chain's membership in flash are from another firmware, and ignored");
+        error!(
+            "votes on the chain's membership in flash are in another firmware's format, and ignored"
+        );
     }
 }
 
@@ -315,7 +327,7 @@ pub(crate) fn votes(is_stored: bool) {
 #[cfg(not(feature = "auth"))]
 pub(crate) fn cannot_sign() {
     error!(
-        "configuration refused: it has a key, but this image was built without the feature auth"
+        "configuration refused: it has a key, but this image was built without the cargo feature auth"
     );
 }
 

@@ -135,10 +135,8 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
 /// # Errors
 /// The least sufficient data rate, the number of relays on the channel, and the alternatives.
 pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<(), String> {
-    load.carried(baud, probe_after).map_err(|full| {
-        let least = full.least_baud;
-        format!("--baud {baud}: must be within {least} to {MOST_BAUD}: {full}")
-    })
+    load.carried(baud, probe_after)
+        .map_err(|full| format!("--baud {baud}: {full}"))
 }
 
 /// Parses a number on the command line, which must be within `least` to `most`.

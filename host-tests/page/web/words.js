@@ -6,7 +6,7 @@ const byId = (id) => document.getElementById(id);
 const decibels = (linear) => `${(10 * Math.log10(linear)).toFixed(2)} dB`;
 
 /** Returns the words for the direction that limits a chain of both directions. */
-const limitedBy = (direction) => ({ forward: "limited by the way to Rx", backward: "limited by the way back", both: "limited by both directions" })[direction];
+const limitedBy = (direction) => ({ forward: "limited by the direction to Rx", backward: "limited by the direction back to Tx", both: "limited by both directions" })[direction];
 
 function summary(report) {
   if (report.sir === undefined) return "The relays have not agreed on positions.";
@@ -70,13 +70,13 @@ const PHRASES = {
   "silent": "went silent",
   "lost": "lost relay",
   "found": "became a neighbour of relay",
-  "no quorum": "no quorum, too few relays are reachable",
-  "view accepted": "new membership of the chain agreed",
-  "lease expired": "the lease of the agreement expired",
+  "no quorum": "too few relays receive each other (no quorum), position held",
+  "view accepted": "new members of the chain agreed",
+  "lease expired": "last agreement expired, setpoint kept until a new one",
   "not received by": "is not received by relay",
-  "sensor off": "ignores the measurements of relay",
+  "sensor off": "ignores the measurements, which do not fit the others, of relay",
   "converged": "agreed on a position",
-  "infeasible": "no target SIR can be met",
+  "infeasible": "no positions meet any target SIR, positions kept",
   "new estimate": "new interference estimate",
   "interferer unclear": "the measurements fit no single interferer",
 };

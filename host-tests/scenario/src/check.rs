@@ -271,7 +271,7 @@ pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
             Some(key),
             None,
             Problem::Syntax,
-            format!("valid TOML ({why})"),
+            format!("valid TOML (the parser reports: {why})"),
         )
     })?;
     if table.is_empty() {

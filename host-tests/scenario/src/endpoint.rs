@@ -16,7 +16,7 @@ const PX4_SENDS_TO: u16 = 14_540;
 const APART: u16 = 1_000;
 
 /// Description of a valid UDP address and its ports, for error messages.
-pub const FORM: &str = "udp:HOST:PORT or udp:HOST:PORT@LOCAL, PORT and LOCAL within 1 to 65535, without @LOCAL PORT within 1 to 64535";
+pub const FORM: &str = "udp:HOST:PORT with PORT within 1 to 64535, or udp:HOST:PORT@LOCAL with PORT and LOCAL within 1 to 65535";
 
 /// UDP address of an autopilot, with the local port that the companion uses to reach it.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -127,7 +127,7 @@ impl fmt::Display for EndpointError {
             Self::NoLocal => f.write_str("has a LOCAL that is not within 1 to 65535"),
             Self::NoDefault { port } => write!(
                 f,
-                "needs @LOCAL, because the default, PORT + {APART} = {}, is above 65535",
+                "needs @LOCAL, because the default local port, PORT + {APART} = {}, is above 65535",
                 u32::from(*port) + u32::from(APART)
             ),
         }
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!(local("udp:h:64536"), Err(none));
         assert_eq!(
             none.to_string(),
-            "needs @LOCAL, because the default, PORT + 1000 = 65536, is above 65535"
+            "needs @LOCAL, because the default local port, PORT + 1000 = 65536, is above 65535"
         );
     }
 

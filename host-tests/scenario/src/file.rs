@@ -280,7 +280,7 @@ fn data_link(file: &str, raw: RawDataLink, noise_hz: Option<f64>) -> Result<Link
                     Some(number(here)),
                     Problem::Unsorted,
                     format!(
-                        "above {} (the {key} of the entry before it) to {most}",
+                        "above {} (the {key} of the previous entry) to {most}",
                         number(before)
                     ),
                 ));
@@ -395,7 +395,7 @@ fn interference(
                 if here.x_m <= before.x_m {
                     let key = format!("field.beta[{index}].x_m");
                     let allowed = format!(
-                        "above {} (the x_m of the entry before it) to 1e7 m",
+                        "above {} (the x_m of the previous entry) to 1e7 m",
                         number(before.x_m)
                     );
                     return Err(mistake(
@@ -444,7 +444,7 @@ fn relays(
         if raw.altitude_m.is_none() && power_w.is_none() {
             return fail(
                 Problem::NothingDiffers,
-                "an index together with altitude_m, power_w (or power_dbm) or both".to_owned(),
+                "an index, and at least one of altitude_m, power_w and power_dbm".to_owned(),
             );
         }
         let relay = RelayOverride {
@@ -516,7 +516,9 @@ pub(super) fn line(
     match distance_m {
         #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
         Some(given) if !line.axis.is_of(given as f32) => {
-            let allowed = format!("{along:.3} m, as [site] has it, or none");
+            let allowed = format!(
+                "{along:.3} m, the distance between the two sites of [site], or no distance_m"
+            );
             Err(mistake(
                 file,
                 "geometry.distance_m",
@@ -758,13 +760,13 @@ fn on_earth(
         ))
     };
     let Some(line) = room.line else {
-        let allowed = "x_m and y_m, or a [site] with the geographic position of the line";
+        let allowed = "x_m and y_m instead, or a [site] with the geographic positions of Tx and Rx";
         return fail(Problem::NoSite, allowed);
     };
     let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
     let Some(place) = point.and_then(|point| line.axis.place(point)) else {
         let allowed = format!(
-            "up to {} m from the line of [site] and from its ends",
+            "a position up to {} m from the line between the two sites of [site] and from its ends",
             Axis::AROUND_M
         );
         return fail(Problem::OutOfRange, &allowed);
@@ -784,7 +786,7 @@ fn on_earth(
                 number(amsl_m)
             );
             let allowed = format!(
-                "no amsl_m for an interferer on the ground, or a height that changes the interference by at most {MAX_HEIGHT_ERROR_DB} dB everywhere; \
+                "no amsl_m, or a height that changes the interference by at most {MAX_HEIGHT_ERROR_DB} dB everywhere; \
                  this one changes it by {off_db:.1} dB, because interferers are computed as being on the ground"
             );
             let key = format!("{table}amsl_m");

@@ -26,7 +26,7 @@ fn check_mode(file: &Path) -> Result<(), String> {
         Ok(about) if about.is_file() && about.permissions().mode() & OTHERS != 0 => {
             let mode = about.permissions().mode() & 0o777;
             Err(format!(
-                "mode {mode:04o}: other users of this computer can read or write the key; allowed: at most 0660; type: chmod 600 {}",
+                "has the mode {mode:04o}, so other users of this computer can read or write the key; type: chmod 600 {}",
                 file.display()
             ))
         }

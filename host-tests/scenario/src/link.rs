@@ -174,11 +174,11 @@ impl fmt::Display for BandwidthError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Missing => f.write_str(
-                "the bandwidth is missing; allowed: --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz",
+                "the bandwidth is missing; give --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz",
             ),
             Self::Contradicts { option_hz, file_hz } => write!(
                 f,
-                "--bandwidth-hz {option_hz:?}: contradicts link.bandwidth_hz = {file_hz:?} of the scenario; allowed: one of the two"
+                "--bandwidth-hz {option_hz:?}: contradicts link.bandwidth_hz = {file_hz:?} of the scenario; leave one of the two out"
             ),
         }
     }

@@ -39,7 +39,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoHypothetical => {
-                f.write_str("the [[interferer]] cannot be replaced by a single interferer with the same effect, which the relays need")
+                f.write_str("no single interferer has the same effect as all [[interferer]] together, but relays can compute with a single one only: change their positions or powers, or leave some out")
             }
             Self::NoRoom {
                 relays,
@@ -159,7 +159,7 @@ pub fn hypothetical(scenario: &Scenario) -> Option<Hypothetical> {
 pub fn undescribed_relay_error(scenario: &Scenario, uavs: u16) -> Option<String> {
     let (index, _) = scenario.relays.last_key_value()?;
     (*index > uavs).then(|| {
-        format!("[[relay]] index = {index}: there is no such relay in a chain of {uavs}; allowed: 1 to {uavs}")
+        format!("[[relay]] index = {index}: the chain has only {uavs} relays; allowed: 1 to {uavs}")
     })
 }
 

@@ -89,7 +89,7 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
         assert_eq!(vehicle.link.poll_cleared(), None);
         assert_eq!(vehicle.events, []);
         for line in [
-            "relay: denied, name all lost relays on one side",
+            "relay: denied: name every lost relay on that side",
             "relay: lost relays cleared",
         ] {
             let text = LinkMessage::Text(line.to_owned());

@@ -66,7 +66,7 @@ fn is_off_a_swapped_line(kind: &str) {
     assert!(line.ends_with(said.split(" km").nth(1).unwrap()), "{line}");
     let operator = |heard: &ReceivedMessage| {
         let text = heard.0["text"].as_str().unwrap_or_default();
-        text.starts_with("relay: the drone is ") && text.ends_with(" km from its line")
+        text.starts_with("relay: drone is ") && text.ends_with(" km off the line Tx-Rx")
     };
     apart.drone.receive(operator);
     let position = apart.position();
@@ -90,7 +90,7 @@ fn is_off_a_swapped_line(kind: &str) {
     assert!((1..=3).contains(&texts), "{texts} texts");
     // The drone cannot be engaged: the relay has no position, and no targets are streamed.
     // The log gives the reason, and never reports the drone as ready.
-    let reason = "autopilot: cannot be engaged: the position is unknown, or not near the line between transmitter and receiver";
+    let reason = "autopilot: cannot be engaged: the drone's position is unknown, or not near the line between transmitter and receiver";
     apart.relay.wait_for(reason);
     apart.drone.order("mode companion");
     let heard = apart.drone.receive_for(Duration::from_secs(3));
@@ -129,7 +129,7 @@ fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     let said = format!("the drone is {:.0} km from", away_m / 1e3);
     assert!(line.contains(&said), "{said} is not in {line}");
     assert!(
-        line.contains("are these the sites of this flight"),
+        line.contains("are these the sites (Tx and Rx) of this flight"),
         "{line}"
     );
     assert_eq!(apart.position()["sites_look_swapped"], false);

@@ -68,7 +68,7 @@ fn a_later_upload_is_based_on_the_flown_mission() {
     let ended = bench.uploads("1", moved).succeeds();
     assert_eq!(
         lines_of_event(&ended, "current"),
-        ["relay 1 flies the mission with which it was loaded"]
+        ["relay 1 flies the mission loaded before flight"]
     );
     let changes = lines_of_event(&ended, "change");
     assert_eq!(
@@ -132,7 +132,7 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     bench.agreed();
     let more = "--new-altitude 50 --new-band 50,50 --yes";
     let (ended, error) = bench.uploads("1", more).fails(1);
-    let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m";
+    let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m; --no-fence uploads it nevertheless";
     assert_eq!(error, line);
     assert_eq!(
         lines_of_event(&ended, "change")[0],
@@ -254,12 +254,12 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
     let mut bench = Bench::new();
     bench.agreed();
     let new = "--new-interferer 80,700,-300";
-    let line = "--version 1: the upload cannot be confirmed, because standard input is not a terminal: give --yes, or --dry-run to see its changes";
+    let line = "--version 1: nobody can confirm the upload, because standard input is not a terminal: give --yes to upload without a question, or --dry-run to see the changes only";
     assert_eq!(bench.uploads("1", new).refused(2), line);
     let question = "Upload version 1? [y/N] ";
     for answer in ["n\n", "\n"] {
         let (status, shown) = at_a_terminal(&bench.options("1", new), answer);
-        let refused = "--version 1: not confirmed, nothing was uploaded\n";
+        let refused = "--version 1: not confirmed, so nothing was uploaded\n";
         assert_eq!((status, shown), (Some(1), format!("{question}{refused}")));
     }
     assert!(!bench.0.relays[0].has_printed("uploaded: "));

@@ -81,11 +81,11 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     for (command, why) in [
         (
             "land",
-            "unknown command `land`: the only command is clear-lost N",
+            "unknown command `land`: the only one is `clear-lost N",
         ),
         ("clear-lost", "clear-lost names no relay"),
         ("clear-lost 2", "relay 2 is this relay"),
-        ("clear-lost 1", "relay 1 is received and not lost"),
+        ("clear-lost 1", "relay 1 is not lost"),
         ("clear-lost 4", "relay 4: must be within 1 to 3"),
         ("clear-lost x", "relay x: must be within 1 to 3"),
     ] {
@@ -96,7 +96,7 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     let still = Instant::now();
     drones.fly_until(|_| still.elapsed() > Duration::from_secs(2));
     assert!(drones.at[1][0] <= 46.0, "{:?}", drones.at);
-    let said = "relay 3 is cleared: no lost relay downstream limits this relay any more";
+    let said = "relay 3 is cleared: this relay no longer keeps clear of lost relays downstream (toward Rx)";
     assert_eq!(
         commanded(&socket, "clear-lost 3\n"),
         (true, said.to_owned())
@@ -119,7 +119,7 @@ fn an_incomplete_command_is_answered() {
     relay.line("converged: ");
     let (is_done, text) = commanded(&socket, "clear-lo");
     assert!(!is_done, "{text}");
-    relay.line("command refused: unknown command `clear-lo`: the only command is clear-lost N");
+    relay.line("command refused: unknown command `clear-lo`: the only one is `clear-lost N");
     assert_eq!(status_of(&socket)["relay"]["index"], 1);
     let text = answer(&socket, "", false);
     assert!(text.contains("\"has_lease\""), "the state: {text}");
@@ -152,12 +152,12 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     drone.order("clear 1");
     answer(&drone, 2);
     relay.line(
-        "command refused: the command must name all lost relays of one side, and no others (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
+        "command refused: the command must name every lost relay on one side of this relay, and no other (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
     );
     drone.order("clear 2");
     answer(&drone, 0);
     relay.line(
-        "cleared: relay 2 is cleared: no lost relay downstream limits this relay any more (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
+        "cleared: relay 2 is cleared: this relay no longer keeps clear of lost relays downstream (toward Rx) (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
     );
     assert_eq!(status_of(&socket)["relay"]["lost"], json!([]));
 }

@@ -61,7 +61,7 @@ fn three_relays_with_one_file_settle_like_the_simulation() {
     for relay in &mut relays {
         let line = relay.line("started: ");
         assert!(
-            line.contains(", network 4711, ") && line.contains(", 57600 baud"),
+            line.contains(", network 4711, ") && line.contains(", 57600 bit/s"),
             "{line}"
         );
     }

@@ -65,7 +65,7 @@ impl Flight {
     pub(crate) fn takes_off(&mut self) {
         self.drone.takes_off();
         self.relay
-            .line("autopilot: in the air, not controlled by the relay");
+            .line("autopilot: in the air, and not controlled by the relay");
     }
 
     /// Chooses OFFBOARD or GUIDED as the pilot, and waits for setpoint control. A PX4 accepts the mode only while
@@ -94,7 +94,7 @@ impl Flight {
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay
-            .line("autopilot: in the air, not controlled by the relay");
+            .line("autopilot: in the air, and not controlled by the relay");
         let text = match mode {
             "pilot" => "relay: released, manual mode",
             _ => "relay: released, returns (RTL)",
@@ -181,7 +181,7 @@ fn falls_silent(flight: &mut Flight) {
     flight.drone.order("mute");
     flight
         .relay
-        .line("autopilot: no heartbeat for 3 s; check the cable, the baud rate and MAVLink 2");
+        .line("autopilot: no heartbeat for 3 s: is the autopilot on, is its cable right, and does its port use MAVLink 2 and this data rate?");
     assert!(flight.targets_for(MOMENT).is_empty(), "nobody is there");
     flight.drone.order("speak");
 }

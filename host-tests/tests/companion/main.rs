@@ -191,9 +191,9 @@ fn a_killed_process_is_noticed_and_comes_back() {
     let killed = Instant::now();
     // A dropped relay is killed.
     drop(chain.relays.remove(1));
-    chain.relays[0].line("lost: relay 2 downstream does not reply");
+    chain.relays[0].line("lost: relay 2 downstream (toward Rx) does not reply");
     let first = killed.elapsed();
-    chain.relays[1].line("lost: relay 2 upstream does not reply");
+    chain.relays[1].line("lost: relay 2 upstream (toward Tx) does not reply");
     let took = killed.elapsed();
     println!(
         "noticed after {} and {} ms",
@@ -204,8 +204,8 @@ fn a_killed_process_is_noticed_and_comes_back() {
     assert!(took < Duration::from_secs(10), "{took:?}");
 
     let mut again = chain.relay(2, "");
-    chain.relays[0].line("back: relay 2 downstream");
-    chain.relays[1].line("back: relay 2 upstream");
+    chain.relays[0].line("back: relay 2 is now the neighbour downstream");
+    chain.relays[1].line("back: relay 2 is now the neighbour upstream");
     // The chain has requested a view since its lease expired: the returning relay gets its position with that view.
     assert_eq!(again.settled(), settled[1]);
     drop(chain.relays.remove(0));

@@ -24,7 +24,7 @@ fn mavsdk_is_led_to_its_position_and_released() {
     drone.order("air");
     // MAVSDK sends no `system_status`; a PX4 sends ACTIVE.
     drone.order("active");
-    relay.line("autopilot: in the air, not controlled by the relay");
+    relay.line("autopilot: in the air, and not controlled by the relay");
     let own = drone.receive(ReceivedMessage::is_target);
     let off = apart_m(own.to(), on_earth(370.0, 15.0));
     assert!(off < 0.1, "{off} m off its own place");
@@ -36,7 +36,7 @@ fn mavsdk_is_led_to_its_position_and_released() {
     let there = drone.receive(|heard| heard.is_target() && apart_m(heard.to(), place) < 0.05);
     assert_eq!(there.0["from"], serde_json::json!([1, 191]));
     drone.order("mode hold");
-    relay.line("autopilot: in the air, not controlled by the relay");
+    relay.line("autopilot: in the air, and not controlled by the relay");
     drone.receive(|heard| heard.is_text("relay: released, holds position"));
     relay.stopped();
 }

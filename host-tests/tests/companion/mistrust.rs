@@ -13,7 +13,7 @@ const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788
 #[test]
 fn different_mavlink_keys_are_reported_and_frames_ignored() {
     let unsigned = "signs its frames and ignores unsigned ones: give --autopilot-key-file";
-    let other = "signs with another key than that of --autopilot-key-file; its frames are ignored";
+    let other = "signs with another key than that of --autopilot-key-file, so its frames are ignored: give both the same key";
     let plain = "does not sign its frames, which are ignored";
     for (drone, relay, line) in [
         (Some(ONE), None, unsigned),
@@ -27,7 +27,7 @@ fn different_mavlink_keys_are_reported_and_frames_ignored() {
         let said = flight.relay.stopped().concat();
         assert!(!said.contains("5555"), "{said}");
         let is_refused =
-            said.contains("frames from the autopilot rejected because of their signatures");
+            said.contains("frames from the autopilot were rejected because of their signatures");
         assert!(is_refused || relay.is_none(), "{said}");
         assert_eq!(said.contains("autopilot: found"), relay.is_none(), "{said}");
     }

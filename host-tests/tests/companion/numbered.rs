@@ -20,7 +20,7 @@ fn a_drone_keeps_its_number_when_its_place_changes() {
         relay.line("converged");
     }
     drop(second);
-    third.line("lost: relay 2 upstream does not reply");
+    third.line("lost: relay 2 upstream (toward Tx) does not reply");
     let line = third.line("view accepted: ");
     let said = " s  relay 3  view accepted: the chain has 2 relays, this one at place 2 from the transmitter (view ";
     assert!(line.contains(said), "{line}");

@@ -117,7 +117,10 @@ fn wrong_options_of_an_autopilot_are_named() {
 #[test]
 fn an_absent_autopilot_at_the_start_is_an_error() {
     for (autopilot, why) in [
-        ("/nowhere/tty", "--autopilot /nowhere/tty: No such file"),
+        (
+            "/nowhere/tty",
+            "--autopilot /nowhere/tty: there is no such device",
+        ),
         ("/dev/null", "--autopilot /dev/null: is not a tty"),
         (
             "udp:nowhere.invalid:14540",

@@ -13,7 +13,9 @@ use crate::process::{LIMIT, Relay, bits};
 #[test]
 fn two_relays_with_positions_keep_apart_by_their_guards() {
     let mut free = Chain::start(2, "");
-    free.lines("unguarded: no --positions: drones are not kept apart while they move");
+    free.lines(
+        "unguarded: no --positions and no --autopilot: drones are not kept apart while they move",
+    );
     let expected = free.settled();
     drop(free);
 
@@ -27,7 +29,7 @@ fn two_relays_with_positions_keep_apart_by_their_guards() {
     let mut at = [[10.0, 0.0, 20.0], [30.0, 0.0, 20.0_f32]];
     for relay in &mut chain.relays {
         let line =
-            relay.line("guarded: setpoints keep drones apart while they move; this drone's positions come from --positions");
+            relay.line("guarded: drones are kept apart while they move; this drone's positions are read from --positions");
         assert!(!line.contains("unguarded"), "{line}");
         assert!(!relay.has_printed("setpoint: "), "nobody knows where it is");
     }
@@ -78,7 +80,10 @@ fn invalid_position_lines_are_counted_and_logged_once() {
     let said = relay.stopped();
     let times = |part: &str| said.iter().filter(|line| line.contains(part)).count();
     assert_eq!(times("is not x_m"), 1, "{said:?}");
-    assert!(times("position: 8 invalid lines") > 0, "{said:?}");
+    assert!(
+        times("position: 8 lines of --positions were invalid") > 0,
+        "{said:?}"
+    );
 }
 
 #[test]

@@ -27,7 +27,11 @@ fn three_signing_relays_settle_like_the_simulation() {
         let mut chain = Chain::on_wires(3, noise);
         chain.files.write("epoch2", "41\n");
         chain.relays = (1..=3).map(|index| start(&chain, index, "key")).collect();
-        assert!(chain.relays[1].line("signed: ").ends_with("epoch 42"));
+        assert!(
+            chain.relays[1]
+                .line("signed: ")
+                .ends_with("epoch (start counter) 42")
+        );
         assert_eq!(epoch(&chain.files, "epoch2"), 42);
         // The relay writes the file before the log line.
         chain.relays[0].line("signed: ");
@@ -44,7 +48,11 @@ fn three_signing_relays_settle_like_the_simulation() {
             let fresh = start(&chain, index, "key");
             chain.relays.insert(index - 1, fresh);
         }
-        assert!(chain.relays[1].line("signed: ").ends_with("epoch 43"));
+        assert!(
+            chain.relays[1]
+                .line("signed: ")
+                .ends_with("epoch (start counter) 43")
+        );
         assert_eq!(chain.relays[0].settled(), expected[0]);
         assert_eq!(chain.relays[1].settled(), expected[1]);
     }
@@ -54,7 +62,7 @@ fn three_signing_relays_settle_like_the_simulation() {
 fn a_relay_with_a_different_key_is_ignored() {
     let chain = Chain::on_wires(2, QUIET);
     let (mut one, _other) = (start(&chain, 1, "key"), start(&chain, 2, "other"));
-    one.line("lost: relay 2 downstream does not reply");
+    one.line("lost: relay 2 downstream (toward Rx) does not reply");
     assert!(!one.has_printed("setpoint: "));
     let last = one.stopped().pop().unwrap();
     assert!(
@@ -85,13 +93,13 @@ fn a_bad_key_or_epoch_is_named() {
             "key",
             text("text"),
             1,
-            "text: must hold a number within 0 to 4294967294",
+            "text: must contain one number within 0 to 4294967294: the epoch of the last start",
         ),
         (
             "key",
             text("last"),
             1,
-            "last: is the largest epoch, and a start needs a larger one",
+            "last: contains the largest epoch, and every start needs a larger one: give all relays a new key, and remove this file",
         ),
         ("key", text("no/folder"), 1, "folder: cannot be written"),
         (
@@ -131,7 +139,7 @@ fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     chain.relays.remove(1).stopped();
     chain.files.write("epoch2", "5\n");
     let mut back = start(&chain, 2, "key");
-    assert!(back.line("signed: ").ends_with("epoch 6"));
+    assert!(back.line("signed: ").ends_with("epoch (start counter) 6"));
     let line = chain.relays[0].line("epoch: ");
     let remedy = "epoch: relay 2 has started with an epoch (start counter) that is not above its last one, and its frames are rejected; raise the number in its --epoch-file and restart it";
     assert!(line.ends_with(remedy), "{line}");
@@ -152,7 +160,7 @@ fn a_key_file_readable_by_others_is_refused() {
     let signed = format!("--key-file {key} --epoch-file {epoch}");
     let station = "--of 1 --end tx --tty /nowhere/tty --version 1 --new-altitude 30 --yes";
     let line = format!(
-        "--key-file {key}: mode 0644: other users of this computer can read or write the key; allowed: at most 0660; type: chmod 600 {key}"
+        "--key-file {key}: has the mode 0644, so other users of this computer can read or write the key; type: chmod 600 {key}"
     );
     for program in [
         Relay::start(&format!("--index 1 --of 1 {signed}")),

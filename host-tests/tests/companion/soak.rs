@@ -83,7 +83,7 @@ fn round(channel: &Medium, sockets: &[PathBuf], relays: &mut [Relay; 3]) {
     }
     channel.plug(1);
     fill_disk(third.pid(), false);
-    third.line("is written again, after ");
+    third.line("can be written again, after ");
     for socket in sockets {
         until(socket, of_three);
     }
@@ -97,7 +97,7 @@ fn reports_of_dropped_lines(first: &Relay, reader: PipeReader, dropped: u64) -> 
         first.signal(Signal::USR1);
         std::thread::sleep(Duration::from_millis(20));
         let told = lines.try_iter();
-        let told = told.filter(|it| it.contains(" lines dropped: the output"));
+        let told = told.filter(|it| it.contains(" log lines dropped: the disk was full"));
         let told = told.count();
         if told > 0 {
             return told;
@@ -165,7 +165,7 @@ fn faults_of_ports_and_disks_end_no_relay() {
     check_logged_once_a_round(&said, parts, rounds);
     let parts = [
         "cannot be written: ",
-        "is written again, after ",
+        "can be written again, after ",
         "hang-up: ",
     ];
     check_logged_once_a_round(&third.stopped(), parts, rounds);

@@ -87,7 +87,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     let started = tx.line("\"event\":\"started\"");
     assert!(started.contains("\"end\":\"transmitter\""));
     rx.line("started: receiver of a chain of 3 relays, ");
-    rx.line("measurement: \"nonsense\" is not POWER or receiver POWER, a power within 1e-30 to 1e6 W, or that in dBm");
+    rx.line("measurement: \"nonsense\" is not POWER or receiver POWER, a power within 1e-30 to 1e6 W, or in dBm with the unit");
     let meter = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     // Notation of a spectrum analyser.
     let tx_dbm = format!("{} dBm", 10.0 * f64::log10(tx_w) + 30.0);
@@ -123,7 +123,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     field.media[0].pull(4);
     rx.line("port lost: --tty ");
     rx.signal(Signal::HUP);
-    rx.line("hang-up: the log file was reopened; the station continues");
+    rx.line("hang-up: the log file was reopened after SIGHUP; the station continues");
     field.media[0].plug(4);
     rx.line("port back: --tty ");
     let is_louder = |said: &Value| said["relay"]["receiver_w"].as_f64().unwrap() > 1.3 * rx_w;
@@ -158,7 +158,7 @@ fn wrong_options_of_a_station_are_named() {
     let files = Files::new();
     let (signed, tty) = (files.signed("key", "ground"), crate::pty::Pty::new());
     let folder = files.text("");
-    let udp = "must be udp:PORT or udp:HOST:PORT, PORT within 1 to 65535";
+    let udp = "must be udp:PORT or udp:HOST:PORT, with PORT within 1 to 65535";
     let mut cases = vec![
         (String::new(), 2, "--version".to_owned()),
         (
@@ -218,10 +218,10 @@ fn a_running_station_uploads_and_keeps_running() {
         )
     };
     let (mut first, level, capture) = station("2", "first");
-    first.line("flown: 1 of 1 relays fly version 2 in view ");
+    first.line("flown: 1 of 1 relays fly version 2, as relay 1 reports for the present members of the chain (view ");
     relay.line("adopted: the chain flies version 2");
     write(&level, "1e-9\n");
-    first.line("measurement: 1.000e-9 W by ");
+    first.line("measurement: 1.000e-9 W from ");
     first.stopped();
     let said = std::fs::metadata(capture).unwrap().len();
     assert!(said > 500, "{said} bytes in the capture");

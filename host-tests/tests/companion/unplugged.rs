@@ -15,17 +15,20 @@ fn a_port_that_vanishes_is_opened_again() {
     for _ in 0..2 {
         let (_, sleeps) = flight.relay.cost();
         flight.drone.order("unplug");
-        let line = flight
-            .relay
-            .line("device disconnected; retried until it is back");
+        let line = flight.relay.line(
+            "the device was disconnected; opened again as soon as it is back: check its cable",
+        );
         assert!(line.contains("port lost: --autopilot /"), "{line}");
         flight.relay.line("autopilot: no heartbeat");
         std::thread::sleep(Duration::from_millis(1_500));
         let (_, after) = flight.relay.cost();
         assert!(after - sleeps < 500, "{} wake-ups", after - sleeps);
-        assert!(flight.relay.lines_with("is back").is_empty(), "it is not");
+        assert!(
+            flight.relay.lines_with("is open again").is_empty(),
+            "it is not"
+        );
         flight.drone.order("plug");
-        flight.relay.line("is back");
+        flight.relay.line("is open again");
         // The autopilot is still in GUIDED, and its pilot has to choose that mode again.
         flight.relay.line("autopilot: cannot be engaged");
         flight.drone.order("mode pilot");
@@ -33,17 +36,17 @@ fn a_port_that_vanishes_is_opened_again() {
         flight.drone.receive(ReceivedMessage::is_target);
     }
     flight.arrives(place);
-    let gone = flight.relay.lines_with("device disconnected");
+    let gone = flight.relay.lines_with("the device was disconnected");
     assert!(gone.is_empty(), "once each: {gone:?}");
 
     // Messages are requested again from an autopilot that was switched off with its port.
     flight.drone.order("unplug");
     flight
         .relay
-        .line("device disconnected; retried until it is back");
+        .line("the device was disconnected; opened again as soon as it is back: check its cable");
     flight.drone.order("reboot");
     flight.drone.forget();
     flight.drone.order("plug");
-    flight.relay.line("is back");
+    flight.relay.line("is open again");
     flight.drone.wait_for_requests(&ASKED);
 }

@@ -54,7 +54,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
         assert!(!chain.files.path("upload1").exists());
         let ends = format!("--end tx --tty {}", chain.tx.as_ref().unwrap().tty(0));
         let last = ground(&chain.files, "3", &ends).succeeds().pop().unwrap();
-        let flown = "flown: 2 of 2 relays fly version 3 in view ";
+        let flown = "flown: 2 of 2 relays fly version 3, as relay ";
         assert!(last.contains(flown), "{last}");
         // Both log lines come before the ground station's.
         chain.lines("uploaded: version 3 of the mission was received and stored");
@@ -87,7 +87,7 @@ fn a_relay_without_its_upload_is_offered_it_again() {
     chain.lines("converged: ");
     let ends = format!("--shared --end rx --tty {station}");
     let last = ground(&chain.files, "1", &ends).succeeds().pop().unwrap();
-    let flown = "flown: 2 of 2 relays fly version 1 in view ";
+    let flown = "flown: 2 of 2 relays fly version 1, as relay ";
     assert!(last.contains(flown), "{last}");
     chain.settles_at(&uploaded);
     let kept = chain.files.path("upload2");
@@ -163,7 +163,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
         rx.tty(1)
     ));
     let line = station.line("adopted: ");
-    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; polling it until the others do, too";
+    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; the station asks it until the others do, too";
     assert!(line.ends_with(first), "{line}");
     assert_eq!(*state.lock().unwrap(), Wire::Cut);
     // Several polls later the others still do not fly it.
@@ -176,7 +176,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
     *state.lock().unwrap() = Wire::Open;
     let line = station.line("flown: ");
     assert!(
-        line.contains("flown: 3 of 3 relays fly version 5 in view "),
+        line.contains("flown: 3 of 3 relays fly version 5, as relay "),
         "{line}"
     );
     station.succeeds();
@@ -212,15 +212,27 @@ fn a_useless_upload_file_is_named_and_ignored() {
     };
     for (bytes, words) in [
         (good.clone(), None),
-        (damaged, Some("is damaged or not an upload; not used")),
+        (
+            damaged,
+            Some(
+                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+            ),
+        ),
         (
             good[..Upload::LENGTH].to_vec(),
-            Some("is damaged or not an upload; not used"),
+            Some(
+                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+            ),
         ),
-        (Vec::new(), Some("is damaged or not an upload; not used")),
+        (
+            Vec::new(),
+            Some(
+                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+            ),
+        ),
         (
             stored(&high, &new()),
-            Some("is for relays that were loaded with the mission of digest 0x"),
+            Some("is an upload for relays that were loaded with the mission of digest 0x"),
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();
@@ -247,9 +259,13 @@ fn the_ground_gives_up_after_its_time_limit() {
     let (files, wire) = (Files::new(), Medium::new(1, QUIET));
     let more = format!("--end tx --tty {} --timeout 2", wire.tty(0));
     let line = ground(&files, "7", &more).refused(1);
-    let reports = "--timeout 2: no relay has reported the mission that it flies: ";
+    let reports =
+        "--timeout 2: not finished after 2 s: no relay has reported the mission that it flies: ";
     assert!(line.starts_with(reports), "{line}");
-    assert!(line.ends_with("; 0 frames refused"), "{line}");
+    assert!(
+        line.ends_with("; 0 received frames were rejected"),
+        "{line}"
+    );
 }
 
 /// Checks that relays with a geofence refuse an altitude outside it, and name the permitted range.
@@ -282,14 +298,17 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         );
         let far = format!("farthest outside is relay 1, at altitude {altitude}.0 m");
         let line = ground(&chain.files, "5", &more).refused(1);
-        assert_eq!(line, format!("--version 5: {why}; {far}"));
+        assert_eq!(
+            line,
+            format!("--version 5: {why}; {far}; --no-fence uploads it nevertheless")
+        );
         let relays = &mut chain.relays;
         assert!(
             !relays[0].has_printed("upload refused: "),
             "nothing was sent"
         );
         let line = ground(&chain.files, "5", &format!("{more} --no-fence")).refused(1);
-        let by = "relay 1, or a relay beyond it, rejects the upload";
+        let by = "relay 1, or a relay behind it, rejects the upload";
         assert_eq!(line, format!("--version 5: {by}: {why}"));
         let own = "upload refused: the altitudes must be within the relay's own geofence, ";
         relays[0].line(&format!("{own}{range}"));

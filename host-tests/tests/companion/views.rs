@@ -42,7 +42,7 @@ fn stored(chain: &Chain, index: usize) -> Option<ViewRecord> {
     Some(ViewRecord::from_bytes(&bytes[..ViewRecord::LENGTH]).unwrap())
 }
 
-const STANDS_BY: &str = "restored: this relay's earlier votes on the chain's membership were read from --view-file; remove that file before another flight";
+const STANDS_BY: &str = "restored: this relay's votes on the chain's membership before this start were read from --view-file; remove that file before another flight";
 
 /// Checks that relays killed in a view (membership) of two and restarted form a chain of three. No view number is
 /// used twice.
@@ -116,8 +116,7 @@ fn a_useless_view_file_is_named_and_prevents_the_flight() {
     let other = store(&file, &voted(digest(&loaded()) ^ 1, 3, 40, true));
     let mut damaged = good.clone();
     damaged[7] ^= 1;
-    let is_damaged =
-        "is damaged or not a record of votes: before a new flight remove the file, and start again";
+    let is_damaged = "is damaged, or not a file of votes: before a new flight remove the file, and start again; in the same flight the relay cannot rejoin the chain";
     for (bytes, words) in [
         (damaged, is_damaged),
         (good[..good.len() - 1].to_vec(), is_damaged),

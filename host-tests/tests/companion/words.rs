@@ -40,7 +40,10 @@ fn the_reason_why_a_port_cannot_be_opened_is_logged() {
     first.line("started: ");
     let mut faults = vec![
         (files.text(""), "is a directory, not a tty"),
-        (files.text("none"), "No such file: is it plugged in?"),
+        (
+            files.text("none"),
+            "there is no such device: is it plugged in?",
+        ),
         ("/dev/null".to_owned(), "is not a tty"),
         (used, "is already in use"),
     ];
@@ -62,7 +65,7 @@ fn the_reason_why_a_port_cannot_be_opened_is_logged() {
 fn reasons_of_rejected_frames_are_logged() {
     let files = Files::new();
     for (one, other, why) in [
-        ("", "--network 8", "are of another network number"),
+        ("", "--network 8", "have another network number"),
         (
             &*files.signed("key", "e1"),
             &*files.signed("other", "e2"),

@@ -97,7 +97,7 @@ fn flies_to_its_place(image: Image, kind: Kind) {
     vehicle.run(1_000);
     wait_for_line(
         &mut fleet,
-        "autopilot: in the air, not controlled by the relay",
+        "autopilot: in the air, and not controlled by the relay",
     );
     assert_eq!(vehicle.told.is_empty(), kind == Kind::ArduCopter);
     for told in &vehicle.told {
@@ -164,7 +164,7 @@ fn a_drone_without_sites_sends_no_targets() {
     let mut fleet = Fleet::of(Image::Wires, &paper(1), Faults::default(), 1);
     wait_for_line(
         &mut fleet,
-        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move",
+        "no sites (positions of Tx and Rx on earth): no autopilot is controlled, and drones are not kept apart while they move",
     );
     fleet.places();
     let mut port = &fleet.autopilots[0];
@@ -178,6 +178,6 @@ fn the_smallest_image_refuses_sites() {
     let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);
     wait_for_line(
         &mut fleet,
-        "configuration refused: it has sites, but this image was built without the feature flight",
+        "configuration refused: it has sites, but this image was built without the cargo feature flight",
     );
 }

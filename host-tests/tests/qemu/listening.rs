@@ -122,7 +122,7 @@ fn three_drones_locate_an_interferer_like_the_simulation() {
         .collect();
 
     // The pilots fly the drones, which measure; there is no estimate yet.
-    let in_air = "autopilot: in the air, not controlled by the relay";
+    let in_air = "autopilot: in the air, and not controlled by the relay";
     together(&mut fleet, &mut vehicles, "flight by the pilots", |lines| {
         (1..=RELAYS).all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == drone);

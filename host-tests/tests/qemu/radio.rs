@@ -37,7 +37,7 @@ fn four_of_five_on_one_radio_recover_from_a_loss() {
         let mut new = lines[before..].iter().filter(|line| line.drone == drone);
         let counted = new.find(|line| {
             line.text
-                == "a new view (membership of the chain) has been agreed: new positions follow"
+                == "the relays have agreed on new members of the chain (view): new positions follow"
         })?;
         new.find(|line| line.setpoint() == Some(*place))?;
         let agreed = new.find(|line| line.text == "the relays have agreed on positions")?;
@@ -57,8 +57,14 @@ fn four_of_five_on_one_radio_recover_from_a_loss() {
     let lost = lost.filter(|line| line.text.contains("does not reply"));
     let lost: Vec<(u16, &str)> = lost.map(|line| (line.drone, line.text.as_str())).collect();
     let of_three = [
-        (2, "node 3 downstream does not reply: look for that drone"),
-        (4, "node 3 upstream does not reply: look for that drone"),
+        (
+            2,
+            "node 3 downstream (toward Rx) does not reply: look for that drone",
+        ),
+        (
+            4,
+            "node 3 upstream (toward Tx) does not reply: look for that drone",
+        ),
     ];
     assert!(!lost.is_empty());
     assert!(lost.iter().all(|loss| of_three.contains(loss)), "{lost:?}");

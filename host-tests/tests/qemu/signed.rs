@@ -36,7 +36,7 @@ fn five_signing_drones_settle_like_the_simulation() {
             let mut lines = fleet.after_start(drone).skip(1);
             assert_eq!(
                 lines.next().unwrap().text,
-                "frames are signed, epoch 77; the epoch cannot be stored: raise it in the configuration block before the next start"
+                "frames are signed; epoch (start counter) 77, which cannot be stored: raise it in the configuration block before the next start"
             );
         }
     }
@@ -62,9 +62,16 @@ fn a_drone_without_the_key_takes_no_part() {
             let mut lines = lines.iter().filter(|line: &&Line| line.drone == drone);
             lines.any(|line| line.text == text)
         };
-        lost(2, "node 3 downstream does not reply: look for that drone")
-            && lost(3, "node 4 downstream does not reply: look for that drone")
-            && lost(4, "node 3 upstream does not reply: look for that drone")
+        lost(
+            2,
+            "node 3 downstream (toward Rx) does not reply: look for that drone",
+        ) && lost(
+            3,
+            "node 4 downstream (toward Rx) does not reply: look for that drone",
+        ) && lost(
+            4,
+            "node 3 upstream (toward Tx) does not reply: look for that drone",
+        )
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));
     let counters = [1, 2, 3, 4].map(|drone| fleet.counters(drone));
@@ -80,10 +87,10 @@ fn a_drone_without_the_key_takes_no_part() {
     let said = fleet.after_start(4).nth(1).unwrap();
     assert_eq!(
         said.text,
-        "no key: frames are not signed, and anybody in range can forge them"
+        "no key: frames are not signed, so anybody in range can forge them"
     );
     assert_eq!(
         fleet.after_start(4).nth(2).unwrap().text,
-        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+        "no sites (positions of Tx and Rx on earth): no autopilot is controlled, and drones are not kept apart while they move"
     );
 }

@@ -32,12 +32,12 @@ fn both_neighbours_notice_a_drone_that_is_switched_off() {
     let sides = [
         (
             2,
-            "node 3 downstream does not reply: look for that drone",
+            "node 3 downstream (toward Rx) does not reply: look for that drone",
             asked[0],
         ),
         (
             4,
-            "node 3 upstream does not reply: look for that drone",
+            "node 3 upstream (toward Tx) does not reply: look for that drone",
             asked[1],
         ),
     ];
@@ -109,24 +109,24 @@ fn a_drone_with_a_bad_configuration_stays_out_and_logs_why() {
         with(&field, 128, &0.0_f32.to_le_bytes()),
     ];
     let words = [
-        "no configuration: the configuration block in flash is blank",
-        "no configuration: the configuration block in flash is blank",
-        "configuration refused: the block is damaged, its CRC does not match",
-        "configuration refused: the block's version or length is not the one of this firmware",
+        "no configuration: the configuration block in flash is blank, so this relay does nothing: provision the drone",
+        "no configuration: the configuration block in flash is blank, so this relay does nothing: provision the drone",
+        "configuration refused: the block is damaged (its CRC does not match): provision the drone again",
+        "configuration refused: the block has another version or length than this firmware reads: provision the drone again",
         "configuration refused: the relay's index must be within 1 to the number of relays",
-        "configuration refused: mission: Distance",
-        "configuration refused: this relay's altitude or power is out of range",
-        "configuration refused: channel: Carrier",
-        "configuration refused: mission: Band",
-        "configuration refused: mission: Lateral",
-        "configuration refused: the method is unknown, or cannot use an interference field",
+        "configuration refused: mission: distance_m must be within 1 to 1e6",
+        "configuration refused: this relay's altitude must be within 0.1 to 1e5 m, its power within 1e-6 to 1e6 W",
+        "configuration refused: channel: carrier frequency must be within 1e6 to 1e12 Hz",
+        "configuration refused: mission: the altitude band, band.least_m to band.most_m, must be within 0.1 to 1e5 and include common.altitude_m",
+        "configuration refused: mission: lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
+        "configuration refused: the method must be align with an interference field, and otherwise align, joint or adjust",
         "configuration refused: byte 15 (keep the altitude) must be 0 or 1",
-        "configuration refused: rounds or explore_m out of range, or not 0 for another method than adjust",
-        "configuration refused: samples or i_max_w of the interference measurement out of range",
+        "configuration refused: with the method adjust rounds must be within 1 to 65535 and explore_m within 0 to 1e5, with any other method both 0",
+        "configuration refused: samples must be within 100 to 1000000 and i_max_w within 1e-30 to 1e6 W, or both 0",
         "configuration refused: the interference field has more points than the block can hold",
-        "configuration refused: bytes after the last point of the interference field are not 0",
-        "configuration refused: it has both an interferer and an interference field",
-        "configuration refused: interference field: Upsilon",
+        "configuration refused: the bytes after the last point of the interference field must be 0",
+        "configuration refused: it has both an interferer and an interference field: leave one out",
+        "configuration refused: interference field: upsilon_per_w must be within 1e-9 to 1e32",
     ];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
     fleet.wait("word from every drone", |lines| {

@@ -57,7 +57,7 @@ impl Three {
                 .count()
         };
         let found = count(
-            "autopilot: cannot be engaged: OFFBOARD or GUIDED was chosen before the relay started; choose another mode first",
+            "autopilot: cannot be engaged: OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
         );
         if found > self.found {
             self.found = found;
@@ -148,7 +148,10 @@ fn three_images_fly_with_autopilots_one_by_mavsdk() {
     }
     three.until("flight by the pilots", |three| {
         (1..=3).all(|drone| {
-            three.has_logged(drone, "autopilot: in the air, not controlled by the relay")
+            three.has_logged(
+                drone,
+                "autopilot: in the air, and not controlled by the relay",
+            )
         }) && three.mavsdk.target().is_some()
     });
     assert!(three.others.iter().all(|vehicle| vehicle.told.is_empty()));

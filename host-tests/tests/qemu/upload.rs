@@ -122,7 +122,10 @@ fn three_drones_fly_the_transmitters_upload() {
         fleet.settle_at(&simulated(&moved(3)));
         for drone in 1..=3 {
             let said = |text: &str| fleet.of_drone(drone).any(|line| line.text == text);
-            assert!(said("a newer mission has been received") && said("mission version 3 adopted"));
+            assert!(
+                said("a newer mission has been received by an upload")
+                    && said("mission version 3 adopted")
+            );
             // The emulator's flash is read-only; the drone flies the mission nevertheless.
             assert!(said(
                 "mission version 3 cannot be stored: after a reboot it has to be uploaded again"

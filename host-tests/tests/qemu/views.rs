@@ -68,7 +68,7 @@ fn two_drones_that_recall_a_view_without_them_do_not_fly() {
     fleet.wait("a quorum that is missed", |lines| {
         lines.iter().any(|line| {
             line.text
-                == "no quorum, because too few relays are reachable: bring the missing relays into range, or land the reachable ones"
+                == "no quorum: too few relays receive each other to agree on the chain's members: bring the missing relays into range, or land this part of the chain"
         })
     });
     assert!(fleet.lines.iter().all(|line| line.setpoint().is_none()));

@@ -383,7 +383,7 @@ fn steps_of_a_radio_are_met_by_the_fewest_relays() {
 fn a_rate_needs_one_bandwidth() {
     let (status, line) = refusal("--target-rate-bps 5");
     assert_eq!(status, 2, "{line}");
-    let allowed = "the bandwidth is missing; allowed: --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz";
+    let allowed = "the bandwidth is missing; give --bandwidth-hz, link.bandwidth_hz or noise.bandwidth_hz, 1 to 1e12 Hz";
     assert!(
         line.contains(&format!("--target-rate-bps 5.0: {allowed}")),
         "{line}"
@@ -432,7 +432,7 @@ fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     std::fs::write(&file, wrong).unwrap();
     let name = file.path().to_str().unwrap();
     let (status, line) = refusal(&format!("--uavs 1 --scenario {name}"));
-    let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default, PORT + 1000 = 66000, is above 65535";
+    let named = "companion.autopilot = \"udp:localhost:65000\" needs @LOCAL, because the default local port, PORT + 1000 = 66000, is above 65535";
     assert!(status == 2 && line.contains(named), "{line}");
 }
 

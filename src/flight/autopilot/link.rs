@@ -217,7 +217,7 @@ impl Autopilot {
                 Line::info(Topic::Clearance, "relay: lost relays cleared")
             }
             Some(_) => {
-                let text = ["relay: denied, name all lost relays on one side", ""];
+                let text = ["relay: denied: name every lost relay on that side", ""];
                 Line::warning(Topic::Clearance, text)
             }
             None => return,

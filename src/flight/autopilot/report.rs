@@ -104,13 +104,13 @@ impl Line {
     /// Returns the text for the operator about an event of the relay; `None` for events without a text.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
-            Event::Infeasible => "relay: no target SIR can be met",
+            Event::Infeasible => "relay: no target SIR met, keeps position",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",
             Event::LeaseLapsed => "relay: agreement expired, keeps setpoint",
             Event::Adopted => "relay: new mission adopted",
-            Event::UploadRefused { .. } => "relay: mission rejected: sites or geofence",
-            Event::DuplicateIndex { .. } => "relay: duplicate relay number",
+            Event::UploadRefused { .. } => "relay: mission rejected, see sites and geofence",
+            Event::DuplicateIndex { .. } => "relay: duplicate relay number, land one",
             _ => return None,
         };
         Some(Self::info(Topic::Relay, text))

@@ -30,7 +30,6 @@ pub struct ViewRecord {
 
 /// Reason why a stored record was rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RecordError {
     /// Record error: the relay that wrote the record had loaded another mission.
@@ -39,18 +38,10 @@ pub enum RecordError {
     Begun,
 }
 
-impl core::fmt::Display for RecordError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Base => {
-                "the record of votes was written by a relay that was loaded with another mission"
-            }
-            Self::Begun => "the record of votes must be restored before the relay starts",
-        })
-    }
-}
-
-impl core::error::Error for RecordError {}
+error_texts!(RecordError {
+    Base => "the record of votes was written by a relay that was loaded with another mission",
+    Begun => "the record of votes must be restored before the relay starts",
+});
 
 /// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash that an
 /// iterator over all bytes would need.

@@ -32,16 +32,16 @@ pub(crate) fn begins(config: &Config) {
 }
 
 pub(crate) fn unsigned() {
-    warn!("no key: frames are not signed, and anybody in range can forge them");
+    warn!("no key: frames are not signed, so anybody in range can forge them");
 }
 
 /// Logs the signing epoch, a number that rises at every start. `is_stored` is true if the flash has stored it.
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
-        info!("frames are signed, epoch {}", epoch);
+        info!("frames are signed; epoch (start counter) {}", epoch);
     } else {
         error!(
-            "frames are signed, epoch {}; the epoch cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch (start counter) {}, which cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }
@@ -49,7 +49,7 @@ pub(crate) fn signs(epoch: u32, is_stored: bool) {
 
 pub(crate) fn unguarded() {
     warn!(
-        "no geographic sites: no autopilot is controlled, and drones are not kept apart while they move"
+        "no sites (positions of Tx and Rx on earth): no autopilot is controlled, and drones are not kept apart while they move"
     );
 }
 
@@ -63,7 +63,7 @@ pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
 
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed, and frames that are not signed with its key are ignored"
+        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
     );
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's membership restored from flash");
     } else {
-        error!("votes on the chain's membership in flash are from another firmware, and ignored");
+        error!("votes on the chain's membership in flash are in another firmware's format, and ignored");
     }
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn refused(why: Refused) {
             );
         }
         Refused::NoEpoch => {
-            error!("frames cannot be signed: the epoch (start counter) has reached its maximum");
+            error!("frames cannot be signed: the epoch (start counter) has reached its maximum: provision all drones with a new key");
         }
         Refused::NoAutopilot => {
             error!(

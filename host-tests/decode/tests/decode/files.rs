@@ -86,7 +86,8 @@ fn wrong_input_is_one_line_that_names_it() {
         let mode = std::fs::Permissions::from_mode(0o644);
         std::fs::set_permissions(&key, mode).unwrap();
         let said = refusal(&["--key", file], &[]);
-        let line = format!("--key {file}: mode 0644: other users of this computer can read");
+        let line =
+            format!("--key {file}: has the mode 0644, so other users of this computer can read");
         assert!(said.starts_with(&line), "{said}");
     }
     assert!(

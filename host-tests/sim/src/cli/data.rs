@@ -53,13 +53,13 @@ impl Data {
             given_option("--queue-packets", self.queue_packets),
         ];
         let line = match (told.into_iter().flatten().next(), self.traffic) {
-            (Some(option), None) => format!("{option}: would be ignored without --traffic"),
+            (Some(option), None) => format!("{option}: has no effect without --traffic"),
             (_, Some(Way::Both)) if matches!(interference, Interference::Field(_)) => {
-                "--traffic both: in a [field] the interference at Tx is not known; allowed: forward"
+                "--traffic both: a [field] does not give the interference at Tx, which the traffic to Tx needs; allowed: forward"
                     .to_owned()
             }
             (_, Some(Way::Both)) if uploads => {
-                "--traffic both: after an --upload the SIRs from Rx to Tx are not known; allowed: forward"
+                "--traffic both: the SIRs from Rx to Tx are unknown after an --upload; allowed: forward"
                     .to_owned()
             }
             _ => return Ok(()),

@@ -138,7 +138,7 @@ impl Hostile {
             return Err(Failure::input(line));
         }
         if self.uploads.are_planned() && self.no_auth {
-            let line = "--upload needs signed frames, so it cannot be combined with --no-auth";
+            let line = "--upload cannot be combined with --no-auth, because relays accept only signed uploads";
             return Err(Failure::input(line));
         }
         Ok(())
@@ -166,7 +166,7 @@ impl Hostile {
             let at = seconds(*at);
             if *is_kill && let Some((other, true)) = last {
                 let line = format!(
-                    "--kill {index}@{at}: would be ignored: the relay has been silent since --kill {index}@{}",
+                    "--kill {index}@{at}: has no effect, because the relay has been silent since --kill {index}@{}",
                     seconds(other.at)
                 );
                 return Err(Failure::input(line));
@@ -203,7 +203,7 @@ impl Hostile {
             .chain(self.flight.begins());
         match all.find(|(_, at)| *at >= end) {
             Some((option, _)) => Err(Failure::input(format!(
-                "{option}: would be ignored, because the run ends earlier: see --soak {}",
+                "{option}: has no effect, because --soak {} ends the run by then",
                 seconds(end)
             ))),
             None => Ok(()),
@@ -243,7 +243,7 @@ impl Hostile {
 }
 
 fn relay_event(text: &str) -> Result<RelayEvent, String> {
-    let form = "must be I@S, a relay (1 to N) and seconds after the start (0 to 1e6)";
+    let form = "must be I@S: relay I (1 to N) at S seconds after the start (0 to 1e6)";
     let (index, at) = text.split_once('@').ok_or(form)?;
     Ok(RelayEvent {
         index: index.parse().map_err(|_| form)?,
@@ -252,12 +252,12 @@ fn relay_event(text: &str) -> Result<RelayEvent, String> {
 }
 
 fn partition(text: &str) -> Result<Partition, String> {
-    let form = "must be K@S or K@S-T, a relay (1 to N - 1) and seconds after the start (0 to 1e6)";
+    let form = "must be K@S or K@S-T: behind relay K (1 to N - 1) from S to T seconds after the start (0 to 1e6)";
     let (after, times) = text.split_once('@').ok_or(form)?;
     let after = after.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be K@S-T with an end T after the start S".to_owned());
+        return Err("must be K@S-T with T above S".to_owned());
     }
     Ok(Partition { after, from, until })
 }
@@ -348,13 +348,13 @@ impl Air {
     /// The setup's wiring must already be set, because the access method depends on it.
     pub fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
         if self.burst > 1.0 && loss <= 0.0 {
-            let line = format!("--burst {}: would be ignored without --loss", self.burst);
+            let line = format!("--burst {}: has no effect without --loss", self.burst);
             return Err(Failure::input(line));
         }
         let least = Bursts::shortest(loss);
         if self.burst > 1.0 && self.burst < least {
             let line = format!(
-                "--burst {}: must be 1, or {least:.4} to 1e6 with --loss {loss}: independent losses have runs of this mean length already",
+                "--burst {}: must be 1 (independent losses), or within {least:.4} to 1e6: with --loss {loss} even independent losses come in bursts of {least:.4} frames on average",
                 self.burst
             );
             return Err(Failure::input(line));
@@ -367,7 +367,7 @@ impl Air {
         }
         if let Some(reach) = self.reach {
             if setup.settings.wiring == Wiring::Pair {
-                let line = format!("--reach {reach}: would be ignored without --air");
+                let line = format!("--reach {reach}: has no effect without --air");
                 return Err(Failure::input(line));
             }
             setup.radio_reach = reach;
@@ -390,18 +390,17 @@ impl Air {
 }
 
 fn deaf(text: &str) -> Result<OneWayFailure, String> {
-    let form =
-        "must be J:I@S or J:I@S-E, two relays (1 to N) and seconds after the start (0 to 1e6)";
+    let form = "must be J:I@S or J:I@S-E: relay J does not receive relay I (each 1 to N) from S to E seconds after the start (0 to 1e6)";
     let (relays, times) = text.split_once('@').ok_or(form)?;
     let (by, of) = relays.split_once(':').ok_or(form)?;
     let by: u16 = by.parse().map_err(|_| form)?;
     let of: u16 = of.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be J:I@S-E with an end E after the start S".to_owned());
+        return Err("must be J:I@S-E with E above S".to_owned());
     }
     if by == of {
-        return Err("must be J:I@S-E with two different relays".to_owned());
+        return Err("must be J:I@S-E with two different relays J and I".to_owned());
     }
     Ok(OneWayFailure {
         by,
@@ -469,7 +468,7 @@ impl Flight {
     /// Rejects `--takeover` without `--fly`, or of a drone that a chain of `uavs` relays does not have.
     pub fn agree(&self, uavs: u16) -> Result<(), Failure> {
         if let (false, Some(Takeover { relay, .. })) = (self.fly, self.takeover.first()) {
-            let line = format!("--takeover {relay}@..: would be ignored without --fly");
+            let line = format!("--takeover {relay}@..: has no effect without --fly");
             return Err(Failure::input(line));
         }
         let wrong = |takeover: &&Takeover| !(1..=uavs).contains(&takeover.relay);
@@ -493,7 +492,7 @@ impl Flight {
         let distance_m = f64::from(config.distance_m);
         let axis = axis.or_else(|| somewhere(distance_m)).ok_or_else(|| {
             Failure::input(format!(
-                "--fly: the line is {distance_m} m long: must be within {SHORTEST_M} to {LONGEST_M} m"
+                "--fly: the distance from Tx to Rx is {distance_m} m: must be within {SHORTEST_M} to {LONGEST_M} m"
             ))
         })?;
         let start = match &self.start {
@@ -523,12 +522,13 @@ impl Flight {
 }
 
 fn takeover(text: &str) -> Result<Takeover, String> {
-    let form = "must be I@S or I@S-E, a relay (1 to N) and seconds after the start (0 to 1e6)";
+    let form =
+        "must be I@S or I@S-E: relay I (1 to N) from S to E seconds after the start (0 to 1e6)";
     let (relay, times) = text.split_once('@').ok_or(form)?;
     let relay = relay.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be I@S-E with an end E after the start S".to_owned());
+        return Err("must be I@S-E with E above S".to_owned());
     }
     Ok(Takeover {
         relay,
@@ -549,7 +549,11 @@ fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
             continue;
         }
         let at = |what: String| named(format!("line {}: {what}", number + 1));
-        let form = || at(format!("`{line}`: must be `index, x_m, y_m, h_m`"));
+        let form = || {
+            at(format!(
+                "`{line}`: must be `index, x_m, y_m, h_m`, with numbers"
+            ))
+        };
         let mut parts = line.split(',').map(str::trim);
         let index: u16 = parts
             .next()
@@ -585,7 +589,7 @@ fn starts(file: &Path, relays: u16) -> Result<Vec<Point>, Failure> {
     complete.ok_or_else(|| {
         let missing = starts.iter().position(Option::is_none).unwrap_or(0) + 1;
         named(format!(
-            "drone {missing} is missing: a line for each of 1 to {relays}"
+            "drone {missing} has no line: must have one line for each drone, 1 to {relays}"
         ))
     })
 }

@@ -107,9 +107,9 @@ impl Options {
     pub(super) fn agree(&self, method: &str) -> Result<(), Failure> {
         let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);
         let is_adjust = self.method == Method::Adjust;
-        let step = "has no fixed step; use align-step or stochastic-step";
-        let rounds = "has no rounds of adjustment; use adjust";
-        let bracket = "uses the fixed step of --epsilon; the other methods bracket the target";
+        let step = "has no fixed step: leave it out, or use align-step or stochastic-step";
+        let rounds = "has no rounds of adjustment: leave it out, or use adjust";
+        let bracket = "tries the target SIRs in the fixed step of --epsilon: leave it out";
         let ignored: [(Option<String>, &str); 6] = [
             (
                 given_option("--epsilon", self.epsilon.filter(|_| !is_step)),
@@ -135,13 +135,13 @@ impl Options {
         ];
         for (option, why) in ignored {
             if let Some(option) = option {
-                let line = format!("{option}: would be ignored: --method {method} {why}");
+                let line = format!("{option}: has no effect with --method {method}, which {why}");
                 return Err(Failure::input(line));
             }
         }
         if self.closed_loop.is_some() && !self.method.is_for_fields() {
             let line = format!(
-                "--closed-loop: would be ignored: relays measure interference only with --method stochastic or stochastic-step, not {method}"
+                "--closed-loop: has no effect with --method {method}, because relays measure interference only with stochastic and stochastic-step: leave it out, or use one of these"
             );
             return Err(Failure::input(line));
         }
@@ -168,7 +168,7 @@ fn probability(text: &str) -> Result<f64, String> {
 }
 
 fn grid(text: &str) -> Result<uav_relay::Local, String> {
-    let form = "must be CxR, columns and rows, 2 to 255 each";
+    let form = "must be CxR: C columns and R rows, 2 to 255 each";
     let (columns, rows) = text.split_once('x').ok_or(form)?;
     let side = |text: &str| text.parse().ok().filter(|side| *side >= 2).ok_or(form);
     Ok(uav_relay::Local::Grid {
@@ -213,7 +213,7 @@ impl Listening {
         ];
         match told.into_iter().flatten().next() {
             Some(option) if !self.listen => Err(Failure::input(format!(
-                "{option}: would be ignored without --listen"
+                "{option}: has no effect without --listen"
             ))),
             _ => Ok(()),
         }
@@ -295,7 +295,7 @@ impl Listening {
 }
 
 fn velocity(text: &str) -> Result<[f64; 2], String> {
-    let form = "must be VX,VY, m/s along the line and to its right, each -100 to 100";
+    let form = "must be VX,VY: the speed along the line and to its right, m/s, each -100 to 100";
     let (along, aside) = text.split_once(',').ok_or(form)?;
     Ok([number(along, -100.0, 100.0)?, number(aside, -100.0, 100.0)?])
 }

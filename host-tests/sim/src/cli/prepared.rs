@@ -73,7 +73,7 @@ impl<'a> Prepared<'a> {
             .to_possible_value()
             .map_or_else(String::new, |value| value.get_name().to_owned());
         if !scenario.knows_interference() {
-            let line = "interferer: is missing: a scenario with [listen] but without [[interferer]] is for cargo provision only";
+            let line = "[[interferer]]: is missing: only `cargo provision` accepts a scenario with [listen] and without [[interferer]]";
             return Err(Failure::input(line.to_owned()).into());
         }
         agree(options, &method, &scenario)?;
@@ -96,7 +96,7 @@ impl<'a> Prepared<'a> {
                 let fits = |uavs: &u16| mission::mission(&scenario, *uavs, tolerance).is_ok();
                 let most = (1..options.uavs).rev().find(fits).unwrap_or(1);
                 let line = format!(
-                    "--uavs {}: must be within 1 to {most} without a --scenario: relays keep {} m apart on {} m",
+                    "--uavs {}: must be within 1 to {most} without a --scenario, because relays keep {} m apart on the {} m from Tx to Rx",
                     options.uavs, scenario.min_separation_m, scenario.distance_m
                 );
                 return Err(Refused::Reported(
@@ -271,10 +271,12 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
     if options.method.is_for_fields() != is_field {
         let line = if is_field {
             format!(
-                "--method {method} needs an [[interferer]], but the scenario has a [field]: use stochastic or stochastic-step"
+                "--method {method} needs an [[interferer]], but the scenario has a [field]: use --method stochastic or stochastic-step"
             )
         } else {
-            format!("--method {method} needs a --scenario with a [field] of interference")
+            format!(
+                "--method {method} needs a --scenario with a [field] (distributions of the interference)"
+            )
         };
         return Err(Failure::input(line));
     }
@@ -284,7 +286,7 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
     }
     if let Some(one) = mission::hypothetical(scenario) {
         command::print_line(&format!(
-            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m replaces all of them, and the SIRs are \
+            "note: one interferer of {:.3} W at x = {:.3} m, y = {:.3} m replaces all interferers of the scenario, and the SIRs are \
              computed with it; `cargo plan` computes the SIRs with all",
             one.power_w, one.x_m, one.y_m
         ));

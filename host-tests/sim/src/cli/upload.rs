@@ -118,12 +118,11 @@ impl Uploads {
             (None, false) => return Ok(()),
         };
         if !self.are_planned() {
-            let line = format!("{given}: would be ignored without --upload");
+            let line = format!("{given}: has no effect without --upload");
             return Err(Failure::input(line));
         }
         if self.no_store && !boots {
-            let line =
-                "--no-store: would be ignored, because no relay is switched on again (--boot)";
+            let line = "--no-store: has no effect, because no relay is switched on again (--boot)";
             return Err(Failure::input(line));
         }
         Ok(())
@@ -194,7 +193,7 @@ impl Planned {
         if new.as_flattened().iter().all(Option::is_none) {
             return Ok(None);
         }
-        let sites = sites.ok_or("Tx or Rx can be moved only if the scenario has a [site]")?;
+        let sites = sites.ok_or("the latitude, longitude and height of Tx or Rx can be changed only if the scenario has a [site]")?;
         let to = |at: Geodetic, [lat, lon, amsl]: [Option<f64>; 3]| {
             Geodetic::from_degrees(
                 lat.unwrap_or(f64::from(at.lat_e7) / 1e7),
@@ -213,7 +212,7 @@ impl Planned {
     /// Returns the parameters of the uploaded mission: `base` with the values that `--upload` changes.
     fn changed(&self, base: &MissionConfig) -> Result<MissionConfig, &'static str> {
         let Interference::Source(at) = base.interference else {
-            return Err("a [field] of interference cannot be uploaded");
+            return Err("a [field] cannot be uploaded");
         };
         let to = |key, old| {
             let mut changes = self.changes.iter();
@@ -259,8 +258,7 @@ impl Planned {
 }
 
 fn planned(text: &str) -> Result<Planned, String> {
-    let form =
-        "must be S or S:KEY=VALUE,.., seconds after the start (0 to 1e6) and what is changed";
+    let form = "must be S or S:KEY=VALUE,..: S is the start of the upload, 0 to 1e6 s, and each KEY a parameter of the mission that it changes";
     let (at, changes) = match text.split_once(':') {
         Some((at, changes)) => (at, Some(changes)),
         None => (text, None),

@@ -100,7 +100,7 @@ impl AttackReport {
     pub(super) fn text(&self) -> String {
         let mut text = String::new();
         let tags = if self.auth { "with" } else { "without" };
-        for (one, kind) in [(&self.forged, "forged"), (&self.replayed, "recorded")] {
+        for (one, kind) in [(&self.forged, "forged"), (&self.replayed, "replayed")] {
             if one.sent > 0 {
                 let counted: Vec<String> = one
                     .counted
@@ -109,7 +109,7 @@ impl AttackReport {
                     .collect();
                 _ = writeln!(
                     text,
-                    "attack on a chain {tags} tags: {} {kind} frames, {} accepted; counted as {}",
+                    "attack on a chain {tags} signed frames: {} {kind} frames, {} accepted; counted as {}",
                     one.sent,
                     one.taken,
                     counted.join(", ")
@@ -122,12 +122,12 @@ impl AttackReport {
                 "the final position of every relay is bit-identical to that of a run without the attack"
             ),
             (Some(harm), Some(far)) => writeln!(text, "{harm}, by {far:.3} m at most"),
-            (Some(harm), None) => writeln!(text, "{harm}, and some got no position at all"),
+            (Some(harm), None) => writeln!(text, "{harm}, and some relays got no position at all"),
         };
         if self.misled > 0 {
             _ = writeln!(
                 text,
-                "meanwhile, relays took {} positions for target SIRs that do not occur without the attack",
+                "during the attack relays accepted {} positions for target SIRs that do not occur without it",
                 self.misled
             );
         }

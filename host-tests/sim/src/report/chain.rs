@@ -259,7 +259,7 @@ impl ChainReport {
         if let Some(back) = self.back {
             _ = writeln!(
                 text,
-                "way back: worst hop SIR {:.6} ({:.3} dB); it needs {:?} of the SIR of the way there (link.reverse); worst direction: {}",
+                "way back: worst hop SIR {:.6} ({:.3} dB); it needs {:?} of the SIR from Tx to Rx (link.reverse); worst direction: {}",
                 back.worst_back, back.worst_back_db, back.reverse, back.worst_direction
             );
         }
@@ -435,7 +435,7 @@ pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let known = version(outcome).max(adopted(outcome));
     let missing = outcome.offered().filter(|newest| *newest > known);
     Some(match missing {
-        Some(version) => format!("{error}; mission {version} was not adopted"),
+        Some(version) => format!("{error}; mission version {version} was not adopted"),
         None => error,
     })
 }
@@ -511,7 +511,7 @@ impl AirReport {
         let mut text = String::new();
         _ = writeln!(
             text,
-            "air ({}, {} baud): load {load:.3}, {} frames sent, {} dropped by full queues; receptions lost: {} to collisions, {} to own transmissions",
+            "radio channel ({}, {} bit/s): load {load:.3}, {} frames sent, {} dropped by full queues; receptions lost: {} to collisions, {} to own transmissions",
             self.access, self.baud, counts.sent, counts.dropped, counts.collided, counts.unheard
         );
         text

@@ -252,13 +252,13 @@ impl Group {
                 count(one.relays.unwrap_or_default().into()),
                 one.view.unwrap_or_default()
             ),
-            "lease expired" => format!("{who}: lease of the agreement expired"),
+            "lease expired" => format!("{who}: last agreement expired, setpoint kept"),
             "not received by" => format!("relay {other} does not receive {who}"),
             "mission mismatch" => format!("{who}: relay {other} has another mission"),
             "key mismatch" => format!("{who}: relay {other} signs with another key"),
             "epoch went back" => {
                 format!(
-                    "{who}: relay {other} started with an old epoch (start counter), its frames are rejected"
+                    "{who}: relay {other} started with an old epoch (start counter), so its frames are rejected"
                 )
             }
             "duplicate index" => format!("{who}: duplicate relay number {other}"),
@@ -266,7 +266,9 @@ impl Group {
             "released" => format!("{who} released: the pilot took control"),
             "blind" => format!("{who}: the autopilot reports no position"),
             "restarted" => format!("{who}: autopilot restarted"),
-            "no quorum" => format!("{who}: no quorum, so the position is held"),
+            "no quorum" => {
+                format!("{who}: too few relays receive each other (no quorum), position held")
+            }
             "new estimate" => format!("{who}: new interference estimate"),
             "interferer unclear" => {
                 format!("{who}: the measurements do not fit a single interferer")
@@ -302,7 +304,7 @@ impl Group {
                 "mission version {version} adopted: {}",
                 count(self.relays.len())
             ),
-            _ => "no target SIR can be met".to_owned(),
+            _ => "no positions meet any target SIR, so the relays keep theirs".to_owned(),
         }
     }
 }
@@ -616,7 +618,7 @@ impl RecoveryReport {
             _ = write!(text, "adopted {after:.3} s after the upload began, ");
         }
         let Some(converged) = self.converged_s else {
-            return text + "replaced by another membership before the relays agreed on positions";
+            return text + "new members agreed before the relays agreed on positions";
         };
         _ = write!(
             text,

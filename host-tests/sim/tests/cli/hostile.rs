@@ -226,8 +226,9 @@ fn an_overloaded_channel_is_refused_before_flight() {
         let arguments = format!("--uavs {uavs} --air {sharing} --baud {below}");
         let (status, line) = refusal(&arguments);
         assert_eq!(status, 2, "{arguments:?}");
-        let says = format!("--baud {below}: must be within {least} to 10000000: ");
-        assert!(line.starts_with(&says), "{line}");
+        let begins = format!("--baud {below}: too slow for ");
+        let names = format!(" relays in range of each other: use at least {least} bit/s, or ");
+        assert!(line.starts_with(&begins) && line.contains(&names), "{line}");
     }
     for (sharing, baud) in [("csma", "32854"), ("ideal", "9600")] {
         let report = json(&format!("--uavs 8 --air {sharing} --baud {baud}"));
@@ -244,7 +245,7 @@ fn an_overloaded_channel_is_refused_before_flight() {
 fn fifty_relays_are_refused_with_a_probing_that_works() {
     let arguments = "--uavs 50 --air csma --reach 49 --baud 57600";
     let (status, line) = refusal(arguments);
-    let expected = "--baud 57600: must be within 229974 to 10000000: 50 relays in range of each other overload the channel: use at least 229974 bit/s, or --probe-after-ms 19963 with three times that for --dead-after-ms, or at most 13 relays in range\n";
+    let expected = "--baud 57600: too slow for 50 relays in range of each other: use at least 229974 bit/s, or --probe-after-ms 19963, or at most 13 relays in range of each other\n";
     assert_eq!((status, line.as_str()), (2, expected));
     // A millisecond less does not fit.
     let (status, _) = refusal(&format!("{arguments} --probe-after-ms 19962"));
@@ -266,7 +267,7 @@ fn a_soak_runs_to_its_end_and_reports_the_availability() {
     assert!(number("least_separation_m") > 0.0);
     let text = String::from_utf8(chain(arguments).stdout).unwrap();
     for line in [
-        "air (csma, 115200 baud): load 0.",
+        "radio channel (csma, 115200 bit/s): load 0.",
         "availability: 0.",
         "at the same time: 1",
         "least separation of two relays: ",
@@ -331,7 +332,7 @@ fn listening_needs_an_interferer() {
     let name = file.to_str().unwrap();
     let (status, text) = refusal(&format!("--scenario {name} --uavs 3 --listen"));
     assert_eq!(status, 2, "{text}");
-    assert!(text.contains("interferer: is missing"), "{text}");
+    assert!(text.contains("[[interferer]]: is missing"), "{text}");
     let source = "[[interferer]]\npower_w = 80\nx_m = 500\ny_m = 400\n";
     std::fs::write(&file, format!("{TOML}following = true\n{source}")).unwrap();
     let options = format!("--scenario {name} --uavs 3 --listen --listen-for 30");

@@ -204,7 +204,9 @@ fn an_override_of_a_relay_beyond_the_chain_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     let line = String::from_utf8(output.stderr).unwrap();
     assert!(
-        line.ends_with("scenario.toml: [[relay]] index = 5: there is no such relay in a chain of 4; allowed: 1 to 4\n"),
+        line.ends_with(
+            "scenario.toml: [[relay]] index = 5: the chain has only 4 relays; allowed: 1 to 4\n"
+        ),
         "{line}"
     );
 }

@@ -202,7 +202,8 @@ fn a_silent_relay_on_wires_stops_an_upload() {
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let error = report["error"].as_str().unwrap();
     assert!(
-        error.contains("relay 4 went silent") && error.contains("mission 1 was not adopted"),
+        error.contains("relay 4 went silent")
+            && error.contains("mission version 1 was not adopted"),
         "{error}"
     );
     assert_eq!(report["version"].as_u64(), Some(0));

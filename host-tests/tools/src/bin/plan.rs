@@ -32,7 +32,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         None => Scenario::default(),
     };
     if !scenario.knows_interference() {
-        let line = "interferer: is missing: a scenario with [listen] but without [[interferer]] is for cargo provision only";
+        let line = "[[interferer]]: is missing: only `cargo provision` accepts a scenario with [listen] and without [[interferer]]";
         return Err(Failure::input(line.to_owned()));
     }
     let number = options.number();
@@ -370,13 +370,13 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let refuse = |line: String| Err(Failure::input(line));
     if let Some(x_m) = options.x_m {
         return refuse(format!(
-            "--x-m {x_m:?} is not for --out: a relay computes its position along the line itself"
+            "--x-m {x_m:?}: cannot be used with --out, because relays compute their positions along the line themselves: leave it out"
         ));
     }
     let is_field = matches!(scenario.interference, Interference::Field(_));
     if is_field && options.altitude == Altitude::Free {
         return refuse(
-            "--altitude free is not for --out with a [field]: there relays stay at geometry.altitude_m, which is best set to geometry.altitude_min_m"
+            "--altitude free: cannot be used with --out if the mission has a [field], because its relays stay at geometry.altitude_m: leave it out, and set geometry.altitude_m to geometry.altitude_min_m, the best altitude"
                 .to_owned(),
         );
     }
@@ -437,7 +437,7 @@ fn write_out(
         let rate_bps = Rate::of(&flown.plan, scenario, radio).worse(scenario.reverse);
         if rate_bps < target_bps * (1.0 - options.tolerance) {
             return Err(Failure::unmet(format!(
-                "--out {}: not written: the positions on which {relays} relays agree carry {rate_bps:.6e} bit/s, below the target of {target_bps:.6e} bit/s; give a larger --uavs",
+                "--out {}: not written: the positions on which {relays} relays would agree carry {rate_bps:.6e} bit/s, below the target of {target_bps:.6e} bit/s; give a larger --uavs",
                 file.display()
             )));
         }

@@ -81,7 +81,7 @@ fn run(options: &Options) -> Result<String, String> {
     };
     if secret.is_none() {
         command::print_line(
-            "no --key-file: frames are not signed, and anybody in range can forge them",
+            "no --key-file: frames are not signed, so anybody in range can forge them",
         );
     }
     Ok(said)
@@ -238,7 +238,7 @@ impl<'a> Asked<'a> {
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
-                    "{}: [plan] was computed for another scenario: relays in this scenario reach no agreement",
+                    "{}: [plan] was computed for another scenario, because the relays of this one reach no agreement: run `cargo plan` again",
                     self.name
                 )),
                 None => Ok(None),
@@ -274,7 +274,7 @@ impl<'a> Asked<'a> {
         Ok(Some(Secret {
             key: key::load("--key-file", file)?,
             epoch: epoch
-                .ok_or("--epoch: is required, because this machine's clock has no valid time")?,
+                .ok_or("--epoch: is missing, and cannot be taken from the time, because this computer's clock is not set")?,
         }))
     }
 

@@ -76,7 +76,7 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
 fn only_one_way(scenario: &Scenario, what: &str) -> Result<(), NoPlan> {
     if scenario.reverse > 0.0 {
         return Err(NoPlan::Wrong(format!(
-            "{what} is for one direction, and link.reverse = {:?}: allowed: link.reverse = 0.0 or no {what}",
+            "{what}: cannot be used with link.reverse = {:?}, because it is for one direction only; allowed: link.reverse = 0.0 or no {what}",
             scenario.reverse
         )));
     }
@@ -187,10 +187,10 @@ impl Why {
                 let (target, most) = (unit.asked(*target), unit.say(*most));
                 match relays {
                     Some(relays) => format!(
-                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR is {most}, with {relays}"
+                        "no number of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR is {most}, with {relays} relays"
                     ),
                     None => format!(
-                        "no tried number of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR found is {most}"
+                        "none of the tried numbers of relays, up to {limit}, gives every hop an SIR of {target}: the highest SIR found is {most}"
                     ),
                 }
             }

@@ -251,7 +251,7 @@ impl WayBack {
         };
         let needed = self.reverse.map_or_else(String::new, |reverse| {
             format!(
-                "; it needs {reverse:?} of the SIR of the way there (link.reverse); worst direction: {}",
+                "; it needs {reverse:?} of the SIR from Tx to Rx (link.reverse); worst direction: {}",
                 self.worst_direction.unwrap_or("unknown")
             )
         });

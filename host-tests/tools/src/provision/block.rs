@@ -300,7 +300,7 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
             "baud",
             baud,
             BAUD,
-            "the firmware's ports have this fixed data rate",
+            "the firmware's ports have only this data rate",
         );
         return Err(format!("{line}; a radio's own data rate is --baud"));
     }

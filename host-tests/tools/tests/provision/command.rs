@@ -130,7 +130,7 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     ] {
         let baud = arguments.split_once("--baud ").map_or("115200", |it| it.1);
         let line = format!(
-            "--baud {baud}: must be within {least} to 10000000: {in_range} relays in range of each other overload the channel: use at least {least} bit/s, or --probe-after-ms {ms} with three times that for --dead-after-ms, or at most {most} relays in range; if fewer receive each other, give --in-range, or --wires for separate links\n"
+            "--baud {baud}: too slow for {in_range} relays in range of each other: use at least {least} bit/s, or --probe-after-ms {ms}, or at most {most} relays in range of each other; if fewer receive each other, give --in-range, or --wires for separate links\n"
         );
         assert_eq!(refusal(&format!("{plain} {arguments}")), line);
     }
@@ -217,7 +217,7 @@ fn the_block_has_the_networks_method_and_baud() {
     for (sections, words) in [
         (
             network("baud = 57600"),
-            "network.baud = 57600: must be 115200, or left out: the firmware's ports have this fixed data rate",
+            "network.baud = 57600: must be 115200, or left out: the firmware's ports have only this data rate",
         ),
         (
             network("probe_after_ms = 1200001"),
@@ -259,7 +259,7 @@ fn an_autopilot_at_no_udp_port_is_named_in_one_line() {
     std::fs::write(&file, text).unwrap();
     let scenario = format!("--scenario {}", file.display());
     let line = refusal(&format!("{} {scenario}", of_paper(&out)));
-    let named = "companion.autopilot = \"udp:localhost:0\" has no PORT within 1 to 65535; allowed: a tty, or udp:HOST:PORT";
+    let named = "companion.autopilot = \"udp:localhost:0\" has no PORT within 1 to 65535; allowed: a string: a tty, or udp:HOST:PORT";
     assert!(line.contains(named), "{line}");
     assert!(!out.exists(), "nothing is written");
 }

@@ -67,7 +67,7 @@ fn brief_takes_the_key_from_a_file_and_the_epoch_from_the_clock() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(
         said,
-        "no --key-file: frames are not signed, and anybody in range can forge them\n"
+        "no --key-file: frames are not signed, so anybody in range can forge them\n"
     );
     assert_eq!(block(), paper());
 
@@ -150,7 +150,8 @@ fn a_key_file_that_others_can_read_is_refused() {
             continue;
         }
         let text = refusal(&keyed);
-        let words = format!("--key-file {file}: mode {mode:04o}: other users of this computer");
+        let words =
+            format!("--key-file {file}: has the mode {mode:04o}, so other users of this computer");
         assert!(text.contains(&words), "{text}");
         assert!(text.contains(&format!("type: chmod 600 {file}")), "{text}");
     }

@@ -93,7 +93,7 @@ fn both_directions_are_in_the_table_and_in_the_picture() {
     let report = json(&file, "--uavs 3");
     for part in [
         "SIR [dB]     SIR back back [dB]\n",
-        "it needs 0.5 of the SIR of the way there (link.reverse); worst direction: both\n",
+        "it needs 0.5 of the SIR from Tx to Rx (link.reverse); worst direction: both\n",
         "in this model no positions are better; not modelled: terrain and obstacles\n",
     ] {
         assert!(table.contains(part), "{part}: {table}");
