@@ -134,7 +134,7 @@ impl Report {
             ),
             Event::NoQuorum => tell(
                 "no quorum",
-                "too few relays receive each other to agree on the chain's members, so this relay keeps its setpoint: bring the missing relays into range, or land this part of the chain",
+                "too few relays receive each other to agree on the chain's members, so this relay keeps its setpoint; bring the missing relays into range, or land this part of the chain",
             ),
             Event::UploadRefused { why } => self.refused(now, why),
             Event::Uploaded => {

@@ -150,7 +150,10 @@ fn an_unavailable_local_port_is_named() {
         (&short, [&*in_use, "udp:HOST:PORT@LOCAL, within 1 to 65535"]),
         (
             &own,
-            ["is this program's own port", "LOCAL must differ from PORT"],
+            [
+                "is this program's own port",
+                "LOCAL must be another one than PORT",
+            ],
         ),
     ] {
         let line = relay(address, "").refused(1);

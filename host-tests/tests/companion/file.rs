@@ -181,7 +181,8 @@ fn overrides_by_the_command_line_are_logged_once() {
     for (index, status) in [(1, 2), (2, 1)] {
         let more = format!("--index {index} --of 2 --shared /nowhere --altitude 23");
         let refused = start(&own, &more).refused(status);
-        let line = "--altitude 23: relay 1 has values of its own in a [[relay]] of --config";
+        let line =
+            "--altitude 23: has no effect, because the --config file has a [[relay]] for relay 1";
         assert_eq!(refused.starts_with(line), status == 2, "{refused}");
     }
 }

@@ -116,7 +116,7 @@ fn a_silent_udp_port_is_logged_once() {
     unanswered.check_report(&[
         "autopilot: no answer at ",
         &local,
-        "keeps the first address and port",
+        "Until it restarts, a PX4 sends to the first port",
         "udp:HOST:PORT@LOCAL",
     ]);
     unanswered.check_no_repetition();

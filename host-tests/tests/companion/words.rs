@@ -93,7 +93,8 @@ fn upload_fails(files: &Files, tty: &str, key: &str, more: &str, why: &str) {
     let signed = files.signed(key, "ground");
     let upload = format!("--tty {tty} --end tx --version 3 --yes --timeout 8 {signed}");
     let line = Relay::ground(&format!("{upload} {more}")).refused(1);
-    let reports = "--timeout 8: no relay has reported the mission that it flies: ";
+    let reports =
+        "--timeout 8: not finished after 8 s: no relay has reported the mission that it flies: ";
     assert!(line.starts_with(reports), "{line}");
     assert!(line.contains(why), "{more}: {line}");
 }
@@ -117,7 +118,7 @@ fn on_a_wire_the_ground_names_the_likely_cause() {
     fails(
         "key",
         "--altitude 21",
-        "loaded with another mission than 0x",
+        "loaded with another mission than this station, whose digest is 0x",
     );
     fails(
         "key",

@@ -72,7 +72,9 @@ pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's membership restored from flash");
     } else {
-        error!("votes on the chain's membership in flash are in another firmware's format, and ignored");
+        error!(
+            "votes on the chain's membership in flash are in another firmware's format, and ignored"
+        );
     }
 }
 
@@ -94,7 +96,9 @@ pub(crate) fn refused(why: Refused) {
             );
         }
         Refused::NoEpoch => {
-            error!("frames cannot be signed: the epoch (start counter) has reached its maximum: provision all drones with a new key");
+            error!(
+                "frames cannot be signed: the epoch (start counter) has reached its maximum: provision all drones with a new key"
+            );
         }
         Refused::NoAutopilot => {
             error!(
