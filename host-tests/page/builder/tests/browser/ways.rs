@@ -1,6 +1,6 @@
 //! Both directions of every hop.
 
-use super::opened::{choose, is_native, number, opened, root, said};
+use super::opened::{choose, is_native, number, opened, press, root, said};
 
 #[test]
 fn both_directions_of_every_hop_are_shown_and_the_worst_one_is_marked() {
@@ -57,10 +57,14 @@ fn both_directions_of_every_hop_are_shown_and_the_worst_one_is_marked() {
     std::fs::create_dir_all(picture.parent().unwrap()).unwrap();
     std::fs::write(picture, browser.screenshot()).unwrap();
 
-    // What relays cannot do both ways is refused, and the last result stays.
     choose(&mut browser, "method", "joint");
+    is_native(&mut browser, "the joint method for both directions");
+
+    // What relays cannot do both ways is refused, and the last result stays.
+    press(&mut browser, "listen");
     let words = said(&mut browser, "wrong");
     assert!(words.contains("reverse"), "{words}");
+    press(&mut browser, "listen");
     choose(&mut browser, "method", "align");
     choose(&mut browser, "reverse", "1.5");
     assert_eq!(
