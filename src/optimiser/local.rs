@@ -165,8 +165,8 @@ impl Hops {
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
-    /// For traffic in both directions, each is the smaller one of the SIR toward Rx and the SIR toward Tx divided by
-    /// r.
+    /// For traffic in both directions, each is the smaller one of the forward SIR and the backward SIR divided by r.
+    /// r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);

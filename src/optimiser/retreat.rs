@@ -58,8 +58,8 @@ const ULPS: u8 = 8;
 /// many targets; the position of its receiver is known.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A of the hop, m^2. It is that with the field's largest Upsilon = E[1/I], or, for the hop to Rx, with
-    /// Upsilon at Rx.
+    /// Gain A of the hop, m^2: its SIR is A times `quiet` over the squared length. `quiet` is Upsilon = E[1/I] at the
+    /// receiver over the field's largest Upsilon. For the hop to Rx A includes Upsilon at Rx, and `quiet` is 1.
     gain: f32,
     /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
     climb_squared: f32,
@@ -67,9 +67,9 @@ pub struct Retreat<'a> {
     /// Smallest x that the hop's sender may take, m.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from the receiver to the sender; `None` for traffic in one direction. It has the gain for the
-    /// field's largest Upsilon, over r, the required ratio of backward to forward SIR, and the interference at the
-    /// sender.
+    /// Backward hop from the receiver to the sender; `None` for traffic in one direction. Its gain is for the field's
+    /// largest Upsilon = E[1/I], divided by r, the required ratio of backward to forward SIR. The second value is the
+    /// interference at the sender.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
@@ -148,8 +148,9 @@ impl<'a> Retreat<'a> {
 
     /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], m. `quiet` is Upsilon = E[1/I] there
-    /// over the field's largest, above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
+    /// `target` is a linear SIR above zero, `from_m` the receiver's x, m, from 0 to that of Rx. `quiet` is Upsilon =
+    /// E[1/I] at the receiver over the field's largest Upsilon, above 0; it is 1 at Rx. The result is rounded toward
+    /// the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let place = self.onward(target, from_m, quiet)?;
         match self.back() {

@@ -79,8 +79,9 @@ const MOST_SQUARED: f32 = 1e18;
 /// Backward hop, for the traffic from Rx to Tx, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Gain A' of the backward hop over r. For a hop to Tx it is `K_tx` / r, m^2; the SIR at Tx is `K_tx` over the
-    /// hop's squared length. r is the required ratio of backward to forward SIR.
+    /// Gain of the backward hop over r, the required ratio of backward to forward SIR. The hop's SIR is the gain
+    /// times inverse interference over squared length. For a hop to Tx the gain, m^2, includes the interference at
+    /// Tx.
     gain: f32,
     /// True if Tx is the receiver of this hop, false if a relay is.
     to_tx: bool,
