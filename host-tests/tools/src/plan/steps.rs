@@ -344,8 +344,8 @@ impl Search<'_> {
 /// The table decides if a relay at a smaller x is worse than one at a larger x with no more time.
 struct Backward {
     hop: Hop,
-    /// Largest x of the next node, m, from which a relay at a grid point receives a rate step (its least SINR). There
-    /// is a row for each rate step, with a value for each grid point.
+    /// Largest x of the next node, m, from which a relay at a grid point receives a rate step. There is a row for
+    /// each rate step, a least SINR of the radio, with a value for each grid point.
     ///
     /// The x is at most that of Rx.
     farthest: Vec<Vec<f64>>,

@@ -70,15 +70,20 @@ pub(super) struct Gains {
     /// Receiver noise over the interferer's power received at the distance D (nu). D is the distance from Tx to Rx.
     noise: f32,
     common_w: f32,
-    /// Logarithm of the gain of a hop from a relay with the common power to another relay.
+    /// Logarithm of the gain of a hop between relays, if the sender has the common power. The hop's SIR is its gain
+    /// times the inverse interference at the receiver, over the squared length.
     relay: f32,
-    /// Logarithm of the gain of the hop from a relay with the common power to Rx.
+    /// Logarithm of the gain of the hop to Rx, if the sender has the common power. The SIR at Rx is the gain over the
+    /// squared length.
     to_rx: f32,
-    /// Logarithm of the gain of the return hop from a relay with the common power to Tx.
+    /// Logarithm of the gain of the return hop to Tx, if the sender has the common power. The SIR at Tx is the gain
+    /// over the squared length.
     to_tx: f32,
-    /// Logarithm of the gain of the hop from Tx to a relay.
+    /// Logarithm of the gain of the hop from Tx to a relay. The hop's SIR is its gain times the inverse interference
+    /// at the relay, over the squared length.
     from_tx: f32,
-    /// Logarithm of the gain of the return hop from Rx to a relay.
+    /// Logarithm of the gain of the return hop from Rx to a relay. The hop's SIR is its gain times the inverse
+    /// interference at the relay, over the squared length.
     from_rx: f32,
     /// Logarithm of r, the required ratio of backward to forward SIR.
     reverse: f32,

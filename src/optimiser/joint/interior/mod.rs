@@ -43,13 +43,14 @@ const CLOSE_MU: f32 = 3e-3;
 /// ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor on the barrier weight mu, each time that the positions have settled for one mu.
+/// Factor by which the barrier weight mu falls once the positions have settled for the current mu.
 const LESS: f32 = 0.3;
 
-/// Gain below which the barrier weight mu falls, after more than half of a Newton step. It is the gain of the merit
-/// (target plus barrier), in units of mu times the number of levels.
+/// Gain of merit below which the barrier weight mu falls, after more than half of a Newton step. The merit is the
+/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
 const SETTLED: f32 = 0.1;
-/// Gain below which the barrier weight mu falls, after any fraction of a Newton step. Its unit is that of `SETTLED`.
+/// Gain of merit below which the barrier weight mu falls, after any fraction of a Newton step. The merit is the
+/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
@@ -67,9 +68,11 @@ const APART: f32 = 5.0;
 /// Number of Newton steps for the target T that one portion of the work takes. T, in ln(SIR), is slightly below the
 /// chain's worst SIR.
 const STEPS: u8 = 4;
-/// Index, from 0 on, of the last Newton step for the target T.
+/// Index, from 0 on, of the last Newton step for the target T. T, in ln(SIR), is slightly below the chain's worst
+/// SIR.
 const TARGETS: u8 = 12;
-/// Relative error of the sum in the equation for the target T, below which its Newton steps end.
+/// Relative error at which the Newton steps for the target T end. T, in ln(SIR), is slightly below the chain's worst
+/// SIR.
 const EXACT: f32 = 5e-4;
 
 /// Number of relays in a segment, a part of the chain that one portion of the work handles.
@@ -167,7 +170,7 @@ enum Work {
     /// Elimination of the relays of this segment from the Newton system.
     Eliminate(u16),
     /// Computation of the Newton steps of the relays in one part of this segment. `true` for its second part, which
-    /// comes first.
+    /// is computed before its first part.
     Substitute(u16, bool),
 }
 
@@ -282,7 +285,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Stores two x of relay `index` for Algorithm 1, m: its position or reach, and its upper limit. They take the
+    /// Stores two values for relay `index` during Algorithm 1, m: its x, and the upper limit of its x. They take the
     /// memory of a hop's levels, so they are lost when the interior-point method runs.
     pub(super) fn note(&mut self, index: u16, lengths_m: [f32; 2]) {
         if let Some(node) = self.node(index) {
@@ -290,7 +293,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the two x, m, that [`Interior::note`] has stored for relay `index`; 0 for Tx.
+    /// Returns the two values, m, that [`Interior::note`] has stored for relay `index`; 0 for Tx.
     pub(super) fn noted(&self, index: u16) -> [f32; 2] {
         let node = self.nodes.get(usize::from(index).wrapping_sub(1));
         node.map_or([0.0; 2], |node| node.hop.level)
@@ -367,9 +370,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Processes one portion of the interior-point method. Ready at its end with the target that the stored positions
-    /// meet, in ln(SIR): slightly less than the worst forward SIR, and than the worst backward SIR over r, their
-    /// required ratio.
+    /// Processes one portion of the interior-point method. Ready at its end with a target in ln(SIR), slightly below
+    /// what the stored positions reach. Each forward SIR is above it, and each backward SIR over r, the required
+    /// ratio of backward to forward SIR.
     pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let relays = chain.mission.relays();
         let done = match self.work {

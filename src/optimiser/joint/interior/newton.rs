@@ -108,8 +108,8 @@ impl Front {
     /// Eliminates the relay before `hop` from the Newton system. `self` has the rows of that relay, and then those of
     /// the node at `spot`, where `hop` ends.
     ///
-    /// If `hop` begins at Tx, `is_relay` is false, and the result is 0. `None` if a pivot is not positive. If the
-    /// system is `convex`, a pivot can only be too small by rounding, and is raised instead.
+    /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
+    /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
     pub(super) fn pass(
         &mut self,
         is_relay: bool,
@@ -194,7 +194,7 @@ impl Front {
     }
 
     /// Subtracts the contribution of the eliminated relay before from this node's rows. `factor` is the result of
-    /// that elimination. Its products are added to the `sums` for the target's step.
+    /// that elimination. Products of its values are added to `sums`, from which the target's Newton step follows.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -288,7 +288,7 @@ impl Sums {
         column: 0.0,
     };
 
-    /// Returns the Newton step of the target. `None` if the system has no maximum.
+    /// Returns the Newton step of the target. `None` if the system has no maximum, so that there is no step.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;
         (rest > 0.0).then(|| self.slope / rest)

@@ -23,14 +23,14 @@ use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
 use core::task::Poll;
 
-/// Number of relays that one portion of Algorithm 1 takes.
+/// Number of relays that one portion of Algorithm 1 takes. The algorithm computes the x of all relays for one target.
 const LINE: u16 = 2;
 /// Number of relays whose initial positions one portion of the work sets.
 const PUT: u16 = 20;
 
-/// Fraction by which the initial x of relays move toward even spacing, to separate relays at one x. It is also their
-/// minimum distance to their limits, as a fraction of the range. The first value is for a first run of the
-/// interior-point method, the second for its repetitions.
+/// Fraction by which the initial x of relays move toward even spacing, to separate relays at one x. It is also the
+/// relays' minimum distance to their limits, as a fraction of the permitted range. The first value is for a first run
+/// of the interior-point method, the second for its repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Initial chain of the search, described from the end (Tx or Rx) with more power to the other end.
@@ -104,7 +104,7 @@ impl Start {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search finds the highest target that the result of the interior-point method meets.
+    /// The search finds the highest target at the lateral offsets and altitudes of an interior-point run.
     Result,
     /// The search finds the highest target of the best chain more exactly, at the end of the solution.
     Last,
@@ -126,7 +126,7 @@ enum Work {
     Interior,
 }
 
-/// State of Algorithm 1 for one target: a pass from Tx to Rx, and a pass back to Tx.
+/// Progress of Algorithm 1 for one target: in its pass from Tx to Rx, or in its pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
     /// Index of the last relay that the pass has computed; 0 before the first and at the end.
@@ -345,7 +345,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Interior
     }
 
-    /// Continues Algorithm 1 for the target `sigma`, in ln(SIR), by two relays. Ready with `Some` once all relays
+    /// Continues Algorithm 1 by two relays, for the target `sigma`, in ln(SIR). Ready with `Some` once all relays
     /// have an x, which is stored; ready with `None` if the target cannot be met.
     fn line(
         &mut self,
@@ -458,8 +458,8 @@ fn is_turned(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> bool {
     config.rx_power_w > config.tx_power_w
 }
 
-/// Gain above which the interior-point method runs again, in ln(SIR). It is the gain of Algorithm 1 over the target
-/// that the last run has reached.
+/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1
+/// meets at the last result's lateral offsets and altitudes, less the target that the method itself has reached.
 const NEW: f32 = 3e-4;
 /// Maximum number of runs of the interior-point method from x of Algorithm 1, per initial chain.
 const AGAIN: u8 = 4;
