@@ -61,7 +61,7 @@ pub struct Retreat<'a> {
     /// Gain A of the hop, m^2: its SIR is A times `quiet` over the squared length. `quiet` is Upsilon = E[1/I] at the
     /// receiver over the field's largest Upsilon. For the hop to Rx A includes Upsilon at Rx, and `quiet` is 1.
     gain: f32,
-    /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
+    /// Squared difference in altitude of sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
     /// Smallest x that the hop's sender may take, m.
@@ -325,15 +325,16 @@ pub struct Step {
 /// Interference at the receiver of a hop, as a function of its x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
-    /// Same interference at every x, as measured: Upsilon = E[1/I] over the largest one of the field.
+    /// Same interference at every x, as measured. The value is Upsilon, the mean inverse interference power, over the
+    /// largest Upsilon of the mission's field.
     Evenly(f32),
     /// Interference field of the mission, with receiver noise.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference that a receiver has measured: `measured_per_w`, Upsilon = E[1/I], 1/W. For `None` it
-    /// is the mission's interference field. Both include the receiver noise.
+    /// Returns the interference that a receiver has measured, or with `None` the mission's interference field.
+    /// `measured_per_w` is Upsilon, the mean inverse interference power, 1/W. Both include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -342,7 +343,8 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the ratio of Upsilon = E[1/I] at `x_m` to the largest Upsilon of the interference field.
+    /// Returns the ratio of Upsilon at `x_m` to the largest Upsilon of the interference field. Upsilon is the mean
+    /// inverse interference power, E[1/I].
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
             Self::Evenly(quiet) => quiet,
@@ -355,9 +357,9 @@ impl<'a> HopInterference<'a> {
 /// one with the smallest x of the receiver.
 ///
 /// `value` returns the sender's x for the receiver's x, y, and `quiet`, the ratio of Upsilon = E[1/I] at y to the
-/// field's largest. It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the
-/// root is below the second minus the first. Work: at most three values for each field point in between that a hop
-/// could reach.
+/// field's largest. The result is y - sqrt(`c` quiet - s), with the sender's gain over the target `c` and the first
+/// of `squares`, s. It is `None` if the square under the root is below the second minus the first. Work: at most
+/// three values for each field point in between that a hop could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

@@ -87,7 +87,7 @@ pub struct Back {
     to_tx: bool,
     /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance of the receiver from the interferer perpendicular to x, (Y - y0)^2 + h0^2, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
     /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
@@ -254,7 +254,7 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
 }
 
 /// Returns the length, m, at which a noise-free hop begins to meet its target as it gets longer. `None` if there is
-/// none; the length may be negative. f is 0 or above where the target is met, and this is the root at which f rises.
+/// none; the length may be negative. The hop's margin to its target is 0 there, and rises.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;

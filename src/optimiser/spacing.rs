@@ -103,12 +103,13 @@ pub struct Hop {
     sender: Sender,
     /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance of the receiver from the interferer perpendicular to x, (Y - y)^2 + h^2, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Part of the hop's equation that depends neither on the target nor on the length, m^2. It is (Y - y0) (Y + y0 -
-    /// 2y) + h0 (2h - h0). The interferer is at (X, Y), the sender at (y0, h0), the receiver at (y, h).
+    /// Part of the hop's equation that depends neither on the target nor on the length, m^2. With the interferer at
+    /// (X, Y) on the ground, the sender at (y0, h0) and the receiver at (y, h) across x, it is (Y - y0) (Y + y0 - 2y)
+    /// + h0 (2h - h0).
     base: f32,
-    /// Squared distance of receiver and sender perpendicular to x, (y - y0)^2 + (h - h0)^2, m^2.
+    /// Squared distance of receiver and sender perpendicular to x, m^2.
     across_squared: f32,
     /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,

@@ -109,9 +109,9 @@ impl<'a> Site<'a> {
     /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
     ///
     /// The hop's end must not be before the sender in x. The search is on the straight line to `wanted` from the
-    /// allowed position closest to the middle of the reachable ones. `None` if no allowed position is reached. For c
-    /// = target / gain > 1 a hop from p reaches a ball, with the interferer at m: its centre is p + (p - m) / (c -
-    /// 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// allowed position closest to the middle of the reachable ones. `None` if no allowed position is reached. With
+    /// the sender at p, the interferer at m and c = target / gain > 1 the reachable positions form a ball: its centre
+    /// is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
