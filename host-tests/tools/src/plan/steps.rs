@@ -45,7 +45,7 @@ const HALVINGS: u8 = 40;
 struct Label {
     point: Point,
     time: f64,
-    /// Index, in the list of the previous relay's labels, of the label that this one continues.
+    /// Index of the chain up to the previous relay, in the list of such chains, that this one continues.
     before: usize,
 }
 
@@ -313,8 +313,9 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the `labels` (first hops of chains) that may lead to the best chain. The others are worse than a label
-    /// that ends farther: that one takes no more time, and its relay receives as far in the return direction.
+    /// Returns those of `labels` (first hops of chains) that may lead to the best chain. Each of the others is no
+    /// better than a label that ends farther, takes no more time, and receives the next node at as large an x in the
+    /// return direction.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -349,8 +350,8 @@ struct Backward {
     ///
     /// The x is at most that of Rx.
     farthest: Vec<Vec<f64>>,
-    /// x of the grid points, m, that may be better for a relay than some grid point farther from Tx. There the relay
-    /// receives the next node from farther away in the return direction.
+    /// x of the grid points, m, that may be better for a relay than some grid point farther from Tx. In the return
+    /// direction the relay then receives a next node at a larger x than from that farther point.
     useful: Vec<f64>,
 }
 
