@@ -59,7 +59,8 @@ const ULPS: u8 = 8;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
     /// Gain A of the hop, m^2: its SIR is A times `quiet` over the squared length. `quiet` is Upsilon = E[1/I] at the
-    /// receiver over the field's largest Upsilon. For the hop to Rx A includes Upsilon at Rx, and `quiet` is 1.
+    /// receiver over the field's largest Upsilon, with the interference power I. For the hop to Rx A includes Upsilon
+    /// at Rx, and `quiet` is 1.
     gain: f32,
     /// Squared difference in altitude of sender and receiver, m^2.
     climb_squared: f32,
@@ -98,7 +99,7 @@ impl<'a> Retreat<'a> {
     /// Returns this hop together with the backward hop, if the mission has traffic in both directions.
     ///
     /// The backward hop is sent with `power_w`, or by Rx if that is `None`. Its receiver, the sender of this hop, has
-    /// measured Upsilon = `measured_per_w`.
+    /// measured `measured_per_w`: Upsilon, the mean inverse interference power, 1/W.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,

@@ -376,7 +376,7 @@ pub(super) struct Cells<const RELAYS: usize>([Cell; RELAYS]);
 impl<const RELAYS: usize> Cells<RELAYS> {
     pub(super) const NEW: Self = Self([Cell::NONE; RELAYS]);
 
-    /// Returns the cell of relay `index`.
+    /// Returns the stored lateral offset and altitude of relay `index`.
     #[inline(never)] // called from many places
     pub(super) fn get(&self, index: u16) -> Cell {
         let at = usize::from(index).wrapping_sub(1);
