@@ -602,8 +602,8 @@ impl PendingReports {
         measurements: 0,
     };
 
-    /// Records the interference `power_w`, W, for a report to the relays at distances 1 to `reach`. Returns true if a
-    /// handshake must be sent to them first.
+    /// Records the interference `power_w`, W, measured at this station, for a report to relays. They are the `reach`
+    /// relays nearest to the station, all within radio reach. Returns true if a handshake must be sent to them first.
     pub(super) fn record(&mut self, power_w: f32, reach: u16) -> bool {
         self.power_w = power_w;
         self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));

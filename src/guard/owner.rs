@@ -13,7 +13,8 @@ use crate::time::Jitter;
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence (limit of x) to the neighbour downstream, 0 before the first.
+    /// Sequence number of the newest fence sent to the neighbour downstream, 0 before the first. A fence is an x that
+    /// this neighbour must stay beyond.
     number: u16,
     /// x of the newest fence that this relay has announced, m; infinite before the first. The neighbour downstream
     /// stays beyond it.

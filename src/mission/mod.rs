@@ -635,8 +635,10 @@ impl Mission {
         self.tx_gain
     }
 
-    /// Gain of a hop from a relay of `power_w` watts to another drone. It is (`p_u` / `p_MSI`)(eta / `mu_los`), with
-    /// the relay's power and the interferer's; in an interference field `p_u` `Upsilon_max` / `mu_los`.
+    /// Gain of a hop from a relay of `power_w` watts to another drone. The hop's SIR is this gain times
+    /// [`crate::sir::quiet`], the inverse interference, over the squared length. The gain is (`p_u` / `p_MSI`)(eta /
+    /// `mu_los`): the powers of relay and interferer, and the path-loss factors drone to ground and drone to drone.
+    /// In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the field's largest E[1/I].
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)

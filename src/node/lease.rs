@@ -235,9 +235,11 @@ impl Lease {
         effects
     }
 
-    /// Extends the lease, because all members took part in the renewal `pulse`. The lease runs from the time at which
-    /// this relay forwarded `pulse`. No first lease is granted if `next`, the duration in the next renewal, is more
-    /// than twice as long: it would expire before that renewal completes.
+    /// Extends this relay's lease, because all members took part in the renewal `pulse`. The lease lasts for the
+    /// duration in `pulse`, counted from the time at which this relay forwarded it.
+    ///
+    /// A first lease is not granted if `next`, the duration in the next renewal, is more than twice as long: the
+    /// lease would expire before that renewal completes.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {

@@ -64,10 +64,10 @@ pub struct HopEnd {
 
 /// Hops from the previous node to a relay and on to the next node, for any position of the relay.
 ///
-/// With the squared lengths l of both hops and the inverse interference q at the relay, the SIRs of the hop from the
-/// previous node are A q / l and, for traffic toward Tx, `returned` / l. Those of the hop to the next node are
-/// `received` / l and A' q / l. The second one of each is divided by r, the required ratio of backward to forward
-/// SIR.
+/// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from
+/// the previous node are A q / l, with the gain A, and backward `returned` / l. Those of the hop to the next node are
+/// `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the required ratio of
+/// backward to forward SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
@@ -88,8 +88,8 @@ struct WayBack {
     /// SIR of the relay's signal at the previous node, times the squared length of the hop, over r, m^2. r is the
     /// required ratio of backward to forward SIR.
     returned: f32,
-    /// Gain A' of the backward hop from the next node to the relay, over r. r is the required ratio of backward to
-    /// forward SIR.
+    /// Gain of the backward hop from the next node to the relay, over r. The hop's SIR is the gain times inverse
+    /// interference over squared length; r is the required ratio of backward to forward SIR.
     gain: f32,
 }
 
@@ -165,8 +165,8 @@ impl Hops {
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
-    /// For traffic in both directions, each is the smaller one of the SIR toward Rx and the SIR toward Tx divided by
-    /// r.
+    /// For traffic in both directions, each is the smaller one of the forward SIR and the backward SIR divided by r.
+    /// r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);

@@ -36,8 +36,8 @@ const POINTS_AT_ONCE: usize = 128;
 pub struct Behind {
     /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
-    /// Upsilon = E[1/I] measured at the previous relay, 1/W. `None` to use the mission's interference field. Only
-    /// passes toward Tx use it.
+    /// Upsilon, the mean inverse interference power, measured at the previous relay, 1/W. `None` to use the mission's
+    /// interference field. Only passes toward Tx use it.
     pub measured_per_w: Option<f32>,
 }
 
@@ -63,7 +63,8 @@ pub struct Link<'a> {
     pub index: u16,
     /// Lateral offset, altitude and power of the relay.
     pub own: Station,
-    /// Upsilon = E[1/I] measured by the relay, 1/W; `None` to use the mission's interference field.
+    /// Upsilon, the mean inverse interference power, measured by the relay, 1/W. `None` to use the mission's
+    /// interference field.
     pub measured_per_w: Option<f32>,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
     /// of that x for the sake of the next relay.

@@ -58,18 +58,19 @@ const ULPS: u8 = 8;
 /// many targets; the position of its receiver is known.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A of the hop, m^2. It is that with the field's largest Upsilon = E[1/I], or, for the hop to Rx, with
-    /// Upsilon at Rx.
+    /// Gain A of the hop, m^2: its SIR is A times `quiet` over the squared length. `quiet` is Upsilon = E[1/I] at the
+    /// receiver over the field's largest Upsilon, with the interference power I. For the hop to Rx A includes Upsilon
+    /// at Rx, and `quiet` is 1.
     gain: f32,
-    /// Squared difference in altitude of sender and receiver, (h - h0)^2, m^2.
+    /// Squared difference in altitude of sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
     /// Smallest x that the hop's sender may take, m.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from the receiver to the sender; `None` for traffic in one direction. It has the gain for the
-    /// field's largest Upsilon, over r, the required ratio of backward to forward SIR, and the interference at the
-    /// sender.
+    /// Backward hop from the receiver to the sender; `None` for traffic in one direction. Its gain is for the field's
+    /// largest Upsilon = E[1/I], divided by r, the required ratio of backward to forward SIR. The second value is the
+    /// interference at the sender.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
@@ -98,7 +99,7 @@ impl<'a> Retreat<'a> {
     /// Returns this hop together with the backward hop, if the mission has traffic in both directions.
     ///
     /// The backward hop is sent with `power_w`, or by Rx if that is `None`. Its receiver, the sender of this hop, has
-    /// measured Upsilon = `measured_per_w`.
+    /// measured `measured_per_w`: Upsilon, the mean inverse interference power, 1/W.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,
@@ -148,8 +149,9 @@ impl<'a> Retreat<'a> {
 
     /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the receiver's x in [0, D], m. `quiet` is Upsilon = E[1/I] there
-    /// over the field's largest, above 0, or 1 at Rx. The result is rounded toward the receiver. Constant work.
+    /// `target` is a linear SIR above zero, `from_m` the receiver's x, m, from 0 to that of Rx. `quiet` is Upsilon =
+    /// E[1/I] at the receiver over the field's largest Upsilon, above 0; it is 1 at Rx. The result is rounded toward
+    /// the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let place = self.onward(target, from_m, quiet)?;
         match self.back() {
@@ -324,15 +326,16 @@ pub struct Step {
 /// Interference at the receiver of a hop, as a function of its x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
-    /// Same interference at every x, as measured: Upsilon = E[1/I] over the largest one of the field.
+    /// Same interference at every x, as measured. The value is Upsilon, the mean inverse interference power, over the
+    /// largest Upsilon of the mission's field.
     Evenly(f32),
     /// Interference field of the mission, with receiver noise.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference that a receiver has measured: `measured_per_w`, Upsilon = E[1/I], 1/W. For `None` it
-    /// is the mission's interference field. Both include the receiver noise.
+    /// Returns the interference that a receiver has measured, or for `None` the mission's field. `measured_per_w` is
+    /// Upsilon, the mean inverse interference power, 1/W. Both include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -341,7 +344,8 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the ratio of Upsilon = E[1/I] at `x_m` to the largest Upsilon of the interference field.
+    /// Returns the ratio of Upsilon at `x_m` to the largest Upsilon of the interference field. Upsilon is the mean
+    /// inverse interference power, E[1/I].
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
             Self::Evenly(quiet) => quiet,
@@ -354,9 +358,9 @@ impl<'a> HopInterference<'a> {
 /// one with the smallest x of the receiver.
 ///
 /// `value` returns the sender's x for the receiver's x, y, and `quiet`, the ratio of Upsilon = E[1/I] at y to the
-/// field's largest. It is y - sqrt(`c` quiet - q) with q the first of `squares`, or `None` if the square under the
-/// root is below the second minus the first. Work: at most three values for each field point in between that a hop
-/// could reach.
+/// field's largest. The result is y - sqrt(`c` quiet - s), with the sender's gain over the target `c` and the first
+/// of `squares`, s. It is `None` if the square under the root is below the second minus the first. Work: at most
+/// three values for each field point in between that a hop could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

@@ -79,14 +79,15 @@ const MOST_SQUARED: f32 = 1e18;
 /// Backward hop, for the traffic from Rx to Tx, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Gain A' of the backward hop over r. For a hop to Tx it is `K_tx` / r, m^2; the SIR at Tx is `K_tx` over the
-    /// hop's squared length. r is the required ratio of backward to forward SIR.
+    /// Gain of the backward hop over r, the required ratio of backward to forward SIR. The hop's SIR is the gain
+    /// times inverse interference over squared length. For a hop to Tx the gain, m^2, includes the interference at
+    /// Tx.
     gain: f32,
     /// True if Tx is the receiver of this hop, false if a relay is.
     to_tx: bool,
     /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance of the receiver from the interferer perpendicular to x, (Y - y0)^2 + h0^2, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
     /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
@@ -253,7 +254,7 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
 }
 
 /// Returns the length, m, at which a noise-free hop begins to meet its target as it gets longer. `None` if there is
-/// none; the length may be negative. f is 0 or above where the target is met, and this is the root at which f rises.
+/// none; the length may be negative. The hop's margin to its target is 0 there, and rises.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;

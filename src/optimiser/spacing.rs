@@ -103,12 +103,13 @@ pub struct Hop {
     sender: Sender,
     /// Position X of the interferer along x, m.
     interferer_x_m: f32,
-    /// Squared distance of the receiver from the interferer perpendicular to x, (Y - y)^2 + h^2, m^2.
+    /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Part of the hop's equation that depends neither on the target nor on the length, m^2. It is (Y - y0) (Y + y0 -
-    /// 2y) + h0 (2h - h0). The interferer is at (X, Y), the sender at (y0, h0), the receiver at (y, h).
+    /// Part of the hop's equation that depends neither on the target nor on the length, m^2. With the interferer at
+    /// (X, Y) on the ground, the sender at (y0, h0) and the receiver at (y, h) across x, it is (Y - y0) (Y + y0 - 2y)
+    /// + h0 (2h - h0).
     base: f32,
-    /// Squared distance of receiver and sender perpendicular to x, (y - y0)^2 + (h - h0)^2, m^2.
+    /// Squared distance of receiver and sender perpendicular to x, m^2.
     across_squared: f32,
     /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
@@ -215,8 +216,9 @@ impl Hop {
 
     /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m. `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the sender's x in [0, D]. The result is rounded toward the sender, so it
-    /// meets the target as an f32. Constant work; with noise at most 96 evaluations of the hop, usually five.
+    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to that of Rx. The result is rounded
+    /// toward the sender, so it meets the target as an f32. Constant work; with noise at most 96 evaluations of the
+    /// hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_simple() {
             self.in_silence(target, from_m)
@@ -522,9 +524,10 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 
 /// Returns the maximum distance along x, m, from which a relay meets `target` at Rx (`d_max`).
 ///
-/// It is sqrt(K / gamma - y^2 - h^2), at most 1e9, with the factor K of the last hop, the target gamma, and the
-/// relay's offset y and altitude h. `None` if even a relay right above the receiver is too weak. Not limited to D, so
-/// that it is a smooth function of the target, which the root search needs.
+/// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared
+/// distance), gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above
+/// the receiver is too weak. The distance may exceed that from Tx to Rx, so that it is a smooth function of the
+/// target, which the root search needs.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
@@ -598,9 +601,10 @@ impl Hop {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
-    /// Ratio rho = gamma / A of the target SIR and the sender's gain.
+    /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times inverse interference over squared
+    /// length.
     pub(super) ratio: f32,
-    /// Difference rho - 1, where rho is target SIR over gain. It is computed without cancellation.
+    /// Difference rho - 1, where rho is the hop's target SIR over its gain. It is computed without cancellation.
     pub(super) excess: f32,
     /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
@@ -629,8 +633,9 @@ impl NoisyHop {
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the margin g(d) of the hop at the length `d` along x, g'(d) / 2, and g's rounding error. g is 0 or
-    /// above where the target is met. `d`, m, is at most the length at which the noise alone makes the SNR too low.
+    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error. g, m^2, is
+    /// at least 0 if the hop meets its target SIR. `d` is along x, m, at most the length at which the noise alone
+    /// prevents that.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -698,8 +703,8 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest length in [`low`, `high`], m, at which the hop's margin g is 0, or `None`. g is concave
-    /// there, and below 0 at `high`, but for rounding.
+    /// Returns the largest length in [`low`, `high`], m, at which the hop's margin g is 0, or `None`. g is at least 0
+    /// where the hop meets its target. g is concave in the interval, and below 0 at `high`, but for rounding.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -722,8 +727,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the length in [`low`, `high`], m, at which the hop's margin g is 0. g is convex there, not negative at
-    /// `low`, and negative at `high`.
+    /// Returns the length in [`low`, `high`], m, at which the hop's margin g is 0. g is at least 0 where the hop
+    /// meets its target. g is convex in the interval, not negative at `low`, and negative at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

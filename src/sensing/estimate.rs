@@ -113,8 +113,9 @@ const BEYOND_CHANCE: f64 = 8.0;
 /// the estimate is not adopted.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's mean square change to that due to chance, in a settled chain. So large a change
-/// means another interferer, so the count of refinements starts again.
+/// Ratio above which a new estimate means another interferer, in a settled chain. It is the ratio of the estimate's
+/// mean square change to that due to chance. A settled chain no longer refines its estimate. The count of refinements
+/// then starts again.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.

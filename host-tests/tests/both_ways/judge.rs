@@ -7,11 +7,11 @@ pub(crate) struct Chain {
     pub(crate) distance_m: f64,
     /// Powers of Tx, of the relays from Tx on, and of Rx, W.
     pub(crate) powers_w: Vec<f64>,
-    /// Altitude of the relays without one of their own, m.
+    /// Altitude of all relays, m; used if `altitudes_m` is empty.
     pub(crate) altitude_m: f64,
     /// Altitudes of the relays from Tx on, m. Empty if all have the common one.
     pub(crate) altitudes_m: Vec<f64>,
-    /// Least distance between neighbouring relays, m.
+    /// Least distance between two neighbouring relays, m.
     pub(crate) apart_m: f64,
     /// Interferer: its power in W, and its x and y in m.
     pub(crate) interferer: [f64; 3],
@@ -24,7 +24,7 @@ pub(crate) struct Chain {
     pub(crate) loss: [f64; 2],
     /// Noise power of every receiver, W.
     pub(crate) noise_w: f64,
-    /// Fraction of the target SIR that suffices for the return direction from Rx to Tx, above 0.
+    /// Required ratio of backward SIR (toward Tx) to forward SIR (toward Rx), above 0.
     pub(crate) reverse: f64,
 }
 
@@ -111,9 +111,10 @@ impl Chain {
         worst
     }
 
-    /// Returns the positions with the best two-way SIR, with relay k at a point of `grids[k - 1]`.
+    /// Returns the positions with the best SIR of the worst hop, with relay k at a point of `grids[k - 1]`.
     ///
-    /// The two-way SIR counts the worse direction of each hop. The points of a grid are in ascending order.
+    /// The SIR of a hop is the smaller of forward SIR and backward SIR / `reverse`. The points of a grid are in
+    /// ascending order.
     fn best_on(&self, grids: &[Vec<f64>]) -> Vec<f64> {
         let first = grids[0].iter().map(|&x| self.hop(1, 0.0, x));
         let mut best: Vec<f64> = first.collect();
@@ -174,9 +175,11 @@ impl Chain {
         points
     }
 
-    /// Improves positions by searches in a window around each. The windows shrink when they no longer help.
+    /// Improves the positions `start` by searches in a window around each. The windows shrink when they no longer
+    /// help.
     ///
-    /// Returns the two-way SIR of the worst hop, which counts the worse direction of each hop, and the positions.
+    /// Returns the SIR of the worst hop, and the positions. The SIR of a hop is the smaller of forward SIR and
+    /// backward SIR / `reverse`.
     pub(crate) fn refined(&self, start: &[f64]) -> (f64, Vec<f64>) {
         let mut x = start.to_vec();
         let mut value = self.value(&x);
@@ -205,8 +208,8 @@ impl Chain {
         (value, x)
     }
 
-    /// Returns the best two-way SIR that the search finds for a chain's worst hop, and the positions. The two-way SIR
-    /// counts the worse direction of each hop.
+    /// Returns the best SIR of the worst hop that the whole search finds, and the positions. The SIR of a hop is the
+    /// smaller of forward SIR and backward SIR / `reverse`.
     pub(crate) fn best(&self) -> (f64, Vec<f64>) {
         let grid = self.grid();
         let start = self.best_on(&vec![grid; self.relays()]);

@@ -24,7 +24,7 @@ use super::scenes::{ENDS, adversarial, in_noise, log_uniform, mission, narrow, u
 
 type Draw = fn(&mut ChaCha8Rng, [f64; 2], f64) -> Chain;
 
-/// Returns the profiles of all relays, by index.
+/// Returns the index and the profile (altitude and power) of each relay.
 fn profiles(chain: &Chain) -> Vec<(u16, Profile)> {
     let profile = |index: usize| {
         let own = chain.altitudes_m.get(index - 1);
@@ -37,7 +37,7 @@ fn profiles(chain: &Chain) -> Vec<(u16, Profile)> {
     (1..=chain.relays()).map(profile).collect()
 }
 
-/// Gives each relay an altitude of 10 to 80 m and a power of 0.3 to 3 W of its own.
+/// Gives each relay its own random altitude, 10 to 80 m, and its own random power, 0.3 to 3 W.
 fn with_own(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     for index in 1..=chain.relays() {
         chain.altitudes_m.push(narrow(rng.random_range(10.0..80.0)));
@@ -46,14 +46,15 @@ fn with_own(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     chain
 }
 
-/// Requires a separation of 0.2 to 0.98 of the largest one that fits on the line.
+/// Sets the minimum separation: a random fraction, 0.2 to 0.98, of the largest that fits on the line.
 fn with_separation(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     let gaps = (chain.relays() - 1).max(1) as f64;
     chain.apart_m = narrow(chain.distance_m / gaps * rng.random_range(0.2..0.98));
     chain
 }
 
-/// Numbers of scenes: all, those whose SIR is within 1e-4 of the judge's, and those within 5 %. And the worst share.
+/// Numbers of scenes: all, those with an SIR within 1e-4 of the judge's, and those with one within 5 %. `worst` is
+/// the smallest ratio of the SIR to the judge's, an independent search.
 #[derive(Debug, Default)]
 struct Tally {
     all: usize,
@@ -63,7 +64,8 @@ struct Tally {
 }
 
 impl Tally {
-    /// Compares the agreed positions of `chain` with the judge's. The mission has one direction if `one_way`.
+    /// Compares the SIR at the agreed positions of `chain` with that at the judge's positions. The mission has one
+    /// direction if `one_way`. The judge is an independent search.
     fn add(&mut self, chain: &Chain, one_way: bool) {
         let (mut chain, mut known) = (chain.clone(), chain.clone());
         if one_way {
@@ -103,7 +105,9 @@ impl Tally {
     }
 }
 
-/// Compares the agreed positions in random scenes with the judge's, in both directions and in one.
+/// Compares Algorithm 1 with the judge in random scenes, for both directions and for one. `change` modifies each
+/// scene; `what` names the change in the output. The judge is an independent search; for both directions at least 80
+/// % of the scenes must be within 5 % of its SIR.
 fn best_places(seed: u64, what: &str, change: fn(&mut ChaCha8Rng, Chain) -> Chain) {
     let mut rng = generator(seed);
     let draws: [(&str, Draw); 2] = [("usual", usual), ("near an interferer", adversarial)];

@@ -8,24 +8,27 @@ use rand::{Rng, RngExt};
 
 use super::judge::Chain;
 
-/// Position x, y, h, m.
+/// Position of a relay, m: x along the line Tx-Rx, lateral offset y, and altitude h.
 pub(crate) type Place = [f64; 3];
 
-/// Chain whose relays choose their positions in a box.
+/// Chain whose relays may take any position within limits of x, lateral offset and altitude.
 #[derive(Debug, Clone)]
 pub(crate) struct Space {
-    /// Powers, interferer, noise and r; its altitude is unused.
+    /// Chain with the powers, the interferer, the noise and r. r is the required ratio of backward to forward SIR.
+    /// The common altitude of the chain is not used.
     pub(crate) chain: Chain,
-    /// Lateral range, m.
+    /// Lowest and highest lateral offset of the relays, m.
     pub(crate) lateral_m: [f64; 2],
-    /// Altitude range, m.
+    /// Lowest and highest altitude of the relays, m.
     pub(crate) band_m: [f64; 2],
 }
 
-/// Points of the first grid along x, y and h: with and without room to the side.
+/// Numbers of points of the first grid along x, y and h. The first row is for relays that may leave the line
+/// sideways, the second one for relays above the line.
 const GRID: [[usize; 3]; 2] = [[36, 9, 5], [64, 1, 10]];
 
-/// Points of a window along each free coordinate: with and without room to the side.
+/// Numbers of points of a search window along x, y and h. The first row is for relays that may leave the line
+/// sideways, the second one for relays above the line.
 const WINDOW: [[usize; 3]; 2] = [[5, 5, 5], [7, 1, 7]];
 
 impl Space {
@@ -37,7 +40,7 @@ impl Space {
         self.lateral_m[0] >= self.lateral_m[1]
     }
 
-    /// Returns interference plus noise at node `node`, W.
+    /// Returns the power of interference plus noise at `node`, which is at (x, y, h), W.
     fn disturbance_w(&self, node: usize, [x, y, h]: Place) -> f64 {
         let [power_w, xi, yi] = self.chain.interferer;
         let is_on_ground = node == 0 || node > self.relays();
@@ -45,7 +48,8 @@ impl Space {
         power_w / (loss * ((x - xi).powi(2) + (y - yi).powi(2) + h * h)) + self.chain.noise_w
     }
 
-    /// Returns the smaller of forward SIR and backward SIR / r of the hop to `node`.
+    /// Returns a hop's two-way SIR: the smaller of its forward SIR and its backward SIR / r. r is the required ratio
+    /// of backward to forward SIR. The hop leads from `from` to `to`, where `node` is (0 is Tx, N + 1 is Rx).
     fn hop(&self, node: usize, from: Place, to: Place) -> f64 {
         let squared: f64 = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum();
         let gain = 1.0 / (self.chain.loss[0] * squared.max(1e-9));
@@ -54,7 +58,8 @@ impl Space {
         there.min(back / self.chain.reverse)
     }
 
-    /// Returns the worst hop of relays at `places`.
+    /// Returns the two-way SIR of the worst hop, with the relays at `places`. The two-way SIR is the smaller of
+    /// forward SIR and backward SIR / r; r is the required ratio of backward to forward SIR.
     pub(crate) fn value(&self, places: &[Place]) -> f64 {
         let rx = [self.chain.distance_m, 0.0, 0.0];
         let ends = places.iter().chain([&rx]);
@@ -65,7 +70,8 @@ impl Space {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the best places with each relay at one of its candidates.
+    /// Returns the best positions of all relays, each from the list of its `candidates`. Best are those with the
+    /// highest SIR of the worst hop, in the worse direction.
     fn best_on(&self, candidates: &[Vec<Place>]) -> Vec<Place> {
         let first = candidates[0].iter().map(|to| self.hop(1, [0.0; 3], *to));
         let mut best: Vec<f64> = first.collect();
@@ -117,7 +123,7 @@ impl Space {
         points
     }
 
-    /// Returns a window of `width` about `at`, m.
+    /// Returns positions to try around `at`: a randomly shifted grid, about `width` metres to each side.
     fn window(&self, at: Place, width: f64, rng: &mut impl Rng) -> Vec<Place> {
         let counts = WINDOW[usize::from(self.is_flat())];
         let jitter: [f64; 3] = std::array::from_fn(|_| rng.random_range(-0.2..0.2));
@@ -139,7 +145,9 @@ impl Space {
         points
     }
 
-    /// Improves places by windows of `width`, m, and smaller ones.
+    /// Improves the positions `start` by searches in a window around each. The windows shrink when they no longer
+    /// help; the first ones reach `width` metres to each side. Returns the SIR of the worst hop, in the worse
+    /// direction, and the positions.
     pub(crate) fn refined(
         &self,
         start: &[Place],
@@ -169,7 +177,7 @@ impl Space {
         (value, places)
     }
 
-    /// Returns the best value found.
+    /// Returns the best SIR of the worst hop, in the worse direction, that the whole search finds.
     pub(crate) fn best(&self, rng: &mut impl Rng) -> f64 {
         let (relays, d) = (self.relays(), self.chain.distance_m);
         let start = self.best_on(&vec![self.grid(); relays]);
@@ -194,7 +202,7 @@ mod tests {
     use super::{Chain, Space};
     use host_tests::placing::generator;
 
-    /// A far interferer and strong noise: hops of equal length on the line are best.
+    /// Checks that hops of equal length on the line are best with strong noise and a far, weak interferer.
     #[test]
     fn relays_in_noise_alone_are_even_and_on_the_line() {
         let space = Space {

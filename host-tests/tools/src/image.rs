@@ -132,7 +132,7 @@ pub const BLANK: u8 = 0xFF;
 pub struct Piece {
     /// Address of the first byte.
     pub address: u32,
-    /// Bytes from that address on.
+    /// Contents of this part of the flash image. The first byte is at `address`.
     pub bytes: Vec<u8>,
 }
 

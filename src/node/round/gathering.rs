@@ -42,7 +42,8 @@ impl Computation {
             }
     }
 
-    /// Starts a pass that collects the relays' profiles; called at the leader.
+    /// Starts a pass along the chain that collects the relays' own altitudes and powers, at the leader. A relay adds
+    /// its profile if it differs from the mission's common one.
     pub(super) fn begin_gathering(&mut self, context: &Context<'_>) -> Action {
         let after = self.seats.known.unwrap_or(0);
         self.gather(context, after, OwnSeats::new())

@@ -137,7 +137,7 @@ impl Outlook {
     }
 }
 
-/// Returns a + b f, for each coordinate.
+/// Returns the vector a + b f, with the number f.
 fn add(a: Triple, b: Triple, f: f32) -> Triple {
     let mut sum = a;
     for (cell, b) in sum.iter_mut().zip(b) {
@@ -146,7 +146,7 @@ fn add(a: Triple, b: Triple, f: f32) -> Triple {
     sum
 }
 
-/// Returns a + (b f + c g), for each coordinate.
+/// Returns the vector a + (b f + c g), with the numbers f and g.
 fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
     let mut sum = a;
     for ((cell, b), c) in sum.iter_mut().zip(b).zip(c) {

@@ -109,9 +109,9 @@ impl<'a> Site<'a> {
     /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
     ///
     /// The hop's end must not be before the sender in x. The search is on the straight line to `wanted` from the
-    /// allowed position closest to the middle of the reachable ones. `None` if no allowed position is reached. For c
-    /// = target / gain > 1 a hop from p reaches a ball, with the interferer at m: its centre is p + (p - m) / (c -
-    /// 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// allowed position closest to the middle of the reachable ones. `None` if no allowed position is reached. With
+    /// the sender at p, the interferer at m and c = target / gain > 1 the reachable positions form a ball: its centre
+    /// is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -376,7 +376,7 @@ pub(super) struct Cells<const RELAYS: usize>([Cell; RELAYS]);
 impl<const RELAYS: usize> Cells<RELAYS> {
     pub(super) const NEW: Self = Self([Cell::NONE; RELAYS]);
 
-    /// Returns the cell of relay `index`.
+    /// Returns the stored lateral offset and altitude of relay `index`.
     #[inline(never)] // called from many places
     pub(super) fn get(&self, index: u16) -> Cell {
         let at = usize::from(index).wrapping_sub(1);
@@ -460,9 +460,10 @@ const END_HALVINGS: u8 = 24;
 /// Returns the maximum SIR of the first hop, less a margin that leaves the relay a choice of position. `room` has the
 /// allowed lateral offsets and altitudes.
 ///
-/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. With U and B
-/// the squared distances along that line and across it, let s = B + (1 + t)^2 U + h^2; the slope of the SIR has the
-/// sign of h^2 - t (B + U) - t^2 U - nu t s^2, which falls with t. So with noise there is one optimum, closer to Tx.
+/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are
+/// the squared distances from Tx to the interferer along that line and across it; h is the altitude, and nu the
+/// noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
+/// which falls with t. So with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
     let squared = square(room.band.least_m);
@@ -548,10 +549,11 @@ const TIGHT: f32 = 1e-3;
 impl Site<'_> {
     /// Returns the squared distance by which a relay at `to` is too near the interferer, m^2, or 0. The second result
     /// is the weight of the penalty for that, the third the derivative of the squared distance by the target in
-    /// ln(SIR).
+    /// ln(SIR). `c` is the target SIR over the sender's gain.
     ///
-    /// A hop of maximum length that ends near the interferer is short. It violates the minimum separation d_min if
-    /// |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with noise if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// A hop of maximum length from p to p' that ends near the interferer at m is short. It violates the minimum
+    /// separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with the inverse q of interference plus noise.
+    /// With the noise nu that is so if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);
@@ -633,8 +635,8 @@ impl Site<'_> {
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
     /// It is the one with the steepest slope of those that are not at a limit of their allowed range, `low` to
-    /// `high`. The second result is the derivative of F by the selected coordinate; F is 0 for a hop of maximum
-    /// length (see `hop`).
+    /// `high`. The second result is the derivative of F by the selected coordinate. F is half the margin of the hop
+    /// to its target: 0 for a hop of maximum length (see `hop`).
     fn axis(
         &self,
         c: f32,

@@ -139,7 +139,8 @@ pub struct Claim {
     pub other_number: u32,
     /// True if the claiming node is passive because another node uses its number.
     pub passive: bool,
-    /// True for an echo: the sender repeats a claim that it received under the destination's number.
+    /// True for an echo of a claim that the sender received from a node with the destination's number. If two nodes
+    /// have that number, the echo tells each of them of the other's claim.
     pub echo: bool,
 }
 

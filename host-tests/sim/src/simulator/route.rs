@@ -306,7 +306,8 @@ pub struct Period {
 pub struct Stage {
     /// Start of this stage of the route, ps.
     pub from: Ps,
-    /// Index in [`Route::periods`] of the period in which this stage is.
+    /// Index in [`Route::periods`] of the period that contains this stage. In a period the view, the chain's state
+    /// and the promised data rates are constant.
     pub period: usize,
     /// State of each relay, from relay 1: true if it is switched on.
     pub on: Vec<bool>,

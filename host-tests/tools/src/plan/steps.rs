@@ -22,52 +22,59 @@ use uav_relay_scenario::number::narrow;
 
 use super::path::{Hop, Point, Times};
 
-/// Number of cells of the line, for the lower bound and for the table of reaches.
+/// Number of equal cells into which the search divides the line from Tx to Rx.
 const CELLS: u16 = 800;
 
-/// Least relative gain that the search looks for.
+/// Least relative decrease of a chain's time for one bit that the search looks for.
 const GAIN: f64 = 2e-5;
 
-/// Relative difference of times below which the farther of two chains is kept, over all hops.
+/// Relative difference of two chains' times for one bit that the search neglects. It then keeps the chain that ends
+/// farther.
 const SAME: f64 = 1e-4;
 
-/// Loss of reach on the way back that is neglected, as a fraction of the line.
+/// Loss of reach in the return direction (to Tx) that the search neglects. It is a fraction of the line Tx-Rx.
 const SLIGHT: f64 = 1e-6;
 
-/// Number of halvings of a cell that find the position at which a step is just met.
+/// Number of halvings of a cell in the search for the farthest x at which a hop meets a rate step. A rate step is a
+/// least SINR, and the data rate that the radio has from there on.
 const HALVINGS: u8 = 40;
 
-/// Start of a chain: relay k is at `point`, and the hops so far need `time` for one bit, s Hz.
+/// First hops of a chain, which end at a relay at `point`. They need `time` for one bit, in s Hz: the time in s for a
+/// bandwidth of 1 Hz.
 #[derive(Clone, Copy)]
 struct Label {
     point: Point,
     time: f64,
-    /// Index of the previous relay's label.
+    /// Index of the chain up to the previous relay, in the list of such chains, that this one continues.
     before: usize,
 }
 
-/// Reaches of one hop by steps, and the lower bound on its time, both by cells.
+/// Tables of one hop over the cells of the line: reach at each rate step, and least time for one bit. A rate step is
+/// a least SINR of the radio, and the data rate from there on.
 struct Reaches {
     hop: Hop,
-    /// Least x of a sender whose signal meets a step at a grid point, m, for each step and grid point.
+    /// Least x, m, of a sender whose signal has the SINR of a rate step at a grid point; infinite for none. There is
+    /// a row for each rate step of the radio, with a value for each grid point.
     nearest: Vec<Vec<f64>>,
-    /// Lower bounds on the time from each cell to each cell, row by row, s Hz.
+    /// Lower bounds on the hop's time for one bit, s Hz (time in s for a bandwidth of 1 Hz). There is a row for each
+    /// cell of the sender, with a value for each cell of the receiver.
     least: Vec<f64>,
 }
 
-/// Search for the chain with the least time in fitted slots, for a radio with rate steps.
+/// Search for the chain with the least time for one bit, for a radio with rate steps. Each time slot is as long as
+/// its hop needs (fitted slots).
 struct Search<'a> {
     times: &'a Times<'a>,
-    /// Edges of the cells, ascending, f32 values.
+    /// x of the edges of all cells, m, ascending. Each value is exact as an f32.
     grid: Vec<f64>,
-    /// Width of a cell, m.
+    /// Width of a cell of the line, m.
     width: f64,
-    /// Time that a chain must stay below, s Hz.
+    /// Time for one bit that a chain must stay below, s Hz: the time in s for a bandwidth of 1 Hz.
     below: f64,
 }
 
-/// Returns the x of the relays, m, in the best chain that needs less than `time`, s Hz, for one bit. `None` if there
-/// is none, or if the radio has no rate steps.
+/// Returns the x of the relays, m, in the best chain that needs less than `time` for one bit. `time` is in s Hz: the
+/// time in s for a bandwidth of 1 Hz. `None` if there is no such chain, or if the radio has no rate steps.
 pub(super) fn shorter(times: &Times<'_>, time: f64) -> Option<Vec<f64>> {
     let slowest = times.steps.first()?.1;
     // No chain that carries data needs more.
@@ -129,7 +136,7 @@ impl Search<'_> {
         Some(x)
     }
 
-    /// Computes the table of reaches and the lower bounds of `hop`, which ends at relay `node`.
+    /// Computes the tables of `hop`, which ends at relay `node`: reach at each rate step, and least times.
     fn reaches(&self, hop: Hop, node: usize) -> Reaches {
         let points: Vec<Point> = self
             .grid
@@ -170,7 +177,8 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the cells of relay `node`: the x at which each begins, and the least disturbance in it.
+    /// Returns the cells of the line for relay `node`: the start and the least disturbance of each. The disturbance
+    /// is interference plus noise, W: the smaller one of those at the two edges of the cell.
     fn quietest(&self, node: usize) -> Vec<Point> {
         let points: Vec<Point> = self
             .grid
@@ -185,7 +193,8 @@ impl Search<'_> {
         cells.collect()
     }
 
-    /// Returns for each relay and cell a lower bound on the time of all hops after that relay, s Hz.
+    /// Returns lower bounds on the time for one bit of all hops after a relay. They are in s Hz (s for a bandwidth of
+    /// 1 Hz). There is a row for each relay, with a value for each cell that it may be in.
     fn bounds(&self, kinds: &[Rc<Reaches>]) -> Vec<Vec<f64>> {
         let relays = kinds.len();
         let (last, rx) = (self.times.hop(Some(relays), None), self.times.rx());
@@ -221,7 +230,8 @@ impl Search<'_> {
         cell
     }
 
-    /// Returns the chains that end at relay `node`, from those that end at the relay before it.
+    /// Extends the chains `labels` by relay `node`; returns the new chains that are worth keeping. `limit` is the
+    /// relay's largest x, m. `bound` has lower bounds on the time of the hops after it, s Hz, for each cell.
     fn extended(
         &self,
         labels: &[Label],
@@ -269,7 +279,9 @@ impl Search<'_> {
         self.undominated(found, &backward)
     }
 
-    /// Collects the positions at which relay `node` just meets a step, after the node at `from`. Unsorted.
+    /// Collects in `ends` the x of relay `node`, m, at which its hop from `from` just meets a rate step. A rate step
+    /// is a least SINR, and the data rate from there on. Both directions of the hop count. The x of Rx is included;
+    /// the list is not sorted.
     fn ends(&self, from: Point, node: usize, kind: &Reaches, ends: &mut Vec<f64>) {
         ends.clear();
         ends.push(self.times.scene.distance_m);
@@ -301,7 +313,9 @@ impl Search<'_> {
         }
     }
 
-    /// Returns the labels that may lead to the best chain: those that no other label dominates.
+    /// Returns those of `labels` (first hops of chains) that may lead to the best chain. Each of the others is no
+    /// better than a label that ends farther, takes no more time, and receives the next node at as large an x in the
+    /// return direction.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -325,21 +339,25 @@ impl Search<'_> {
     }
 }
 
-/// Reaches of the hop after a relay on the way back, by the relay's position.
+/// Reach of the hop after a relay in the return direction (to Tx), by rate step and the relay's x. A rate step is a
+/// least SINR of the radio, and the data rate from there on.
 ///
-/// They decide which positions are dominated by a farther one, which needs no more time.
+/// The table decides if a relay at a smaller x is worse than one at a larger x with no more time.
 struct Backward {
     hop: Hop,
-    /// Farthest x from which a relay at a grid point is reached, m, for each step and grid point.
+    /// Largest x of the next node, m, from which a relay at a grid point receives a rate step. There is a row for
+    /// each rate step, a least SINR of the radio, with a value for each grid point.
     ///
-    /// It is at most the x of Rx.
+    /// The x is at most that of Rx.
     farthest: Vec<Vec<f64>>,
-    /// Grid points, m, that farther points may not dominate.
+    /// x of the grid points, m, that may be better for a relay than some grid point farther from Tx. In the return
+    /// direction the relay then receives a next node at a larger x than from that farther point.
     useful: Vec<f64>,
 }
 
 impl Backward {
-    /// Creates the table for relay `node`, which receives from the next relay or from Rx.
+    /// Creates the table for relay `node`, which receives from the next relay or Rx. It is empty for data in one
+    /// direction.
     fn new(search: &Search<'_>, node: usize) -> Self {
         let times = search.times;
         let next = Some(node + 1).filter(|next| *next <= times.relays());
@@ -376,7 +394,7 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the least x, m, from which on all positions up to `point` are no better than `point` itself.
+    /// Returns the start, m, of the interval up to `point` in which no x is better for a relay.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;
@@ -397,7 +415,8 @@ impl Backward {
     }
 }
 
-/// Returns the least x of a sender whose signal meets the SINR `sinr` at `to`, m; infinite for none.
+/// Returns the least x of a sender, m, whose signal has the SINR `sinr` at `to`. Infinite if it would be closer than
+/// the minimum separation.
 fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     let squared = hop.powers_w[0] / (hop.factor * sinr * to.disturbance_w) - hop.climb_squared;
     if squared < hop.least_m * hop.least_m {
@@ -406,9 +425,9 @@ fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     to.x - squared.sqrt()
 }
 
-/// Returns the longest hop along x, m, on which `to` receives the step `sinr` on the way back.
+/// Returns the longest hop along x, m, on which `to` receives the next node with the SINR `sinr`.
 ///
-/// `None` if there is none.
+/// `None` if the next node is too weak at any x.
 fn reach(hop: &Hop, sinr: f64, to: Point) -> Option<f64> {
     let squared = hop.powers_w[1] / (hop.factor * sinr * to.disturbance_w) - hop.climb_squared;
     (squared >= 0.0).then(|| squared.sqrt())

@@ -35,13 +35,14 @@ pub(crate) struct Chain {
     pub(crate) model: Model,
 }
 
-/// Number of grid points over the whole line, beside the dense ones near ends and interferer.
+/// Number of grid points along the whole line. There are more, dense ones near Tx, Rx and the interferer.
 const EVEN: usize = 171;
 
-/// Number of equal cells of the line in the search for a radio with steps, beside those of the grid.
+/// Number of equal cells of the line in the search for a radio with rate steps. Their edges are added to those of the
+/// first grid.
 const CELLS: usize = 400;
 
-/// Largest number of chains that each cell keeps in that search.
+/// Maximum number of chains that each cell keeps in the search for a radio with rate steps.
 const KEPT: usize = 4;
 
 /// Inverse of the golden ratio, for golden-section search.
@@ -111,8 +112,8 @@ impl Chain {
 
     /// Returns the time for one bit of a chain with relays at `x`, m, in units of 1 / bandwidth.
     ///
-    /// If time slots are as long as each hop needs, it is the sum over all hops, otherwise the time of the slowest
-    /// hop.
+    /// If each time slot is as long as its hop needs, the time is the sum over all hops; otherwise it is that of the
+    /// slowest hop.
     fn total(&self, x: &[f64]) -> f64 {
         let last = x.len() + 1;
         let mut from = 0.0;
@@ -126,7 +127,8 @@ impl Chain {
 
     /// Returns the data rate of a chain with relays at `x`, m, in bit/s/Hz.
     ///
-    /// For both directions it is the smaller of the rate to Rx and the rate to Tx divided by `reverse`.
+    /// For both directions the result is the smaller of two values: the rate to Rx, and the rate to Tx divided by
+    /// `reverse`.
     pub(crate) fn rate(&self, x: &[f64]) -> f64 {
         self.rate_of(self.total(x), x.len())
     }
@@ -168,7 +170,8 @@ impl Chain {
         points
     }
 
-    /// Returns the x of the relays with the largest rate on the grid, for each number of relays from 1.
+    /// Returns the x of the relays with the largest rate on the grid. There is a list for each number of relays from
+    /// 1.
     fn on_grid(&self) -> Vec<Vec<f64>> {
         let grid = self.grid();
         let never = usize::MAX - 1;
@@ -207,10 +210,12 @@ impl Chain {
         all
     }
 
-    /// Returns the x of relays with the largest rate for a radio with steps, for each number from 1 on.
+    /// Returns the x of the relays with the largest rate, for a radio with rate steps. There is a list of x for each
+    /// number of relays from 1.
     ///
-    /// Each cell of a grid keeps a few starts of chains with the least times, at their exact positions; of two that take as long the farther
-    /// one. From there the next relay is tried at all grid points and where the time of the hop changes, found by bisection.
+    /// Each cell of a grid keeps a few first parts of chains, at their exact positions: those with the least times,
+    /// and of two with equal times the farther one. The next relay is tried at all grid points, and at all x, found
+    /// by bisection, where the time of the hop changes.
     fn by_changes(&self) -> Vec<Vec<f64>> {
         let mut grid = self.grid();
         grid.extend((0..=CELLS).map(|i| self.distance_m * i as f64 / CELLS as f64));
@@ -276,7 +281,8 @@ impl Chain {
         all
     }
 
-    /// Returns the x of relays with the largest rate found without a start, for each number from 1 on.
+    /// Returns the x of the relays with the largest rate that the searches find. There is a list for each number of
+    /// relays from 1. The searches need no initial positions.
     fn searched(&self) -> Vec<Vec<f64>> {
         let mut all = self.on_grid();
         if self.fitted && matches!(self.model, Model::Steps(_)) {
@@ -290,8 +296,8 @@ impl Chain {
         all
     }
 
-    /// Improves the positions `start` by golden-section search. It moves groups of one to four neighbouring relays
-    /// together.
+    /// Improves the x of the relays, which begin at `start`, by golden-section search. The search moves groups of one
+    /// to four neighbouring relays together.
     fn improved(&self, start: &[f64]) -> Vec<f64> {
         let mut x = start.to_vec();
         let mut best = self.total(&x);
@@ -331,9 +337,8 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rates found with all relays, bit/s/Hz.
-    ///
-    /// The second search starts from the positions `others`, m.
+    /// Returns the largest data rates that two searches find with all relays, bit/s/Hz. The first search starts from
+    /// the judge's own grid, the second one also from the x `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {
         let grid = self.searched();
         let starts = [grid.last().unwrap().as_slice(), others];

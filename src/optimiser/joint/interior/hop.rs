@@ -21,10 +21,11 @@ use super::super::hop::{Triple, minus};
 use super::super::solver::{Seat, SolverContext};
 use crate::sir::{Sender, transmitter_gain};
 
-/// Square of a length below which a hop counts as longer, in units of D^2. Relays may share a position.
+/// Amount added to each squared hop length, so that its logarithm is finite. Relays may share a position. The amount
+/// is in units of D^2; D is the distance from Tx to Rx.
 const SHORTEST: f32 = 1e-8;
 
-/// Symmetric matrix: xx, xy, xh, yy, yh, hh.
+/// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
 pub(super) type Symmetric = [f32; 6];
 
 #[inline(never)]
@@ -32,7 +33,7 @@ pub(super) fn dot([a, b, c]: &Triple, [x, y, z]: &Triple) -> f32 {
     a * x + b * y + c * z
 }
 
-/// Adds `weight` v v' to `to`.
+/// Adds the symmetric matrix `weight` v v' to `to`. The vector v is (x, y, h), and v' is its transpose.
 #[inline(never)]
 pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: &Triple, weight: f32) {
     let (a, b) = (weight * x, weight * y);
@@ -45,7 +46,7 @@ pub(super) fn add_square(to: &mut Symmetric, [x, y, h]: &Triple, weight: f32) {
     *hh += weight * h * h;
 }
 
-/// Adds `weight` v to `to`.
+/// Adds the vector (a, b, c), multiplied by `weight`, to the vector (x, y, h).
 #[inline(never)]
 pub(super) fn add_scaled([x, y, h]: &mut Triple, [a, b, c]: &Triple, weight: f32) {
     *x += weight * a;
@@ -59,22 +60,32 @@ fn add_to_diagonal([xx, _, _, yy, _, hh]: &mut Symmetric, value: f32) {
     *hh += value;
 }
 
-/// Logarithms of the gains of a chain, for lengths in units of D.
+/// Logarithms of the gains from which the SIR of each hop is computed. The SIR is the gain times the inverse
+/// interference at the receiver, over the squared hop length; at Rx and Tx the gain includes the interference.
+/// Lengths are in units of the distance from Tx to Rx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
-    /// Position of the interferer.
+    /// Position (x, y, h) of the interferer, in units of the distance from Tx to Rx.
     source: Triple,
-    /// nu, for squared lengths in units of D^2.
+    /// Receiver noise over the interferer's power received at the distance D (nu). D is the distance from Tx to Rx.
     noise: f32,
     common_w: f32,
-    /// ln of the gains from a relay of the common power to a relay, Rx and Tx.
+    /// Logarithm of the gain of a hop between relays, if the sender has the common power. The hop's SIR is its gain
+    /// times the inverse interference at the receiver, over the squared length.
     relay: f32,
+    /// Logarithm of the gain of the hop to Rx, if the sender has the common power. The SIR at Rx is the gain over the
+    /// squared length.
     to_rx: f32,
+    /// Logarithm of the gain of the return hop to Tx, if the sender has the common power. The SIR at Tx is the gain
+    /// over the squared length.
     to_tx: f32,
-    /// ln of the gains from Tx and from Rx.
+    /// Logarithm of the gain of the hop from Tx to a relay. The hop's SIR is its gain times the inverse interference
+    /// at the relay, over the squared length.
     from_tx: f32,
+    /// Logarithm of the gain of the return hop from Rx to a relay. The hop's SIR is its gain times the inverse
+    /// interference at the relay, over the squared length.
     from_rx: f32,
-    /// ln r.
+    /// Logarithm of r, the required ratio of backward to forward SIR.
     reverse: f32,
 }
 
@@ -110,7 +121,8 @@ impl Gains {
         }
     }
 
-    /// Returns ln of the gains a and a' of hop `k`, 1..=N + 1, of `relays`.
+    /// Returns the logarithms of hop `k`'s gains, 1..=N + 1: forward (toward Rx), and backward over r. r is the
+    /// required ratio of backward to forward SIR.
     fn of(&self, k: u16, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> [f32; 2] {
         let relays = chain.mission.relays();
         let power = |index: u16| {
@@ -134,14 +146,17 @@ impl Gains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q at `at`.
+    /// Returns ln q, with q the inverse of interference plus noise at the position `at`. The unit of interference is
+    /// the interferer's power received at the distance from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;
         libm::logf(s / (1.0 + self.noise * s))
     }
 
-    /// Returns ln F and ln (B / r) of hop `k` from `from` to `to`, with ln q at both.
+    /// Returns the two levels of hop `k`: ln(forward SIR), and ln(backward SIR / r). r is the required ratio of
+    /// backward to forward SIR. The hop leads from `from` to `to`; `quiet_from` and `quiet_to` are ln(inverse
+    /// interference) there.
     pub(super) fn levels(
         &self,
         k: u16,
@@ -162,7 +177,10 @@ impl Gains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of both SIR levels of hop `k`. The second ones are summed by the `weights`.
+    /// Returns the derivatives of hop `k`'s two levels by the positions of its ends `from` and `to`. The levels are
+    /// ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The second
+    /// derivatives are summed with the `weights` of both levels, and negated. `convex` leaves out what would make
+    /// that sum indefinite.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -201,7 +219,9 @@ impl Gains {
         hop
     }
 
-    /// Adds the derivatives of ln q at `at`; the second ones are multiplied by -`weight`.
+    /// Adds the derivatives of ln q by the position `at`; q is the inverse of interference plus noise. The first
+    /// derivatives are added to `slope`, and the second ones, multiplied by -`weight`, to `bend`. `convex` leaves out
+    /// what would make the second ones indefinite.
     fn add_quiet(
         &self,
         at: Triple,
@@ -228,14 +248,16 @@ impl Gains {
     }
 }
 
-/// Derivatives of ln F and ln (B / r) of a hop by the positions of its ends. The second ones are negative, and
-/// summed.
+/// Derivatives of a hop's two levels by the positions of its ends. The levels are ln(forward SIR) and ln(backward SIR
+/// / r); r is the required ratio of backward to forward SIR. The second derivatives (`bend...`) are weighted sums
+/// over both levels, negated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {
     pub(super) by_from: [Triple; 2],
     pub(super) by_to: [Triple; 2],
     pub(super) bend_from: Symmetric,
     pub(super) bend_to: Symmetric,
-    /// Part of both by the length, which is the negative of the mixed ones by both ends.
+    /// Part of `bend_from` and `bend_to` that comes from the hop's length. The mixed second derivatives, by one end
+    /// and the other, are its negative.
     pub(super) bend: Symmetric,
 }

@@ -34,40 +34,57 @@ use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First mu, from a distant and from a close start, and last mu; times the number of levels.
+/// First barrier weight mu for a start that may be far from the result, times the number of levels. A chain has two
+/// levels per hop: the logarithms of its forward and backward SIR.
 const FIRST_MU: f32 = 0.03;
+/// First barrier weight mu for a start close to the result, times the number of levels (two per hop).
 const CLOSE_MU: f32 = 3e-3;
+/// Last barrier weight mu, times the number of levels (two per hop). The result is within this of a local optimum, in
+/// ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor from one mu to the next.
+/// Factor by which the barrier weight mu falls once the positions have settled for the current mu.
 const LESS: f32 = 0.3;
 
-/// Gain of merit, in units of m mu, below which mu falls. First after a step of more than half, then after any step.
+/// Gain of merit below which the barrier weight mu falls, after more than half of a Newton step. The merit is the
+/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
 const SETTLED: f32 = 0.1;
+/// Gain of merit below which the barrier weight mu falls, after any fraction of a Newton step. The merit is the
+/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Fraction of the way to the box that a step may take, and the factor between tries.
+/// Maximum fraction of the way to a coordinate's limit that a step may take.
 const NEAR_BOX: f32 = 0.98;
+/// Factor by which a step is shortened for the next try, after a try that lowers the merit.
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Factor between a multiplier and mu / s.
+/// Maximum factor between a Lagrange multiplier and its central value mu / s. mu is the barrier weight, s the excess
+/// of the level (logarithm of a hop's SIR in one direction) over the target.
 const APART: f32 = 5.0;
 
-/// Steps of T in a portion and altogether, and the relative error of the sum at which they end.
+/// Number of Newton steps for the target T that one portion of the work takes. T, in ln(SIR), is slightly below the
+/// chain's worst SIR.
 const STEPS: u8 = 4;
+/// Index, from 0 on, of the last Newton step for the target T. T, in ln(SIR), is slightly below the chain's worst
+/// SIR.
 const TARGETS: u8 = 12;
+/// Relative error at which the Newton steps for the target T end. T, in ln(SIR), is slightly below the chain's worst
+/// SIR.
 const EXACT: f32 = 5e-4;
 
-/// Relays of a segment, of its first part, and of the second one.
+/// Number of relays in a segment, a part of the chain that one portion of the work handles.
 const AT_ONCE: u16 = 10;
+/// Number of relays in the first part of a segment; the second part has the others.
 const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop, and their multipliers with three digits.
+/// Two levels of a hop, and their Lagrange multipliers `lambda`. The levels are ln(forward SIR) and ln(backward SIR /
+/// r); r is the required ratio of backward to forward SIR. A multiplier is stored as the upper half of an f32: three
+/// digits.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: [f32; 2],
@@ -81,25 +98,26 @@ impl Hop {
     };
 }
 
-/// x of a relay, and the hop to it.
+/// x of a relay, in units of the distance from Tx to Rx, and the hop that ends at the relay.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     x: f32,
     hop: Hop,
 }
 
-/// Step of a relay, with three digits.
+/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32: three digits.
 type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
 enum Segment {
-    /// Rows of the segment's first relay.
+    /// Rows of the Newton system for the segment's first relay, after the elimination of all relays before.
     Front(Front),
-    /// Steps of its relays.
+    /// Newton steps of the segment's relays: of its first six, and of the other four.
     Steps([Step; FIRST], [Step; SECOND]),
 }
 
-/// Position of a node, and the corners of its box.
+/// Position (x, y, h) of a node, and the lower and upper limits of the coordinates. All are in units of the distance
+/// from Tx to Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -116,17 +134,18 @@ impl Spot {
         }
     }
 
-    /// Returns the distances to the lower corner.
+    /// Returns how far x, y and h are above their lower limits.
     fn below(&self) -> Triple {
         minus(self.at, self.low)
     }
 
-    /// Returns the distances to the upper corner.
+    /// Returns how far x, y and h are below their upper limits.
     fn above(&self) -> Triple {
         minus(self.high, self.at)
     }
 
-    /// Moves the position into the box, with a `margin` as a fraction of its width.
+    /// Moves each coordinate between its limits, at least `margin` away from them. `margin` is a fraction of the
+    /// distance between the coordinate's lower and upper limit.
     fn enclose(&mut self, margin: f32) {
         let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
@@ -138,21 +157,25 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Levels of this hop and the next ones, after a fraction of the step.
+    /// Computation of the hops' levels from this hop on, with the positions that are tried. A level is the logarithm
+    /// of a hop's SIR in one direction.
     Levels(u16),
-    /// T of these levels, after some steps.
+    /// Computation of the target T from all levels, after this number of its Newton steps. T, in ln(SIR), is slightly
+    /// below the chain's worst SIR.
     Target(u8),
-    /// Merit, from this hop on.
+    /// Summation of the merit, from this hop on. The merit (target plus barrier) decides if a step is accepted.
     Merit(u16),
-    /// Positions and multipliers, from this hop on.
+    /// Storage of the accepted positions, and of new Lagrange multipliers, from this hop on.
     Accept(u16),
-    /// Elimination of a segment.
+    /// Elimination of the relays of this segment from the Newton system.
     Eliminate(u16),
-    /// Factors of one part of a segment, and then its steps. `true` for the second part.
+    /// Computation of the Newton steps of the relays in one part of this segment. `true` for its second part, which
+    /// is computed before its first part.
     Substitute(u16, bool),
 }
 
-/// Relays, whose positions are the variables, and the current step.
+/// State of the interior-point method: the positions of all relays, and the current Newton step. The method maximises
+/// the worst SIR of both directions.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: Gains,
@@ -161,22 +184,25 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Newton steps of the second part of the segment whose steps are computed.
+    /// Newton steps of the current segment's second part, until those of its first part are known.
     second: [Step; SECOND],
-    /// Newton step of the relay after the current one.
+    /// Newton step of the next relay toward Rx, from which the current relay's step follows.
     ahead: Triple,
     work: Work,
     mu: f32,
     target: f32,
     least: f32,
-    /// Merit of the positions, and the one that is summed.
+    /// Merit (target plus barrier) at the stored positions, before the current step. The step is accepted if it does
+    /// not lower the merit.
     merit: f32,
+    /// Sum of the barrier's logarithms so far, at the positions that are tried.
     sum: f32,
-    /// Fraction of the step, 0 for the positions themselves.
+    /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions.
     share: f32,
     sums: Sums,
     by_target: f32,
-    /// Multipliers mu / s in place of the stored ones.
+    /// True if the stored Lagrange multipliers are to be replaced by mu / s. mu is the barrier weight, s the excess
+    /// of a level (logarithm of a hop's SIR in one direction) over the target.
     resets: bool,
     convex: bool,
     tries: u8,
@@ -210,7 +236,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         iterations: 0,
     };
 
-    /// Starts from the positions given by [`Interior::put`], which may be `close` to the result.
+    /// Starts the interior-point method from the positions that [`Interior::put`] has set. `is_close` is true if they
+    /// are close to the result; the barrier weight is then smaller at first.
     pub(super) fn start(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -223,7 +250,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.look(true);
     }
 
-    /// Sets the position of relay `index`, with a margin to the box as a fraction of its width.
+    /// Sets relay `index` to `place`, but at least `margin` inside the limits of its coordinates. `margin` is a
+    /// fraction of the distance between a coordinate's lower and upper limit.
     pub(super) fn put(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -238,7 +266,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.settle(chain, index, spot.at);
     }
 
-    /// Stores the position of relay `index`.
+    /// Stores the position (x, y, h) of relay `index`, in units of the distance from Tx to Rx.
     #[inline(never)]
     fn settle(
         &mut self,
@@ -257,14 +285,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Stores two lengths for relay `index` while no step is computed.
+    /// Stores two values for relay `index` during Algorithm 1, m: its x, and the upper limit of its x. They take the
+    /// memory of a hop's levels, so they are lost when the interior-point method runs.
     pub(super) fn note(&mut self, index: u16, lengths_m: [f32; 2]) {
         if let Some(node) = self.node(index) {
             node.hop.level = lengths_m;
         }
     }
 
-    /// Returns the two lengths stored for relay `index`; 0 for Tx.
+    /// Returns the two values, m, that [`Interior::note`] has stored for relay `index`; 0 for Tx.
     pub(super) fn noted(&self, index: u16) -> [f32; 2] {
         let node = self.nodes.get(usize::from(index).wrapping_sub(1));
         node.map_or([0.0; 2], |node| node.hop.level)
@@ -274,7 +303,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.nodes.get_mut(usize::from(index).wrapping_sub(1))
     }
 
-    /// Returns the position and the box of node `index`, 0 for Tx and N + 1 for Rx.
+    /// Returns the stored position of node `index` and its limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
         if index > chain.mission.relays() {
@@ -294,7 +323,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the step of relay `index`.
+    /// Returns the stored Newton step of relay `index`; 0 for Tx.
     fn step_of(&self, index: u16) -> Triple {
         let at = usize::from(index).wrapping_sub(1);
         let (segment, k) = (at / (FIRST + SECOND), at % (FIRST + SECOND));
@@ -307,7 +336,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         step.map_or([0.0; 3], |step| step.map(widened))
     }
 
-    /// Returns the position of node `index` after the fraction of its step.
+    /// Returns the position and limits of node `index` after the tried fraction of its Newton step.
     #[inline(never)]
     fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
@@ -318,7 +347,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns hop `k`, 1..=N + 1.
+    /// Returns the levels and multipliers of hop `k`, 1..=N + 1. Hop k leads to relay k, the last one to Rx.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -327,7 +356,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of the positions themselves, with new multipliers or the stored ones.
+    /// Begins to evaluate the stored positions without a step. If `resets`, new Lagrange multipliers then replace the
+    /// stored ones.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -340,7 +370,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Processes one portion of the work; ready with T, the logarithm of an SIR, at the end.
+    /// Processes one portion of the interior-point method. Ready at its end with a target in ln(SIR), slightly below
+    /// what the stored positions reach. Each forward SIR is above it, and each backward SIR over r, the required
+    /// ratio of backward to forward SIR.
     pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let relays = chain.mission.relays();
         let done = match self.work {
@@ -388,7 +420,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes levels from hop `k` on, and the logarithms of the distances to the box.
+    /// Computes the levels of ten hops from hop `k` on, and adds to the barrier the limits of their ends. The levels
+    /// are ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The barrier
+    /// is the sum of the logarithms of the distances to all limits.
     fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -419,9 +453,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes T from its equation, by Newton's method for the inverse of the sum.
+    /// Computes the target T, at which the sum of mu / (c - T) over all levels c is 1. mu is the barrier weight, and
+    /// a level is the logarithm of a hop's SIR in one direction.
     ///
-    /// That inverse is concave, and T starts beyond the solution, so T falls to it.
+    /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to
+    /// it.
     fn approach(&mut self, relays: u16, steps: u8) {
         let end = steps + STEPS;
         self.work = Work::Target(end);
@@ -444,7 +480,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the slacks and multipliers of hop `k`.
+    /// Returns the Lagrange multipliers of hop `k`, the slacks of its levels, and the barrier weight mu. A slack is a
+    /// level (logarithm of the hop's SIR in one direction) minus the target.
     fn weights(&mut self, relays: u16, k: u16) -> Weights {
         let (target, mu) = (self.target, self.mu);
         let Hop { level, lambda } = *self.hop(relays, k);
@@ -455,7 +492,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts or refuses a step.
+    /// Accepts the tried step if it does not lower the merit (target plus barrier); else shortens the step. After the
+    /// last try the step is computed again without negative curvature, and after that the barrier weight falls.
     fn judge(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -477,12 +515,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the merit that was summed.
+    /// Returns the merit of the tried positions: the target plus the barrier's sum times its weight mu.
     fn summed(&self) -> f32 {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k`, and keeps the multipliers of the hop to it close to mu / s.
+    /// Stores the new position of relay `k`, and limits the multipliers of the hop that ends there. A multiplier
+    /// stays within a factor of mu / s; mu is the barrier weight, s the excess of a level (logarithm of the SIR) over
+    /// the target.
     fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         if self.share > 0.0 && k <= relays {
@@ -501,7 +541,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Begins the next step from the accepted positions, or lowers mu.
+    /// Begins the next Newton step from the accepted positions, or lowers the barrier weight mu. After the maximum
+    /// number of steps it ends: ready with the target, in ln(SIR).
     fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -520,7 +561,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers mu, or ends. `resets` is for multipliers that no step was found with.
+    /// Lowers the barrier weight mu and continues; after the last mu, ready with the target, in ln(SIR). `resets` is
+    /// true to replace the Lagrange multipliers, after no step with them raised the merit (target plus barrier).
     fn lower(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -536,7 +578,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the derivatives and weights of hop `k` between `ends`.
+    /// Returns the derivatives of the levels of hop `k` by its `ends`, and its multipliers and slacks. A level is the
+    /// logarithm of the hop's SIR in one direction, and its slack the excess over the target.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
@@ -544,8 +587,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         (hop, weights)
     }
 
-    /// Eliminates the first `count` relays of `segment`. Returns the rows of the relay after them, and keeps the last
-    /// factors.
+    /// Eliminates the first `count` relays of `segment` from the Newton system. Returns the rows of the relay after
+    /// them, or `None` if a pivot is not positive. `factors` receives the results of the last six eliminated relays.
     #[inline(never)]
     fn eliminate(
         &mut self,
@@ -578,7 +621,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(front)
     }
 
-    /// Eliminates the relays of `segment`, and then begins the next segment or the substitution.
+    /// Eliminates all relays of `segment`, then begins the next segment or the computation of steps. `None` if the
+    /// Newton system cannot be solved.
     fn forward(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -604,7 +648,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Computes the steps of one part of `segment` from its last relay to its first. `None` if one is not finite.
+    /// Computes the Newton steps of one part of `segment`, from its last relay to its first. `None` if the system
+    /// cannot be solved or a step is not finite.
     fn substitute(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -655,7 +700,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Shortens all steps so that the `step` from `spot` stays in the box.
+    /// Shortens the Newton steps of all relays, so that the `step` of the relay at `spot` keeps its limits.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let spans = (spot.below(), spot.above());
         for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
@@ -667,7 +712,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Updates the multipliers of hop `k`, whose `ends` move by the steps `from` and `to`.
+    /// Updates the Lagrange multipliers of hop `k` for the whole Newton steps `from` and `to` of its ends. `ends` are
+    /// their positions before the steps.
     fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
         let (hop, weights) = self.derivatives(relays, k, ends);
         let ([a, b], [c, d]) = (&hop.by_from, &hop.by_to);
@@ -679,7 +725,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns the number of levels of a chain.
+/// Returns the number of levels: two for each hop, the logarithms of its forward and backward SIR.
 fn levels(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> f32 {
     2.0 * f32::from(chain.mission.relays() + 1)
 }

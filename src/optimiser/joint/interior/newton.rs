@@ -26,35 +26,38 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest pivot, relative to the diagonal before the elimination.
+/// Smallest pivot that counts as positive, relative to the diagonal element before the elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
-/// Curvature that holds a coordinate without room.
+/// Curvature of a coordinate whose two limits are equal. It is so large that the Newton step does not move it.
 const STIFF: f32 = 1e18;
 
-/// Rows of one relay, without the hop to the next relay, after the elimination of all relays before.
+/// Rows of the Newton system for one relay, after the elimination of all relays before. The hop from this relay to
+/// the next one is not yet included.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Symmetric,
     slope: Triple,
     column: Triple,
-    /// Amount that the elimination has subtracted from the diagonal.
+    /// Amount that the elimination of the relays before has subtracted from the diagonal of `bend`.
     taken: Triple,
 }
 
-/// Column of B of the next relay, and coordinate of u of g and of q.
+/// Row of the equation for one coordinate of an eliminated relay, divided by its Cholesky factor. The first three
+/// values are for the next relay's x, y and h. The last two are right sides: for a constant target, and per unit that
+/// the target changes.
 type Row = [f32; 5];
 
-/// Factors of one relay.
+/// Equations of one relay after its elimination, from which its Newton step follows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// L: inverse of xx, yx, hx, inverse of yy, hy, inverse of hh.
+    /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh.
     lower: [f32; 6],
-    /// x, y and h.
+    /// Rows of the equations for the relay's x, y and h.
     rows: [Row; 3],
 }
 
-/// Sums that give dT.
+/// Sums over all hops and relays from which the Newton step of the target follows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,
@@ -62,7 +65,9 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Multipliers of both levels of a hop, and their slacks.
+/// Lagrange multipliers of both levels of a hop, and their slacks. The levels are ln(forward SIR) and ln(backward SIR
+/// / r); r is the required ratio of backward to forward SIR. A slack is a level minus the target; `mu` is the barrier
+/// weight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -71,18 +76,21 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns lambda / s of both levels.
+    /// Returns Lagrange multiplier over slack for both directions of the hop. A slack is the excess of ln(SIR) over
+    /// the target.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns mu / s of both levels.
+    /// Returns the barrier weight mu over the slack for both directions of the hop. At the optimum for one mu the
+    /// Lagrange multipliers have these values. A slack is the excess of ln(SIR) over the target.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the multipliers after a step that changes the slacks by `change`.
+    /// Returns the Lagrange multipliers after a Newton step that changes the two slacks by a and b. A slack is the
+    /// excess of ln(SIR) over the target.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -97,10 +105,11 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates a relay with these rows, and makes them those of the next node, which is at `spot`.
+    /// Eliminates the relay before `hop` from the Newton system. `self` has the rows of that relay, and then those of
+    /// the node at `spot`, where `hop` ends.
     ///
-    /// `hop` leads to that node. Without a relay before the hop, its factors are 0. `None` if a pivot is not positive;
-    /// if the system is `convex`, such a pivot is a rounding error, and is raised.
+    /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
+    /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
     pub(super) fn pass(
         &mut self,
         is_relay: bool,
@@ -141,7 +150,7 @@ impl Front {
         add_scaled(&mut self.column, slope, ratio);
     }
 
-    /// Adds the barrier of the box.
+    /// Adds the derivatives of the barrier that keeps the relay at `spot` between its limits.
     fn enclose(&mut self, mu: f32, spot: &Spot) {
         let ([a, b, c], [d, e, f]) = (spot.below(), spot.above());
         let [xx, _, _, yy, _, hh] = &mut self.bend;
@@ -151,7 +160,8 @@ impl Front {
         barrier(mu, c, f, h, hh);
     }
 
-    /// Adds the hop to the next relay, and eliminates this relay. `None` if a pivot is not positive.
+    /// Adds the hop to the next node to this relay's rows, and eliminates this relay. `None` if a pivot is not
+    /// positive.
     fn eliminate(
         &mut self,
         hop: &Derivatives,
@@ -183,7 +193,8 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the part of the relay before, whose factors are known, and adds it to the sums.
+    /// Subtracts the contribution of the eliminated relay before from this node's rows. `factor` is the result of
+    /// that elimination. Products of its values are added to `sums`, from which the target's Newton step follows.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -215,7 +226,8 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of mu (ln a + ln b); a and b are the distances of a coordinate to its limits.
+/// Adds the derivatives of mu (ln a + ln b), the barrier of one coordinate; the second one negated. a and b are the
+/// distances of the coordinate to its lower and upper limit, mu the barrier weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
@@ -227,7 +239,7 @@ fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     }
 }
 
-/// Adds `weight` a b' to the first columns of `rows`.
+/// Adds the matrix `weight` a b' to the first three columns of `rows`. b' is the transpose of the vector b.
 #[inline(never)]
 fn add_product(rows: &mut [Row; 3], a: &Triple, b: &Triple, weight: f32) {
     for ([x, y, h, ..], a) in rows.iter_mut().zip(a) {
@@ -239,7 +251,7 @@ fn add_product(rows: &mut [Row; 3], a: &Triple, b: &Triple, weight: f32) {
     }
 }
 
-/// Subtracts `part` times `from` from `to`, and multiplies the result by `scale`.
+/// Subtracts `part` times the row `from` from the row `to`, and multiplies the row `to` by `scale`.
 #[inline(never)]
 fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
     for (cell, from) in to.iter_mut().zip(from) {
@@ -247,7 +259,8 @@ fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
     }
 }
 
-/// Returns L'^-1 v.
+/// Returns the solution z of L' z = v. L' is the transpose of the Cholesky factor L, the first argument. The vector v
+/// is the second.
 fn backward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
     let z = z * f;
     let y = (y - e * z) * d;
@@ -260,7 +273,7 @@ impl Factor {
         rows: [[0.0; 5]; 3],
     };
 
-    /// Returns the relay's step, for `by_target` dT and the step of the next relay.
+    /// Returns this relay's Newton step, from the target's step `by_target` and the next relay's, `next`.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
         let known = (self.rows)
             .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));
@@ -275,7 +288,7 @@ impl Sums {
         column: 0.0,
     };
 
-    /// Returns dT. `None` if the system is singular.
+    /// Returns the Newton step of the target. `None` if the system has no maximum, so that there is no step.
     pub(super) fn by_target(&self) -> Option<f32> {
         let rest = self.sigma - self.column;
         (rest > 0.0).then(|| self.slope / rest)

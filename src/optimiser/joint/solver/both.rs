@@ -23,23 +23,26 @@ use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
 use core::task::Poll;
 
-/// Relays of one portion of Algorithm 1, and of one that sets positions.
+/// Number of relays that one portion of Algorithm 1 takes. The algorithm computes the x of all relays for one target.
 const LINE: u16 = 2;
+/// Number of relays whose initial positions one portion of the work sets.
 const PUT: u16 = 20;
 
-/// Share of even spacing in initial positions, which separates relays that share one. Also their margin to the
-/// limits. At a start, and for a repetition.
+/// Fraction by which the initial x of relays move toward even spacing, to separate relays at one x. It is also the
+/// relays' minimum distance to their limits, as a fraction of the permitted range. The first value is for a first run
+/// of the interior-point method, the second for its repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
-/// Initial chain, from the end with more power to the other one.
+/// Initial chain of the search, described from the end (Tx or Rx) with more power to the other end.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offset away from the interferer, as a fraction of the permitted one. At the first, the middle and the
-    /// last relay.
+    /// Lateral offsets away from the interferer, as fractions of the largest permitted one. The values are for the
+    /// first, the middle and the last relay.
     aside: [f32; 3],
-    /// Altitude of the first and the last relay, as a fraction of the band.
+    /// Altitudes of the first and the last relay: 0 is the lowest permitted one, 1 the highest.
     up: [f32; 2],
-    /// Ends of even spacing, in units of D; `None` for the x of Algorithm 1.
+    /// First and last x of evenly spaced relays, as fractions of the distance from Tx to Rx. They are counted from
+    /// the end with more power. `None` if Algorithm 1 computes all x.
     even: Option<[f32; 2]>,
 }
 
@@ -72,7 +75,8 @@ const STARTS: [Start; 5] = [
 ];
 
 impl Start {
-    /// Returns the cross-section in `room` of the relay at `share` of the chain, 0 to 1.
+    /// Returns the lateral offset and altitude in `room` of the relay at `share` of this initial chain. `share` is 0
+    /// for the relay at the end with more power (Tx or Rx), and 1 for the relay at the other end.
     fn cross_section(self, interferer: &Interferer, share: f32, room: Room) -> CrossSection {
         let Room { lateral, band } = room;
         let ([near, middle, far], [first, last]) = (self.aside, self.up);
@@ -98,36 +102,40 @@ impl Start {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// Positions of a start.
+    /// The search finds the highest target that an initial chain meets.
     Start,
-    /// Result of the interior-point method.
+    /// The search finds the highest target at the lateral offsets and altitudes of an interior-point run.
     Result,
-    /// Exact target of the best chain.
+    /// The search finds the highest target of the best chain more exactly, at the end of the solution.
     Last,
 }
 
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Cross-sections of a start, after this relay.
+    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays that are
+    /// done.
     Begin(u16),
-    /// Search for the target at the current cross-sections.
+    /// Search for the highest target that Algorithm 1 meets at the current lateral offsets and altitudes.
     Seek(Seek, Purpose),
-    /// Positions for this target.
+    /// Computation of the x of all relays by Algorithm 1 for this target, in ln(SIR).
     Settle(f32),
-    /// First positions of the interior-point method, after this relay.
+    /// Choice of the positions at which the interior-point method starts. The field is the number of relays that are
+    /// done.
     Put(u16),
     Interior,
 }
 
-/// Current relay of a pass of Algorithm 1 for one target.
+/// Progress of Algorithm 1 for one target: in its pass from Tx to Rx, or in its pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
-    /// Next relay, from 0 on, and true on the way back.
+    /// Index of the last relay that the pass has computed; 0 before the first and at the end.
     index: u16,
+    /// True during the pass back to Tx.
     is_back: bool,
-    /// Reach of the relay before, or required position of the relay, m.
+    /// x of relay `index`, m: the farthest that meets the target, or in the pass back its final x.
     x_m: f32,
+    /// Upper limit of the x of relay `index`, m, which leaves the relays after it their separation.
     end_m: f32,
 }
 
@@ -140,24 +148,26 @@ impl Pass {
     };
 }
 
-/// Solver of a chain with a way back.
+/// Solver of a chain that carries data in both directions.
 #[derive(Clone, Debug)]
 pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) interior: Interior<RELAYS, SEGMENTS>,
-    /// Best target found, in ln(SIR), and its lateral offsets and altitudes.
+    /// Best target found, in ln(SIR); `None` before the first.
     best: Option<f32>,
+    /// Lateral offsets and altitudes of the chain that meets the best target.
     best_cells: Cells<RELAYS>,
     work: Work,
     pass: Pass,
-    /// Result of the interior-point method, in ln(SIR), and number of its repetitions from this start.
+    /// Target that the last run of the interior-point method has reached, in ln(SIR).
     reached: f32,
+    /// Number of runs of the interior-point method from x of Algorithm 1, for the current initial chain.
     again: u8,
-    /// Number of the current start; 0 is the common altitude.
+    /// Number of the current initial chain. In chain 0 all relays are at the common altitude.
     number: u8,
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
-    /// State before the first portion. All its bytes are 0, so it takes no flash.
+    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
     pub(super) const NEW: Self = Self {
         interior: Interior::NEW,
         best: None,
@@ -169,7 +179,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         number: 0,
     };
 
-    /// Processes one portion. It is two relays of Algorithm 1, ten of a step, or twenty of a merit.
+    /// Processes one portion of the solution; ready with the target SIR, linear, at the end. A portion is two relays
+    /// of Algorithm 1, ten relays of a Newton step, or twenty relays of other work.
     pub(super) fn step(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -229,7 +240,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Begin(0)
     }
 
-    /// Begins the next start, or the last search after all of them. The first `done` relays have their cross-sections.
+    /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. The first `done`
+    /// relays have theirs already. After the last initial chain, the next work is the final search for the best
+    /// chain's target.
     fn begin_start(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -266,14 +279,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the current start; the first one for the common altitude. `None` after the last one.
+    /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
+    /// altitude, gets that of chain 1, of which it uses nothing but that its x are those of Algorithm 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
     }
 
-    /// Keeps the current positions if they are the best, and returns the next step of the work. If Algorithm 1 has
-    /// found new positions, that is the interior-point method from there.
+    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best one; returns the next work. If
+    /// Algorithm 1 has found positions worth an improvement, the next work leads to another run of the interior-point
+    /// method. Otherwise it is the next initial chain.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);
@@ -292,8 +307,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the interior-point method at the cells, with x of a pass or evenly spaced. The first `done` relays are
-    /// there.
+    /// Chooses the positions at which the interior-point method starts, and starts it. The lateral offsets and
+    /// altitudes are the stored ones. Each x is that of Algorithm 1, or evenly spaced. The first `done` relays have
+    /// their positions already.
     fn begin_interior(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -329,7 +345,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Interior
     }
 
-    /// Continues Algorithm 1 for `sigma`. Ready with `Some` if all relays have positions; their x is noted.
+    /// Continues Algorithm 1 by two relays, for the target `sigma`, in ln(SIR). Ready with `Some` once all relays
+    /// have an x, which is stored; ready with `None` if the target cannot be met.
     fn line(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -356,7 +373,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Computes the reach of the next relay.
+    /// Computes the farthest x at which the next relay toward Rx meets `target`. The last relay gets its final x.
+    /// `None` if the target cannot be met.
     fn line_there(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -384,7 +402,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Computes the position of the relay before the current one, which is at `pass.x_m`.
+    /// Computes the final x of the relay before relay `pass.index`, which is at `pass.x_m`. `None` if `target` cannot
+    /// be met.
     fn line_back(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -404,7 +423,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Returns relay `index` in a pass of Algorithm 1, as the relay itself will compute it.
+    /// Returns relay `index` and the hop to it for Algorithm 1, computed exactly as the relay will do it.
     fn line_link<'a>(
         &self,
         chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
@@ -433,16 +452,18 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if Rx has more power than Tx.
+/// Returns true if Rx has more power than Tx. The initial chains are then described from Rx.
 fn is_turned(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> bool {
     let config = chain.mission.config();
     config.rx_power_w > config.tx_power_w
 }
 
-/// Gain of Algorithm 1, in ln(SIR), above which the interior-point method is repeated. Then the number of
-/// repetitions.
+/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1
+/// meets at the last result's lateral offsets and altitudes, less the target that the method itself has reached.
 const NEW: f32 = 3e-4;
+/// Maximum number of runs of the interior-point method from x of Algorithm 1, per initial chain.
 const AGAIN: u8 = 4;
 
-/// Distance of the first target above the interior-point method's, in ln gamma: its m mu.
+/// Distance of the first target to try above the result of the interior-point method, in ln(SIR). It is as much as
+/// the method may miss a local optimum by.
 const ABOVE: f32 = 1e-4;

@@ -132,8 +132,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// Target at which the improvement of the current chain ended, in ln(SIR). The search for the highest target that
     /// the chain meets starts there. `None` before the end, and if the improvement was cut short.
     judged_at: Option<f32>,
-    /// True if no comparison with the best chain has cut the current chain's improvement short. A repetition of the
-    /// improvement would then give the same chain.
+    /// True if the current chain's improvement was not ended early for being worse than the best chain. A repetition
+    /// would then give the same chain, so that it can be omitted.
     is_whole: bool,
     /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
     /// relays try other positions.
@@ -160,7 +160,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// State before the first portion. All its bytes are 0, so it takes no flash.
+    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
     const NEW: Self = Self {
         number: 0,
         start: Start::Arch {
@@ -234,14 +234,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of states for both directions: 0 without the features `altitude` and `reverse`.
+/// Number of solvers for both directions: 1 with the features `altitude` and `reverse`, else 0.
 const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
     1
 } else {
     0
 };
 
-/// States of the two solvers, which share their memory.
+/// State of the solver for one direction, or of that for both. A mission needs only one, so they share their memory.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -263,7 +263,7 @@ enum Way<const RELAYS: usize, const SEGMENTS: usize> {
 pub struct Solver<const RELAYS: usize, const SEGMENTS: usize>(Way<RELAYS, SEGMENTS>);
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
-    /// Solver before [`Solver::begin`].
+    /// Initial state of the solver, before [`Solver::begin`] prepares it for a mission.
     pub(crate) const NEW: Self = Self(Way::OneWay(OneWay::NEW));
 
     /// Creates a joint solver. `None` in an interference field, for more than `RELAYS` relays, or without the feature
@@ -273,7 +273,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solver.begin(mission).then_some(solver)
     }
 
-    /// Selects the directions of `mission`, in place. False if the chain cannot be solved.
+    /// Prepares the solver for the directions of `mission`; returns false if it cannot solve the chain. It cannot in
+    /// an interference field, or with too many relays.
     #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
         if mission.reverse() > 0.0 {
@@ -313,8 +314,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Continues to solve the chain by one bounded step. A step takes ten relays of a pass that moves them, or twenty
-    /// relays of any other pass. For both directions it takes two relays of Algorithm 1.
+    /// Continues to solve the chain by one bounded step. For one direction a step takes ten relays of a pass that
+    /// moves them, or twenty of another pass. For both directions it takes at least two relays.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
