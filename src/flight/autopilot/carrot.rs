@@ -434,7 +434,9 @@ impl Target {
 mod tests {
     use heapless::Vec;
 
-    use super::{Carrot, Pace, length};
+    use super::{Carrot, Kind, Pace, Target, length};
+    use crate::flight::axis::Axis;
+    use crate::geodetic::{Geodetic, Sites};
     use crate::guard::config::GuardConfig;
     use crate::mission::Mission;
     use crate::mission::tests::paper;
@@ -554,6 +556,52 @@ mod tests {
             }
             assert!(carrot.is_standing(), "{after}");
         }
+    }
+
+    /// Returns how often reports of a moving target count as another target, in 20 s.
+    ///
+    /// The autopilot reports twice a second. A report is `lag` reports of 100 ms old and `aside_m` beside the target.
+    fn other_targets(lag: usize, aside_m: f32) -> usize {
+        let site = |lat_e7| Geodetic {
+            lat_e7,
+            lon_e7: 85_400_000,
+            amsl_mm: 420_000,
+        };
+        let sites = Sites {
+            tx: site(474_000_000),
+            rx: site(474_090_000),
+        };
+        let axis = Axis::between(sites).unwrap();
+        let to = Placement::on_line(900.0, 20.0);
+        let mut target = Target::at(Placement::on_line(100.0, 20.0), Instant::ZERO);
+        let mut sent: Vec<Placement, 256> = Vec::new();
+        let mut others = 0;
+        for i in 0..200 {
+            let now = Instant::from_millis(100 * i);
+            target.carrot.advance(now, to, Pace::default(), None);
+            _ = target.should_send(now, Kind::ArduCopter);
+            _ = sent.push(target.carrot.place);
+            if i % 5 == 0 {
+                let old = sent[sent.len().saturating_sub(1 + lag)];
+                let said = Placement {
+                    y_m: old.y_m + aside_m,
+                    ..old
+                };
+                let point = axis.point(said).unwrap();
+                let differs = target.compare(now, &axis, point.lat_e7, point.lon_e7);
+                others += usize::from(differs);
+            }
+        }
+        assert!(!target.carrot.is_standing());
+        others
+    }
+
+    /// Checks that an autopilot that reports a moving target late does not count as refusing it.
+    #[test]
+    fn a_moving_target_that_is_reported_late_is_no_other_target() {
+        assert_eq!(other_targets(0, 0.0), 0);
+        assert_eq!(other_targets(9, 0.0), 0);
+        assert_eq!(other_targets(0, 20.0), 1, "reported once");
     }
 
     #[test]

@@ -679,6 +679,12 @@ mod tests {
             !after.is_late(at(5_200)) && after.is_late(at(5_100) + Duration::from_millis(1_500))
         );
     }
+
+    /// Checks that messages may be old as long as no TIMESYNC request has been sent.
+    #[test]
+    fn the_delay_is_unknown_before_the_first_request() {
+        assert!(Echo::default().is_late(Instant::ZERO));
+    }
 }
 
 #[cfg(test)]
