@@ -1,7 +1,7 @@
 //! Tests of the guard's rules, with messages passed by hand.
 
 use crate::guard::config::{Geofence, GuardConfig};
-use crate::guard::own::ReachableInterval;
+use crate::guard::own::{Own, ReachableInterval};
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
 use crate::side::Side;
@@ -569,4 +569,23 @@ fn a_relay_out_of_order_grants_nothing() {
     one.receive(Side::Upstream, 1, upstream);
     assert_ne!(one.sent(Side::Downstream).number, 0);
     assert_ne!(one.setpoint().to_bits(), 100.0_f32.to_bits());
+}
+
+/// Checks that a relay counts as held up after five reminders without a change of its setpoint.
+///
+/// The same setpoint, computed anew, does not start the count again; another one does.
+#[test]
+fn a_setpoint_that_stays_for_five_reminders_is_held_up() {
+    let mut own = Own::new(config(), 1, Instant::ZERO);
+    own.begin(at(100.0), Instant::ZERO);
+    own.target = Some(at(300.0));
+    for reminder in 1..=5 {
+        assert!(!own.is_held_up(Side::Downstream, true), "{reminder}");
+        own.count_reminder();
+        own.set_setpoint(at(100.0), Instant::from_millis(1_000 * reminder));
+    }
+    assert!(own.is_held_up(Side::Downstream, true));
+    assert!(!own.is_held_up(Side::Upstream, true));
+    own.set_setpoint(at(101.0), Instant::from_millis(6_000));
+    assert!(!own.is_held_up(Side::Downstream, true));
 }
