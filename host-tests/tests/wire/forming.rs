@@ -149,7 +149,7 @@ fn a_member_adds_its_vote() {
 
 /// Checks that the last relay decides for an earlier view if relays may have agreed on it already.
 ///
-/// As in Paxos, the value that was accepted last is proposed again. A view is the agreed membership of the chain.
+/// The value that was accepted last is proposed again, as in Paxos. A view is the agreed membership of the chain.
 #[test]
 fn a_possibly_decided_view_is_proposed_again() {
     let mut last = last_of_20(true);

@@ -10,11 +10,13 @@
 //! | `outlook` | the value function: the slack as a quadratic in a relay's position; a relay's step, and its feedback |
 //! | `site` | one relay and the hop to it: its part of the forward pass and of the backward pass; its room across the line |
 //! | `ascent` | step control: the increase of the target, and the accepted fraction of the step |
+//! | `chain` | data shared by both solvers: the chain, a segment of it, the profile of one relay |
 //! | `interior` | with a way back: the interior-point method for both directions |
 //! | `starts` | initial chains and initial targets of the ascents |
 //! | [`solver`] | the solution of a whole chain without messages |
 
 mod ascent;
+mod chain;
 mod hop;
 mod interior;
 mod outlook;
@@ -22,8 +24,9 @@ mod site;
 pub mod solver;
 mod starts;
 
+pub use chain::Seat;
 pub use site::Room;
-pub use solver::{Seat, Solver};
+pub use solver::Solver;
 
 /// Maximum number of relays for which the joint method works; 0 without the feature `altitude`.
 pub const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };

@@ -17,8 +17,8 @@
 //! The first has a convex direction, along the hop, and the second all across the direction to the interferer. In *convex* mode
 //! those are left out, so that the matrix of [`newton`](super::newton) is positive definite.
 
+use super::super::chain::{Seat, SolverContext};
 use super::super::hop::{Triple, minus};
-use super::super::solver::{Seat, SolverContext};
 use crate::sir::{Sender, transmitter_gain};
 
 /// Amount added to each squared hop length, so that its logarithm is finite. Relays may share a position. The amount

@@ -25,10 +25,10 @@
 mod hop;
 mod newton;
 
+use super::chain::{Seat, SolverContext};
 use super::hop::{Triple, minus};
 use super::outlook::{upper_half, widened};
 use super::site::{Cell, Cells};
-use super::solver::{Seat, SolverContext};
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};

@@ -10,10 +10,10 @@
 //! optimum. They are given from the end with more power on, whose signal may pass the interferer in one hop; relays away from the
 //! interferer or high are mostly better than relays close to it, since the method finds its way down but not around.
 
-use super::chain::{Seat, SolverContext};
 use super::judge::JUDGED;
 use super::passes::end_after;
 use crate::mission::Interferer;
+use crate::optimiser::joint::chain::{Seat, SolverContext};
 use crate::optimiser::joint::interior::Interior;
 use crate::optimiser::joint::site::{Cell, Cells, Room};
 use crate::optimiser::joint::starts::Seek;

@@ -3,10 +3,10 @@
 //! After a target the next start follows, with its initial shape. After the last start the polish follows: each relay in turn
 //! tries another position, where the derivatives show no gain.
 
-use super::chain::{Seat, SolverContext, far_off, last_of};
 use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
+use crate::optimiser::joint::chain::{Seat, SolverContext, far_off, last_of};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;

@@ -12,28 +12,23 @@
 //! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
 //! | `judge` | the steps after a target is found: the next start, or the polish |
 //! | `both` | the solver for both directions |
-//! | `chain` | data shared by the passes; a segment of the chain; the profile of one relay |
 //!
 //! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the work.
 
 mod both;
-mod chain;
 mod judge;
 mod passes;
 
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
+use crate::optimiser::joint::chain::{Mark, SEGMENT, STAGES, Seat, SolverContext, Stage};
 use crate::optimiser::joint::site::{Cell, Cells};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
-use chain::{Mark, SEGMENT, STAGES, Stage};
 use core::task::Poll;
 
 use both::Both;
-
-pub use chain::Seat;
-pub(super) use chain::SolverContext;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {

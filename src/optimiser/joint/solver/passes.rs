@@ -3,10 +3,12 @@
 //! A plain pass changes nothing, or gives a chain its initial shape. A pass with the sweep's rules finds the relays' positions,
 //! and whether they have to hold back.
 
-use super::chain::{SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of};
 use super::{ForwardPass, OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::AscentStep;
+use crate::optimiser::joint::chain::{
+    SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of,
+};
 use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site::{Cell, Cells, Room, Site};
