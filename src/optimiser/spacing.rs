@@ -313,7 +313,9 @@ impl Hop {
         let limit = back
             .reach(target, from_m, self.across_squared)
             .map_or(0.0, |d| from_m + d);
-        let is_met = |x: f32| self.sender(back, target, from_m, x).is_some();
+        // A sender beyond its receiver is no hop.
+        let nearest = |x: f32| from_m.min(self.before(x));
+        let is_met = |x: f32| self.sender(back, target, nearest(x), x).is_some();
         let (mut low, mut high) = (place, end_m);
         if place >= end_m || place < limit.next_down().next_down() || !is_met(place + 1e-5 * end_m)
         {
