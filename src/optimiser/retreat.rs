@@ -32,11 +32,20 @@
 //! ```
 //!
 //! Between two points of the field the right side is linear in x, so the margin is concave there, and the first x from which both
-//! directions work is a root of a quadratic. The smallest such x over all y is taken of the y that is best on the way there, of the
-//! nearest y, and of a bisection between them, because the way back prefers the nearest one. For a given x the set of y that both
-//! directions allow is exact: the y up to x + sqrt(A' / gamma - q). A range may have holes near the interferer, which are refused.
+//! directions work is a root of a quadratic. With x between two points of the field and y between two, each direction allows a convex
+//! set of (x, y). So the smallest x is at an end of the y, at the y that is best on the way there, or where both directions just meet
+//! the target, which with y = x + z is
+//!
+//! ```text
+//! z^2 = c Upsilon(y) - q = c' Upsilon(x) - q,    c = A / (gamma Upsilon(x0)),    c' = A' / (gamma Upsilon(x)).
+//! ```
+//!
+//! The right equation is linear in x and z, and leaves a quadratic for z. `longest` tries all these y. For a given x the set of y that
+//! both directions allow is exact: the y up to x + sqrt(A' / gamma - q). A range may have holes near the interferer, which are refused.
 //!
 //! Accuracy: asserted by `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` against f64.
+
+use core::cell::Cell;
 
 use crate::field::{FieldPoint, InNoise};
 use crate::mission::Mission;
@@ -44,14 +53,10 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// Number of bisection steps for the receiver's x with traffic in both directions. The first interval is from the
-/// best x for forward traffic to the best x for backward traffic.
-const HALVINGS: u8 = 6;
-
 /// Relative rounding error by which the squared length of a backward hop may exceed its maximum.
 const ROUNDING: f32 = 4e-6;
 
-/// Number of f32 steps by which a computed root is moved, at most, until the hop meets its target.
+/// Number of f32 steps by which a computed hop is shortened, at most, until it meets its target.
 const ULPS: u8 = 8;
 
 /// Hop toward Rx in an interference field, from which a pass toward Tx computes the sender's x. It is prepared for
@@ -155,44 +160,41 @@ impl<'a> Retreat<'a> {
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let place = self.onward(target, from_m, quiet)?;
         match self.back() {
-            Some((gain, heard)) => self.first(gain / target, heard, place, from_m),
+            Some((gain, heard)) => self.first(gain / target, heard, place, from_m, f32::INFINITY),
             None => Some(place),
         }
     }
 
-    /// Returns the smallest x of at least `place` at which this hop's sender receives the backward hop, m. The
+    /// Returns the smallest x in [`place`, `most_m`) at which this hop's sender receives the backward hop, m. The
     /// backward hop is sent by this hop's receiver, at x = `from_m`. `None` if there is no such x.
     ///
     /// `c` is the gain over the target for the field's largest Upsilon. At most one root for each field point in
     /// between.
     #[inline(never)] // keeps a sweep of one direction small
-    fn first(&self, c: f32, heard: HopInterference<'_>, place: f32, from_m: f32) -> Option<f32> {
+    fn first(
+        &self,
+        c: f32,
+        heard: HopInterference<'_>,
+        place: f32,
+        from_m: f32,
+        most_m: f32,
+    ) -> Option<f32> {
         let apart = self.climb_squared;
         let is_met =
             |x: f32, quiet: f32| square(from_m - x) + apart <= c * quiet * (1.0 + 0.25 * ROUNDING);
         let last = from_m - self.least_step;
-        let hop = |x: f32| (x <= last && (x < from_m || self.to_rx)).then_some(x);
-        let points = match heard {
-            HopInterference::In(field) => field.points(),
-            HopInterference::Evenly(_) => &[],
+        let hop = |x: f32| {
+            let is_hop = x <= last && x < most_m && (x < from_m || self.to_rx);
+            is_hop.then_some(x)
         };
-        let after = points.partition_point(|point| point.x_m <= place);
-        let ends = points.get(after..).unwrap_or_default().iter();
-        let ends = ends.map(|point| point.x_m).take_while(|x_m| *x_m < last);
-        let (mut start, mut level) = (place, heard.quiet(place));
-        for end in ends.chain([last]) {
-            if is_met(start, level) {
-                return hop(start);
+        let end = last.min(most_m);
+        for piece in heard.pieces(place, end) {
+            if is_met(piece.start_m, piece.level) {
+                return hop(piece.start_m);
             }
-            let quiet = heard.quiet(end);
-            let slope = if end > start {
-                (quiet - level) / (end - start)
-            } else {
-                0.0
-            };
             // With z = y - x: z^2 + 2 h z - C <= 0.
-            let h = 0.5 * c * slope;
-            let squared = c * (level + slope * (from_m - start)) - apart;
+            let h = 0.5 * c * piece.slope;
+            let squared = c * (piece.level + piece.slope * (from_m - piece.start_m)) - apart;
             let discriminant = square(h) + squared;
             if discriminant >= 0.0 {
                 let root = sqrt(discriminant);
@@ -201,17 +203,17 @@ impl<'a> Retreat<'a> {
                 } else {
                     root - h
                 };
-                let mut x = (from_m - z).max(start);
+                let (mut x, mut z) = ((from_m - z).max(piece.start_m), z);
                 for _ in 0..ULPS {
-                    if x <= end && is_met(x, heard.quiet(x)) {
+                    if x <= piece.end_m && is_met(x, heard.quiet(x)) {
                         return hop(x);
                     }
-                    x = x.next_up();
+                    z = z.next_down();
+                    x = x.next_up().max(from_m - z);
                 }
             }
-            (start, level) = (end, quiet);
         }
-        is_met(start, level).then(|| hop(start)).flatten()
+        is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
     /// Returns the largest x of the receiver, m, at which its backward hop meets `target`. The backward hop is
@@ -269,31 +271,83 @@ impl<'a> Retreat<'a> {
         if self.back().is_none() {
             return Some(there);
         }
-        let low = low.max(self.nearest());
-        let mut best: Option<Step> = None;
-        // Returns true if the way there limits the hop that ends at `to_m`.
-        let mut is_limit = |to_m: f32| {
-            let quiet = interference.quiet(to_m);
-            let from_m = self.reach(target, to_m, quiet);
-            if let Some(from_m) = from_m
-                && best.is_none_or(|best| from_m < best.from_m)
-            {
-                best = Some(Step { to_m, from_m });
-            }
-            from_m.is_some() && from_m == self.onward(target, to_m, quiet)
+        self.longest_both_ways(interference, target, low, high, there)
+    }
+
+    /// Returns the hop of [`Retreat::longest`] for both directions. `there` is that for the traffic toward Rx only.
+    #[inline(never)] // keeps a sweep of one direction small
+    fn longest_both_ways(
+        &self,
+        interference: HopInterference<'_>,
+        target: f32,
+        low: f32,
+        high: f32,
+        there: Step,
+    ) -> Option<Step> {
+        let (gain, heard) = self.back()?;
+        let (c, back) = (self.gain / target, gain / target);
+        // Smallest x of the sender so far.
+        let best_m = Cell::new(f32::INFINITY);
+        let value = |y, quiet| {
+            let place = self.onward(target, y, quiet)?;
+            let from_m = self.first(back, heard, place, y, best_m.get())?;
+            best_m.set(from_m.min(best_m.get()));
+            Some(from_m)
         };
-        let (mut near, mut far) = (low, there.to_m);
-        if !is_limit(far) && !is_limit(near) {
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (near + far);
-                if is_limit(middle) {
-                    near = middle;
-                } else {
-                    far = middle;
+        let first = value(there.to_m, interference.quiet(there.to_m)).map(|from_m| Step {
+            to_m: there.to_m,
+            from_m,
+        });
+        if first == Some(there) {
+            return first;
+        }
+        let low = low.max(self.nearest());
+        let mut best = least(interference, c, self.squares(), low, high, value).or(first);
+        let HopInterference::In(_) = interference else {
+            return best;
+        };
+        for to in interference.pieces(low, high) {
+            for from in heard.pieces(there.from_m, best_m.get().min(to.end_m)) {
+                for y in self.equal_limits([c, back], from, to).into_iter().flatten() {
+                    if let Some(from_m) = value(y, interference.quiet(y)) {
+                        best = Some(Step { to_m: y, from_m });
+                    }
                 }
             }
         }
         best
+    }
+
+    /// Returns the receiver's x within `to`, m, of the hops that just meet the target both on the way there and back.
+    /// There are at most two.
+    ///
+    /// The sender is within `from`. `gains` are those of both hops over the target.
+    fn equal_limits(&self, gains: [f32; 2], from: Piece, to: Piece) -> [Option<f32>; 2] {
+        let [c, back] = gains;
+        let (rise, back_rise) = (c * to.slope, back * from.slope);
+        let across = rise - back_rise;
+        // With the sender's x = (level - rise z) / across, and the receiver's x + z.
+        let level = back * (from.level - from.slope * from.start_m)
+            - c * (to.level - to.slope * to.start_m);
+        let h = 0.5 * back_rise * rise / across;
+        let squared = back * from.level + back_rise * (level / across - from.start_m);
+        let discriminant = square(h) + squared - self.climb_squared;
+        // Not a number if both sides of the equation are equal everywhere, or nowhere.
+        if !(discriminant >= 0.0) {
+            return [None; 2];
+        }
+        let root = sqrt(discriminant);
+        [root - h, -root - h].map(|z| {
+            let y = (level - rise * z) / across + z;
+            (y >= to.start_m && y <= to.end_m).then_some(y)
+        })
+    }
+
+    /// Returns the squared distances of [`least`]: the squared difference in altitude, and the squared minimum length
+    /// of the hop, m^2.
+    fn squares(&self) -> [f32; 2] {
+        let apart = self.climb_squared;
+        [apart, apart + square(self.least_step)]
     }
 
     /// Returns the hop of [`Retreat::longest`] for the traffic toward Rx only.
@@ -305,12 +359,15 @@ impl<'a> Retreat<'a> {
         high: f32,
     ) -> Option<Step> {
         let low = low.max(self.nearest());
-        let squares = [
-            self.climb_squared,
-            self.climb_squared + square(self.least_step),
-        ];
         let value = |y, quiet| self.onward(target, y, quiet);
-        least(interference, self.gain / target, squares, low, high, value)
+        least(
+            interference,
+            self.gain / target,
+            self.squares(),
+            low,
+            high,
+            value,
+        )
     }
 }
 
@@ -352,6 +409,48 @@ impl<'a> HopInterference<'a> {
             Self::In(field) => field.upsilon(x_m) / field.largest(),
         }
     }
+
+    /// Returns the parts of [`low`, `high`], m, in each of which Upsilon is linear in x, in ascending order.
+    fn pieces(self, low: f32, high: f32) -> impl Iterator<Item = Piece> {
+        let points = match self {
+            Self::In(field) => field.points(),
+            Self::Evenly(_) => &[],
+        };
+        let first = points.partition_point(|point| point.x_m <= low);
+        let inner = points.get(first..).unwrap_or_default().iter();
+        let ends = inner
+            .map(|point| point.x_m)
+            .take_while(move |x_m| *x_m < high);
+        let mut start_m = low;
+        ends.chain([high]).map(move |end_m| {
+            let level = self.quiet(start_m);
+            let piece = Piece {
+                start_m,
+                end_m,
+                level,
+                slope: if end_m > start_m {
+                    (self.quiet(end_m) - level) / (end_m - start_m)
+                } else {
+                    0.0
+                },
+            };
+            start_m = end_m;
+            piece
+        })
+    }
+}
+
+/// Part of the line in which Upsilon = E[1/I], the mean inverse interference power, is linear in x.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Piece {
+    /// Smallest x, m.
+    start_m: f32,
+    /// Largest x, m.
+    end_m: f32,
+    /// Upsilon at the smallest x over the field's largest Upsilon.
+    level: f32,
+    /// Change of `level` per metre.
+    slope: f32,
 }
 
 /// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equal hops it is the
