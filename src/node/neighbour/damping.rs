@@ -76,7 +76,7 @@ struct Link {
     excused: bool,
     /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
     was_down: bool,
-    /// Time between the last two losses of the link.
+    /// Time between the last two losses of the link; 0 if no earlier loss counted.
     interval: Duration,
 }
 
