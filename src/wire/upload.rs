@@ -22,8 +22,8 @@ pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
 pub struct Upload {
     version: u16,
     base: u16,
-    /// Valid parameters of the uploaded mission. Its interference is an interferer, because an interference field
-    /// cannot be uploaded.
+    /// Valid parameters of the uploaded mission. Its interference comes from a single interferer, because a mission
+    /// with an interference field (known distribution along x) cannot be uploaded.
     config: MissionConfig,
     /// Positions of Tx and Rx of this mission; `None` if relays must use those of their configuration. The positions
     /// are valid, but each relay still checks that they fit the mission.
