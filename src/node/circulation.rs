@@ -168,8 +168,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Completes the message and schedules the reply with its result. `path` leads to the initiator. At the initiator
-    /// itself it has no hops, and no reply is sent.
+    /// Completes the message and schedules the reply with its result. `path` leads to the initiator; it has no hops
+    /// if this relay is the initiator, which sends no reply.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);

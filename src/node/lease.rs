@@ -143,7 +143,7 @@ impl Lease {
         }
     }
 
-    /// Accepts `view`, which follows the view `base`. Its positions must not be used before `rest`.
+    /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before `rest`.
     ///
     /// A member of `base` that has not accepted `view` may still have a lease. No renewal completes without all
     /// members, so if this relay was a member, that lease ends by `vouched_until`. The age of an outstanding renewal

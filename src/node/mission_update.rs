@@ -365,8 +365,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Restores the stored mission `upload` after a start, and returns it. It fails if the relay is no longer
-    /// `untouched`, which it is until it takes part in the chain.
+    /// Restores the stored mission `upload` after a start, and returns it. Returns an error if `untouched` is false,
+    /// because the relay has then already taken part in the chain.
     pub(crate) fn resume(
         &mut self,
         member: &Member,
@@ -445,7 +445,8 @@ impl MissionUpdate {
     }
 
     /// Returns the configured geofence for the active mission; `None` without a guard. If the mission has Tx and Rx
-    /// positions of its own, the maximum x grows by as much as the distance from Tx to Rx.
+    /// positions of its own, their distance may differ from that in the loaded mission. The maximum x then differs by
+    /// as much.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {

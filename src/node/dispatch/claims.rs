@@ -88,7 +88,7 @@ impl Node {
     /// Returns the destination of a due claim to this relay's node number, and marks the claim as sent.
     ///
     /// `None` if no claim is due. Claims go to the two neighbours in turn. Without neighbours, on a shared channel,
-    /// they are addressed to this relay's own number.
+    /// they are addressed to this relay's own number, so that another node with this number receives them.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;

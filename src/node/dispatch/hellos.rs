@@ -225,8 +225,8 @@ impl Node {
         }
     }
 
-    /// Selects node `from` as the neighbour on `side` if it is better than the present neighbour. A node that does
-    /// not receive this relay is not selected.
+    /// Selects node `from` as the neighbour on `side` if there is none, or if the node is better. A nearer node is
+    /// better, or one that leads to more relays. A node that does not receive this relay is not selected.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);

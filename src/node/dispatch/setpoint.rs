@@ -42,7 +42,7 @@ impl Node {
     }
 
     /// Handles the report that the lost relays at `side` are not in the air any more. The guard (collision avoidance)
-    /// then avoids only the relays at that side that are members of the view.
+    /// then no longer avoids them, only the other relays of the view at that side.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
         let Member { index, mission, .. } = &self.member;
         let in_view = match side {

@@ -391,8 +391,9 @@ impl Neighbour {
         }
     }
 
-    /// Selects `candidate` as the neighbour if it is better than the present one; returns true if so. The candidate
-    /// has sent a hello, receives this relay, and has selected this relay, no node, or a node farther away.
+    /// Selects `candidate` as the neighbour if there is none, or if it is better; returns true if so. A nearer node
+    /// is better, or one that leads to more relays. The candidate has sent a hello, receives this relay, and has
+    /// selected this relay, no node, or a node farther away.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,

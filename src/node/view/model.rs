@@ -542,8 +542,8 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Of no such view more
-    /// relays may count as members than the view has.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, the relays
+    /// that count as members of such a view must not be more than its number of relays.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
             || chain.relays.iter().all(|unit| {

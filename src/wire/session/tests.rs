@@ -10,7 +10,7 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// Capacity of the session table, [`PEERS`], as a node number.
+/// Capacity of the session table ([`PEERS`]) in the type of node numbers, to count nodes with.
 const ROOM: u16 = 8;
 
 /// Silence after which a node is forgotten; the value of `Settings::dead_after`.
