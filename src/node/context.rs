@@ -249,9 +249,9 @@ pub(crate) enum LayerEvent {
 /// Changes that new measurements of the interference have caused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sensed {
-    /// The interference estimate has changed.
+    /// True if the interference estimate has changed.
     pub(crate) new_estimate: bool,
-    /// The measurements do not fit a single source of interference.
+    /// True if the measurements do not fit a single source of interference.
     pub(crate) unclear: bool,
     /// Node that was found now to measure values that contradict those of the other nodes; else `None`.
     pub(crate) faulty_sensor: Option<u16>,

@@ -141,7 +141,7 @@ pub(crate) enum Checked {
     Unsigned,
     /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Authentic frame that was received before, or that is too old to tell.
+    /// Authentic frame that was received before. Also one whose counter is so old that this is not known.
     Replayed,
     /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,

@@ -133,7 +133,8 @@ impl Hello {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node. Drawn at its start, and raised at most once while it is active.
+    /// Random claim number of the claiming node; of two nodes with one number, the larger claim wins. It is drawn at
+    /// the node's start, and raised at most once while the node is active.
     pub number: u32,
     /// Last claim number that the claiming node received from another node with its number; 0 for none.
     pub other_number: u32,

@@ -72,8 +72,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured Upsilon or the
-    /// lateral offset is encoded between the head and the list of farthest x.
+    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured interference
+    /// (Upsilon) or the lateral offset is encoded between the head and the list of farthest x.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
