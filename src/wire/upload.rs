@@ -83,8 +83,8 @@ impl core::error::Error for UploadError {}
 impl Upload {
     /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
-    /// The path-loss factor eta of the channel is clamped between mu_los and mu_nlos, because rounding can have put
-    /// it outside.
+    /// The path-loss factor eta of links to the ground is clamped between the factors with line of sight (`mu_los`)
+    /// and without (`mu_nlos`), because rounding can have put it outside.
     ///
     /// # Errors
     /// [`UploadError`] names the problem.

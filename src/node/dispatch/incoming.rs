@@ -244,8 +244,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. Reports
-    /// it.
+    /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. If several
+    /// such handshakes come in a row, the node is reported to the firmware.
     pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         if self

@@ -304,7 +304,7 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// Returns a test's start: a side without losses, the current time (1 000 s), and the default settings.
+    /// Returns the initial state of a test: a side without losses, the time 1 000 s, and default settings.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())
