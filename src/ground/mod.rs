@@ -26,7 +26,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay, 15 s, after which another node with its node number is accepted. Relays use the same time.
+/// Silence of a relay, 15 s, after which another node with its node number is accepted. Relays use
+/// `Settings::dead_after` for this purpose, which is 15 s by default.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
@@ -78,7 +79,7 @@ pub struct Ground {
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Number of the last query for the relays' mission; 0 before the first query. The answer repeats it.
+    /// Sequence number of the last query for the relays' mission, which the reply repeats. 0 before the first query.
     query_number: u16,
     flown: Option<FlownMission>,
     /// Distance of the relay that is polled now, in relays along the chain: 1 for the nearest.
@@ -92,7 +93,8 @@ pub struct Ground {
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
-    /// Clock that never runs backwards. It starts again with every upload and every query.
+    /// Clock of the station's timers, which never runs backwards. Every upload and every query sets it to the
+    /// caller's time.
     clock: MonotonicClock,
     reports: PendingReports,
     deframer: Deframer,
@@ -529,8 +531,8 @@ pub struct FlownMission {
 }
 
 impl FlownMission {
-    /// Returns true once all parameters of the mission are known. They are those received, or those loaded before
-    /// flight.
+    /// Returns true once all parameters of the mission are known. The relay has sent them, or the mission is the one
+    /// loaded before flight, which the station knows.
     pub const fn is_known(&self) -> bool {
         self.version == 0 || self.upload.is_some()
     }
@@ -618,8 +620,10 @@ impl PendingReports {
         }
     }
 
-    /// Returns the distance of the next relay to report to, at most `reach`, and the interference power, W. `None` if
-    /// no report is pending.
+    /// Returns the next relay to which the interference must be reported, and the interference power, W.
+    ///
+    /// The relay is given by its distance from the station, in relays: 1 for the nearest. Relays farther away than
+    /// `reach` are left out. `None` if no report is pending.
     pub(super) fn poll(&mut self, reach: u16) -> Option<(u16, f32)> {
         let distance = (1..=reach).find(|distance| self.pending & bit(*distance) != 0)?;
         self.pending &= !bit(distance);

@@ -38,8 +38,8 @@ const SLOW: u32 = 4;
 /// times, so it is at most eight.
 const LOG_MOST: u32 = 2;
 
-/// Wait before the first retransmission on a lossy channel, in hop times. It is longer than the time until the
-/// neighbour's reply, even the reply to a duplicate.
+/// Wait before the first retransmission on a channel that counts as lossy, in hop times. The reply of the next relay
+/// to the message, or to a duplicate of it, normally arrives earlier.
 const SOON: u32 = 4;
 
 /// Number of messages after a loss for which the channel counts as lossy.
@@ -54,12 +54,12 @@ pub(crate) enum Stage {
     Outstanding,
     /// The result of the message is known.
     Completed,
-    /// The message was cancelled after it was sent. Duplicates are answered as in `Completed`. No reply to the
-    /// message proves any more that a neighbour is alive.
+    /// The message was cancelled after it was sent. Duplicates are answered as in `Completed`, but replies to the
+    /// message no longer count as proof that a neighbour is alive.
     Cancelled,
 }
 
-/// Reply to the previous relay on the message's way.
+/// Reply to the relay from which this relay has received the message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Reply {
     /// The message has completed; the reply contains its result.
@@ -139,7 +139,8 @@ impl Circulation {
         matches!(self.stage, Stage::Outstanding)
     }
 
-    /// Returns the time at which this relay received or created the message; `None` without a message.
+    /// Returns the time at which this relay received or created the message. `None` without a message, and after it
+    /// was cancelled.
     pub(crate) const fn started_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Outstanding | Stage::Completed => Some(self.started_at),
@@ -147,7 +148,8 @@ impl Circulation {
         }
     }
 
-    /// Returns the time at which this relay knew the result of the message; `None` before.
+    /// Returns the time at which this relay knew the result of the message. `None` before that, and after the message
+    /// was cancelled.
     pub(crate) const fn completed_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Completed => Some(self.completed_at),
@@ -166,8 +168,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Completes the message and schedules the reply with its result. `path` leads to the initiator. At the initiator
-    /// itself it has no hops, and no reply is sent.
+    /// Completes the message and schedules the reply with its result. `path` leads to the initiator; it has no hops
+    /// if this relay is the initiator, which sends no reply.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -176,12 +178,12 @@ impl Circulation {
         self.repeat_reply(now, path);
     }
 
-    /// Completes the message without a reply: the initiator has nothing more to send.
+    /// Completes the message at its initiator, which sends no reply and has no further message to start.
     pub(crate) const fn close(&mut self) {
         self.stop(Stage::Completed);
     }
 
-    /// Withdraws the message: this relay forgets that it ever had it.
+    /// Withdraws the message, as if this relay had never had it. Its duplicates are not answered with a result then.
     pub(crate) const fn withdraw(&mut self) {
         self.stop(Stage::Idle);
     }
@@ -295,7 +297,7 @@ impl Circulation {
     }
 }
 
-/// Number of consecutive old messages after which the sender counts as a restarted leader.
+/// Number of consecutive messages with old sequence numbers that show that the leader has restarted.
 pub(crate) const SUSPICIOUS: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]
@@ -304,8 +306,8 @@ pub(crate) struct LateMessages(u8);
 impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
-    /// Counts a message with an old number. Returns true if it is the fourth in a row ([`SUSPICIOUS`]); the count
-    /// then starts again.
+    /// Counts a message with an old sequence number. Returns true if it is the fourth such message in a row
+    /// ([`SUSPICIOUS`]), and then counts from 0 again.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;

@@ -224,7 +224,7 @@ pub(crate) enum Ignored {
     Duplicate,
 }
 
-/// Neighbour of a relay, the next or the previous one on the way from the leader to the last relay.
+/// Neighbour of a relay: the previous or the next one, in the order from the leader to the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Peer {
     Next,
@@ -249,9 +249,9 @@ pub(crate) enum LayerEvent {
 /// Changes that new measurements of the interference have caused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sensed {
-    /// The interference estimate has changed.
+    /// True if the interference estimate has changed.
     pub(crate) new_estimate: bool,
-    /// The measurements do not fit a single source of interference.
+    /// True if the measurements do not fit a single source of interference.
     pub(crate) unclear: bool,
     /// Node that was found now to measure values that contradict those of the other nodes; else `None`.
     pub(crate) faulty_sensor: Option<u16>,
@@ -262,7 +262,8 @@ pub(crate) struct Sensed {
 pub(crate) enum ProposalOutcome {
     /// Accepted: the view has `relays` members. Its positions may be used in `usable_in` tenths of a second.
     Granted { relays: u16, usable_in: u16 },
-    /// Superseded: an earlier view was decided, and the leader's next proposal has to follow that view.
+    /// Superseded: the decision accepts another view, decided on earlier, instead of the proposed one. The leader
+    /// then proposes a view that follows the accepted one.
     Superseded,
     /// Rejected: too few relays are reachable for a quorum.
     NoQuorum,
@@ -336,8 +337,8 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the maximum time in which the first message passes `all` relays and its result comes back. It assumes that
-/// half of the frames are lost.
+/// Returns the maximum time from the leader's first pass message until its result is back there. It is computed for a
+/// chain of `all` relays in which half of the frames are lost.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

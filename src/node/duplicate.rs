@@ -80,8 +80,8 @@ pub(crate) const RAISED: u32 = 1 << 31;
 /// Wait before the first unprompted claim to this relay's node number. The next intervals double from claim to claim.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time from the start to the first unprompted claim to this relay's node number. The first agreement of a hundred
-/// relays takes about as long.
+/// Time added before the first unprompted claim to this relay's node number, after a start. It is about the time that
+/// a hundred relays need for their first agreement. A relay that becomes active again waits as long.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
 /// Maximum of the doubling intervals between unprompted claims to this relay's node number. Later claims follow every
@@ -92,9 +92,9 @@ const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 /// [`least_interval`] apart.
 const DEFENCES: u8 = 32;
 
-/// Number of claims that this relay sends after a frame, not a claim, that bears its node number.
+/// Number of claims that this relay repeats after a frame with its own node number that shows no claim.
 ///
-/// With signed frames it is the number of claims after this relay has raised its claim number.
+/// With signed frames: number of claims that it repeats after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
 
 /// Returns the minimum interval between claims of this relay. The claims of two relays and their echoes then do not
@@ -303,7 +303,8 @@ impl IndexClaims {
         }
     }
 
-    /// Schedules repeated claims in answer to `rival`, for some seconds or until `rival` is passive.
+    /// Schedules claims in answer to the claim `rival` of another node to this relay's number. They are repeated for
+    /// some seconds, or until the other node is passive; with signed frames there is only one.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {
@@ -457,8 +458,8 @@ mod tests {
         }
     }
 
-    /// Checks which of two nodes with one number becomes passive, for all rows of the state table. It tries every
-    /// order of the claim numbers, and every lease, epoch and state of the other node.
+    /// Checks which of two nodes with one number becomes passive, for all rows of the state table. It tries larger
+    /// and smaller claim numbers, with and without a lease, and each epoch and state of the other node.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();

@@ -143,7 +143,7 @@ impl Lease {
         }
     }
 
-    /// Accepts `view`, which follows the view `base`. Its positions must not be used before `rest`.
+    /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before `rest`.
     ///
     /// A member of `base` that has not accepted `view` may still have a lease. No renewal completes without all
     /// members, so if this relay was a member, that lease ends by `vouched_until`. The age of an outstanding renewal
@@ -235,11 +235,11 @@ impl Lease {
         effects
     }
 
-    /// Extends this relay's lease, because all members took part in the renewal `pulse`. The lease lasts for the
-    /// duration in `pulse`, counted from the time at which this relay forwarded it.
+    /// Extends this relay's lease after the renewal `pulse`, in which all members took part. The lease then ends when
+    /// the duration in `pulse` has passed since this relay forwarded the renewal.
     ///
-    /// A first lease is not granted if `next`, the duration in the next renewal, is more than twice as long: the
-    /// lease would expire before that renewal completes.
+    /// This relay's first lease in a view is not granted if `next`, the duration in the next renewal, is more than
+    /// twice as long as that in `pulse`. It would expire before the next renewal completes.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -395,8 +395,8 @@ mod tests {
     use crate::view::ViewId;
 
     /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
-    /// change it was in view 1, with a renewal unfinished for 40 s. The new view follows view `base` and loses no
-    /// relay.
+    /// change, the leader was in view 1, where a renewal had been unfinished for 40 s. The new view follows view
+    /// `base` and loses no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

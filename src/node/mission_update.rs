@@ -119,8 +119,8 @@ struct Uploads {
     loaded_m: f32,
     /// Range of altitudes of the mission loaded before flight, m, including the common altitude.
     loaded_band: Band,
-    /// Identifier of the last mission that was refused, by this relay, a neighbour, or a relay beyond one. `None` if
-    /// there is none.
+    /// Identifier of the last mission that a relay has refused; `None` if there is none. It was refused by this
+    /// relay, a neighbour, or a relay that is farther away.
     refused: Option<MissionId>,
     /// Present nonce in this relay's hellos, and the previous one. A mission offer must repeat one of the two.
     asked: [Asked; 2],
@@ -365,8 +365,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Restores the stored mission `upload` after a start, and returns it. It fails if the relay is no longer
-    /// `untouched`, which it is until it takes part in the chain.
+    /// Restores the stored mission `upload` after a start, and returns it. Returns an error if `untouched` is false,
+    /// because the relay has then already taken part in the chain.
     pub(crate) fn resume(
         &mut self,
         member: &Member,
@@ -390,7 +390,8 @@ impl MissionUpdate {
         }
     }
 
-    /// Returns the upload to offer to a neighbour. `None` if the neighbour's newest mission, `holds`, is as new.
+    /// Returns the upload to offer to a neighbour whose newest mission is `holds` (`None` if unknown). The result is
+    /// `None` if the neighbour's mission is not older than the upload, or if there is no upload.
     pub(crate) fn offer_for(&self, holds: Option<MissionId>) -> Option<Upload> {
         let older = holds.is_none_or(|holds| holds < self.latest);
         self.upload().copied().filter(|_| older)
@@ -435,8 +436,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Makes the Tx and Rx positions of the stored mission those of the active one. Returns true if they have
-    /// changed, which makes all relay positions invalid.
+    /// Replaces the Tx and Rx positions in use by those of the stored mission, which becomes active. Returns true if
+    /// the positions have changed, which makes all relay positions invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
@@ -444,7 +445,8 @@ impl MissionUpdate {
     }
 
     /// Returns the configured geofence for the active mission; `None` without a guard. If the mission has Tx and Rx
-    /// positions of its own, the limit of x is shifted by the difference in length.
+    /// positions of its own, their distance may differ from that in the loaded mission. The maximum x then differs by
+    /// as much.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {
@@ -458,9 +460,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the limit exceeded.
     ///
-    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. An altitude limit that
-    /// equals this relay's own fixed altitude is replaced by that of the loaded mission, because all relays must
-    /// decide alike.
+    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. A relay with a fixed
+    /// altitude may have that altitude as the lower or upper limit of its geofence. The limit of the loaded mission
+    /// then counts instead, because all relays must decide alike.
     fn encloses(
         &self,
         member: &Member,

@@ -26,8 +26,9 @@ pub enum Sample {
     },
     /// Mean interference power at a position, for the estimate of an unknown interferer.
     ///
-    /// It is averaged until its relative error is that of [`Listen`](crate::sensing::Listen). It excludes the signals
-    /// of the chain, and includes the receiver's noise, which the relay subtracts (`MissionConfig::noise_w`).
+    /// The firmware averages it until the relative error of the mean is the one in
+    /// [`Listen`](crate::sensing::Listen). It excludes the signals of the chain, and includes the receiver's noise,
+    /// which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
         /// Position of the drone at the measurement. Each coordinate differs from that of Tx by at most 100 times the
         /// distance from Tx to Rx.
@@ -84,8 +85,8 @@ impl Meter {
         }
     }
 
-    /// Adds a sample; returns true if it was accepted. `at` is relay 1's setpoint, which an SIR of the first hop
-    /// needs; `None` at other relays.
+    /// Adds a sample; returns true if it was accepted. `at` is relay 1's setpoint, by which a measured SIR of the
+    /// first hop is converted to interference; `None` at other relays.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,

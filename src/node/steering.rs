@@ -14,7 +14,7 @@ const REMINDER: Duration = Duration::from_millis(1_000);
 /// True with the feature `guard`; without it no setpoint is limited.
 const GUARD: bool = cfg!(feature = "guard");
 
-/// Setpoint control of one relay: the way to the agreed position, limited by the guard.
+/// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
 #[derive(Clone, Debug)]
 pub(crate) struct Steering {
     guard: Option<Guard>,
@@ -102,7 +102,8 @@ impl Steering {
         }
     }
 
-    /// Records at `now` if the drone follows the setpoints (`flown`). Returns true if that is a change for the guard.
+    /// Records at `now` that the drone follows the setpoints if `flown` is true, else that it does not. Returns true
+    /// if that is a change for the guard.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -133,8 +134,9 @@ impl Steering {
         }
     }
 
-    /// Removes the limits of the setpoint that lost relays at `side` cause, because they have left the air. `others`
-    /// is true if the view has more relays on that side.
+    /// Removes the limits that lost relays at `side` put on the setpoint, because these have left the air. `others`
+    /// is true if the view has relays at that side that are not lost. If none of these was received, the guard keeps
+    /// clear of all x beyond the relay's own on that side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);

@@ -604,7 +604,7 @@ impl Relay {
         self.node.round().sensing().unfit()
     }
 
-    /// Returns the number of completed rounds of Algorithm 2, and the linear SIR of the worst hop then.
+    /// Returns the number of completed rounds of Algorithm 2, and the worst hop's SIR after them, linear.
     ///
     /// `None` unless this relay is the leader and the algorithm is running.
     pub fn rounds(&self) -> Option<(u16, f32)> {

@@ -128,11 +128,11 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Replay window of one sender: its newest accepted frame counter, and the state of the 63 below it.
+/// Replay window of one sender: its newest accepted frame counter, and which of the 63 below are used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
-    /// Largest accepted frame counter of the sender, plus one.
+    /// Largest accepted frame counter of the sender, plus one; 0 before any.
     next: u32,
     /// Bit set of accepted frame counters: bit i stands for `next` - 1 - i.
     taken: u64,

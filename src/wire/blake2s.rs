@@ -119,7 +119,7 @@ fn mix(rows: &mut [[u32; 4]; 4], words: &[u32; 16], order: [u8; 8]) {
     }
 }
 
-/// Rotates the rows of the state so that its diagonals become columns.
+/// Rotates the rows of the state, a 4 x 4 matrix, so that its diagonals become columns for [`mix`].
 fn turn([_, b, c, d]: &mut [[u32; 4]; 4]) {
     *b = [b[1], b[2], b[3], b[0]];
     *c = [c[2], c[3], c[0], c[1]];

@@ -19,7 +19,8 @@ pub(crate) struct Sent {
     pub(crate) len: usize,
 }
 
-/// Frame sender and receiver of one node: node number, frame counter, and authentication sessions.
+/// End of one node's links: checks received frames, and addresses, numbers and signs the node's own. It has the node
+/// number, the frame counter, and the authentication sessions.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
     network: u16,

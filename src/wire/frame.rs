@@ -226,8 +226,9 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// Encodes a frame by COBS in place, and appends the delimiter. Returns the total length. The frame is the `len`
-/// bytes from the second one on, fewer than 254. The encoders of `cobs` need a second buffer.
+/// Encodes a frame by COBS in place, and appends the delimiter; returns the total length. The frame to encode is at
+/// `out[1..=len]`, fewer than 254 bytes. The encoders of the crate `cobs` are not used, because they need a second
+/// buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;

@@ -114,8 +114,8 @@ pub(crate) struct Session {
     epoch: u32,
     /// Silence of a node after which another node with the same node number is accepted in its place.
     gone_after: Duration,
-    /// Random number that this relay draws at its start, which claims its node number. The lower halves of this
-    /// relay's nonces count up from it.
+    /// Random claim number that this relay draws at its start. Of two nodes with the same node number, the one with
+    /// the larger claim number wins. The lower halves of this relay's nonces count up from it.
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
     last_number: u32,
@@ -141,7 +141,7 @@ pub(crate) enum Checked {
     Unsigned,
     /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Authentic frame that was received before, or that is too old to tell.
+    /// Authentic frame that was received before. Also one whose counter is so old that this is not known.
     Replayed,
     /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,

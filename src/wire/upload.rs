@@ -22,8 +22,8 @@ pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
 pub struct Upload {
     version: u16,
     base: u16,
-    /// Valid parameters of the uploaded mission. Its interference is an interferer, because an interference field
-    /// cannot be uploaded.
+    /// Valid parameters of the uploaded mission. Its interference comes from a single interferer, because a mission
+    /// with an interference field (known distribution along x) cannot be uploaded.
     config: MissionConfig,
     /// Positions of Tx and Rx of this mission; `None` if relays must use those of their configuration. The positions
     /// are valid, but each relay still checks that they fit the mission.
@@ -83,8 +83,8 @@ impl core::error::Error for UploadError {}
 impl Upload {
     /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
-    /// The path-loss factor eta of the channel is clamped between mu_los and mu_nlos, because rounding can have put
-    /// it outside.
+    /// The path-loss factor eta of links to the ground is clamped between the factors with line of sight (`mu_los`)
+    /// and without (`mu_nlos`), because rounding can have put it outside.
     ///
     /// # Errors
     /// [`UploadError`] names the problem.

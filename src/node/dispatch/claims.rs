@@ -47,10 +47,11 @@ impl Node {
         }
     }
 
-    /// Handles a claim message from node `from`. Returns false if signed frames replace claims.
+    /// Handles a claim message of node `from`, by which nodes with the same node number detect each other. Returns
+    /// false if frames are signed, because handshakes replace claims then.
     ///
-    /// A claim of that node to its own node number is sent back to it as an echo. An echo received by this relay
-    /// shows a claim to this relay's node number; the claim is compared with this relay's own.
+    /// A claim of node `from` to its own number is sent back to it as an echo. An echo that arrives here shows a
+    /// claim to this relay's number, and is compared with this relay's own claim.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -87,7 +88,7 @@ impl Node {
     /// Returns the destination of a due claim to this relay's node number, and marks the claim as sent.
     ///
     /// `None` if no claim is due. Claims go to the two neighbours in turn. Without neighbours, on a shared channel,
-    /// they are addressed to this relay's own number.
+    /// they are addressed to this relay's own number, so that another node with this number receives them.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;

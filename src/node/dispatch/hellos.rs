@@ -11,7 +11,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 use crate::wire::upload::UPLOAD;
 
-/// Mission fields of a hello: the newest mission, and how far the chain uses or refuses it.
+/// Mission fields of a hello: the newest mission, and flags that tell if it is active or refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -99,10 +99,10 @@ impl Node {
     }
 
     /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`. Node `other`
-    /// is at `side`.
+    /// is at `side`, and its neighbour must be on the opposite side of this relay.
     ///
-    /// The neighbour of `other` is on the opposite side of this relay, and the two must receive each other. Otherwise
-    /// this relay must be linked to a node nearer than that neighbour; both are then inserted together.
+    /// One more condition must hold: this relay and that neighbour receive each other; or this relay is linked to a
+    /// nearer node, and both are inserted together; or this relay's link crosses the link of `other`.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -154,7 +154,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a hello from node `from` at `side`. Both have loaded the same mission before flight.
+    /// Handles a hello from node `from` at `side`. Node `from` and this relay have loaded the same mission before
+    /// flight.
     pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let known = self.layers.view.latest_view();
@@ -210,7 +211,8 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records with `heard` if node `from` receives this relay. Reports the node if it repeatedly does not.
+    /// Records that node `from` receives this relay if `heard` is true, else that it does not. Reports the node to
+    /// the firmware if it repeatedly does not.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -223,7 +225,8 @@ impl Node {
         }
     }
 
-    /// Selects node `from` as the new neighbour on `side` if it is a better one. One-way links are ignored.
+    /// Selects node `from` as the neighbour on `side` if there is none, or if the node is better. A nearer node is
+    /// better, or one that leads to more relays. A node that does not receive this relay is not selected.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);
@@ -264,8 +267,8 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay as its own neighbour (`mutual`). If that is new,
-    /// outstanding messages are sent again.
+    /// Records if the neighbour at `side` has selected this relay as its neighbour (`mutual`). If it has done so only
+    /// now, outstanding messages are sent again, because it can answer them now.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

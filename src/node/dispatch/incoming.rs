@@ -15,7 +15,7 @@ use crate::wire::upload::UPLOAD;
 
 impl Node {
     /// Handles an intact message from node `from` at `side`. Returns false if node `from` may not send such a
-    /// message. Work: at most the positions for 16 target SIRs.
+    /// message. Work: at most the computation of this relay's positions for 16 target SIRs.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,
@@ -77,7 +77,8 @@ impl Node {
         true
     }
 
-    /// Returns true if `message` belongs to the current mission, and to the current view if necessary.
+    /// Returns true if `message` belongs to the current mission and view. The view is compared only for kinds of
+    /// messages that depend on it.
     ///
     /// Any other message is counted and answered by a hello. A pass message of another view also makes this relay
     /// request a new view.
@@ -111,8 +112,8 @@ impl Node {
         known
     }
 
-    /// Returns true if node `from` uses the same x axis, between the same positions of Tx and Rx. `digest`, in its
-    /// message, shows that. If it differs, the message is counted as rejected.
+    /// Returns true if node `from` uses the same x axis as this relay. The axis is the line from Tx to Rx, and
+    /// `digest` in the node's message identifies it. A message with another axis is counted as rejected.
     fn is_of_line(&mut self, now: Instant, side: Side, from: u16, digest: u16) -> bool {
         let same = digest == self.layers.update.line_digest(&self.member);
         if !same && self.layers.neighbours.at(side).latest_mission.is_some() {
@@ -234,7 +235,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake of node `from` at `side` that does not prove that the node receives this relay.
+    /// Handles a handshake of node `from` at `side` that does not prove that the node receives this relay. The node
+    /// signs with the right key, but counts as not receiving this relay.
     pub(crate) fn on_handshake(&mut self, side: Side, from: u16) {
         self.on_key_match(side, from);
         if self.searches() {
@@ -242,8 +244,8 @@ impl Node {
         }
     }
 
-    /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. Reports
-    /// it.
+    /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. If several
+    /// such handshakes come in a row, the node is reported to the firmware.
     pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         if self

@@ -340,9 +340,9 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` is too early, because it would leave out relays. These are about
-    /// to be linked: the proposal's sender has just been linked, and the proposal has visited fewer relays than the
-    /// last one.
+    /// Returns true if a view proposal from `side` is too early, so that it would leave out relays. Relays that are
+    /// about to be linked would be missing. This is assumed for a short time after the sender was selected as
+    /// neighbour, if the proposal has visited fewer relays than the last one.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place

@@ -95,7 +95,8 @@ impl Node {
         asked
     }
 
-    /// Handles an offer of a mission from node `from` at `side`. Both have loaded the same mission before flight.
+    /// Handles an offer of a mission from node `from` at `side`. Node `from` and this relay have loaded the same
+    /// mission before flight.
     ///
     /// An offer that repeats no recent number is answered by a hello, which the next offer can answer. After any
     /// other offer a hello is sent only if this relay has stored or refused the mission, or has a newer one.

@@ -31,7 +31,8 @@ impl Node {
         self.steer(now);
     }
 
-    /// Records if the drone follows the setpoints now (`flown`). Returns true if that is a change.
+    /// Records that the drone follows the setpoints from now on if `flown` is true, else that it does not. Returns
+    /// true if that is a change for the guard (collision avoidance).
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.steering.handle_control(now, flown);
         if is_news {
@@ -40,8 +41,8 @@ impl Node {
         is_news
     }
 
-    /// Handles the report that the lost relays at `side` have left the air. It does not concern relays that are
-    /// members of the view.
+    /// Handles the report that the lost relays at `side` are not in the air any more. The guard (collision avoidance)
+    /// then no longer avoids them, only the other relays of the view at that side.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
         let Member { index, mission, .. } = &self.member;
         let in_view = match side {

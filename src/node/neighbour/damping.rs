@@ -76,7 +76,7 @@ struct Link {
     excused: bool,
     /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
     was_down: bool,
-    /// Time between the last two losses of the link.
+    /// Time between the last two losses of the link; 0 if no earlier loss counted.
     interval: Duration,
 }
 
@@ -304,7 +304,7 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// Returns a test's start: a side without losses, the current time (1 000 s), and the default settings.
+    /// Returns the initial state of a test: a side without losses, the time 1 000 s, and default settings.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())

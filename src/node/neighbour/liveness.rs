@@ -18,11 +18,12 @@ use crate::node::context::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost.
+/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost. Fewer are enough only after a
+/// silence of the maximum duration of a lease.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor that tells a lost neighbour from lost frames. A neighbour counts as lost only after three times as many
-/// unanswered requests as in the longest recent run.
+/// Factor that tells a lost neighbour from lost frames. A neighbour counts as lost after three times as many
+/// unanswered requests as in the longest recent run, or after the maximum duration of a lease.
 const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour. It is the round trip through `all` relays,
@@ -202,8 +203,8 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`, unless the neighbour is lost. Returns true if it
-    /// is not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`. Relays send nothing while they compute, which
+    /// must not count as silence. Returns false, and does nothing, if the neighbour is lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.last_sign = now;

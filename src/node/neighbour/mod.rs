@@ -82,7 +82,8 @@ impl Neighbours {
         self.downstream.leave();
     }
 
-    /// Records on both sides that a view proposal was refused with the current neighbours.
+    /// Records on both sides that a view proposal was refused with the current neighbours. A side then causes no view
+    /// request until its neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();

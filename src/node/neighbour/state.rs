@@ -63,7 +63,7 @@ pub(crate) struct Neighbour {
     pub(super) damping: Damping,
     /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
     dropped: u16,
-    /// Previous neighbour that the selected node has replaced because it is nearer; 0 for none.
+    /// Previous neighbour, which a nearer node has replaced as the selected node; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
@@ -102,7 +102,7 @@ pub(crate) struct Neighbour {
 }
 
 impl Neighbour {
-    /// State of a side before the relay starts. It is all zeros, because any other value would be copied from flash.
+    /// State of a side before the relay starts. All values are zero, so that no copy of them is kept in flash.
     pub(super) const NONE: Self = Self {
         node: 0,
         agreed: AgreedNodes::on(0),
@@ -212,7 +212,8 @@ impl Neighbour {
         self.state == NeighbourState::Linked
     }
 
-    /// Records if the neighbour has selected this relay (`mutual`). Returns true if that is a change.
+    /// Records that the neighbour has selected this relay if `mutual` is true, else that it has not. Returns true if
+    /// that is a change.
     pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -234,8 +235,9 @@ impl Neighbour {
         self.reported_found != before
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`, if it is linked and in the view. Returns true if
-    /// so, and if the neighbour is not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`. Relays send nothing while they compute, which
+    /// must not count as silence. Returns false, and does nothing, unless the neighbour is linked, in the view and
+    /// not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -255,9 +257,11 @@ impl Neighbour {
         self.check_at
     }
 
-    /// Handles the timer of this side. Returns true if the neighbour has become lost, which needs a silence of `dead`
-    /// or more. `can_search` is true on a shared channel, where other nodes can take its place. `interval` replaces
-    /// the usual interval between heartbeat requests.
+    /// Handles the timer of this side. Returns true if the neighbour has become lost by this call.
+    ///
+    /// A neighbour is not lost before a silence of `dead`. If `can_search` is true, another node may be selected in
+    /// place of a lost neighbour, as on a shared channel. `interval` is the time between heartbeat requests; `None`
+    /// for the usual one.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -387,8 +391,9 @@ impl Neighbour {
         }
     }
 
-    /// Selects `candidate`, which has sent a hello, as the neighbour if it is better; returns true if so. The
-    /// candidate receives this relay, and has selected this relay, no node, or a node farther away.
+    /// Selects `candidate` as the neighbour if there is none, or if it is better; returns true if so. A nearer node
+    /// is better, or one that leads to more relays. The candidate has sent a hello, receives this relay, and has
+    /// selected this relay, no node, or a node farther away.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
@@ -472,7 +477,7 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes that are nearer than the candidate, without the lost next node. This relay waits
+    /// Returns the number of nodes between this relay and the candidate, without the lost next node. This relay waits
     /// longer for each of them before it selects the candidate, because a nearer node may still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
@@ -498,8 +503,8 @@ impl Neighbour {
         self.node == self.agreed.node()
     }
 
-    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. If this relay has
-    /// proposed, no relay precedes it on this side.
+    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. A relay proposes a
+    /// view only if it has no neighbour on this side, the one toward the leader.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
@@ -514,7 +519,7 @@ impl Neighbour {
         self.agreed.agree(0);
     }
 
-    /// Records that a view proposal was refused. This side then requests no new view until its neighbour changes.
+    /// Records that a view proposal was refused. This side then causes no view request until its neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
@@ -526,7 +531,7 @@ impl Neighbour {
     }
 }
 
-/// Neighbours on one side that the last view decisions are based on; 0 for none.
+/// Node numbers that the last decisions on views gave to the neighbour on one side; 0 for none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view (agreed members of the chain).
@@ -613,12 +618,12 @@ impl Neighbour {
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
-    /// Returns true if the neighbour on this side is linked and less than `distance` relays away.
+    /// Returns true if this side has a linked neighbour less than `distance` relays away that is not lost.
     pub(crate) fn links_within(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
-    /// Returns true if the neighbour on this side is linked and more than `distance` relays away.
+    /// Returns true if this side has a linked neighbour more than `distance` relays away that is not lost.
     pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }
@@ -677,8 +682,8 @@ impl Neighbour {
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Records with `received` if the node `distance` relays away receives this relay. Returns true at exactly
-    /// [`NOT_RECEIVED`] reports in a row that it does not.
+    /// Records a report of the node `distance` relays away: `received` is true if it receives this relay. Returns
+    /// true at exactly [`NOT_RECEIVED`] reports in a row that it does not.
     pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
         self.not_received.count(distance, !received, NOT_RECEIVED)
     }
@@ -696,7 +701,8 @@ impl Neighbour {
         self.forged.count(distance, true, FORGED)
     }
 
-    /// Resets the count of handshakes with another key. The node `distance` relays away has used the right key.
+    /// Resets the count of handshakes with another key, because the node has used the right key now. The node is
+    /// `distance` relays away.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
     }

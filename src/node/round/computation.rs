@@ -22,10 +22,10 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 
-/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2.
+/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. The first value is for
+/// traffic from Tx to Rx only, the second for both directions.
 ///
-/// The second value is for traffic in both directions. A call also completes the current altitude of the search grid,
-/// which is at most 24 or 194 positions more.
+/// A call also completes the current altitude of the search grid, which is at most 24 or 194 positions more.
 pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 /// True if the feature `altitude` (joint method) is on. Without it the code of the joint method is unreachable.
@@ -407,7 +407,7 @@ impl LeaderTask {
         *self = Self::Predicting(planner);
     }
 
-    /// Starts the joint method, whose solver still has to begin.
+    /// Starts the joint method with a new solver, whose first step is still to come.
     #[inline(never)] // or the stack of each step has room for a second solver
     pub(crate) fn solve(&mut self) {
         *self = Self::Solving(ChainSolver::NEW);
@@ -432,8 +432,9 @@ impl LeaderTask {
 /// interference is a field that varies along x, a call predicts only a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A hop in an
-/// interference field costs twice as much as with an interferer.
+/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A field is a known
+/// distribution of the interference. Its hops cost twice as much as with an interferer, for which the maximum is
+/// [`HOPS_AT_ONCE`].
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
 impl Computation {

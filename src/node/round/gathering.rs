@@ -42,8 +42,8 @@ impl Computation {
             }
     }
 
-    /// Starts a pass along the chain that collects the relays' own altitudes and powers, at the leader. A relay adds
-    /// its profile if it differs from the mission's common one.
+    /// Starts a pass from the leader along the chain that collects the relays' altitudes and powers. Only a relay
+    /// whose profile (altitude and power) differs from the mission's common one adds its profile to the message.
     pub(super) fn begin_gathering(&mut self, context: &Context<'_>) -> Action {
         let after = self.seats.known.unwrap_or(0);
         self.gather(context, after, OwnSeats::new())

@@ -63,7 +63,7 @@ impl Round {
     }
 
     /// Handles a message of the current mission and view. A pass message comes from the previous relay, a reply from
-    /// the next one. Work: at most this relay's positions for 16 target SIRs.
+    /// the next one. Work: at most the computation of this relay's positions for 16 target SIRs.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let before = computation.state;

@@ -102,8 +102,8 @@ const INCARNATION: u16 = 64;
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass has been started or received in this view. In the view loaded before flight, passes since
-    /// this relay's start count.
+    /// True once a pass has been started or received in this view. In the view loaded before flight, only passes
+    /// since this relay's last start count.
     begun: bool,
     late_messages: LateMessages,
 }
@@ -223,8 +223,7 @@ impl RoundState {
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass was received after the state `before`. The pass of that state must have had its
-    /// result then.
+    /// Returns true if a new pass has followed the pass of the state `before`, whose result was known then.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }

@@ -339,8 +339,8 @@ impl SweepPass {
     }
 }
 
-/// Returns a checksum of the previous relay's data in a sweep; `behind` is `None` after Tx or Rx. It distinguishes a
-/// duplicate from a sweep that a restarted relay sends with other data.
+/// Returns a checksum of the previous relay's data in a sweep. `behind` is `None` if the previous node is Tx or Rx,
+/// not a relay. The checksum distinguishes a duplicate from a sweep that a restarted relay sends with other data.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {

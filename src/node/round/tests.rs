@@ -20,7 +20,8 @@ use std::vec::Vec;
 
 const RELAYS: u16 = 3;
 
-/// Chain of three relays for the tests, with one target SIR per sweep. Its clock advances by 1 ms with each call.
+/// Chain of three relays for the tests, with one target SIR per sweep. Its clock advances by 1 ms with each call of a
+/// relay's method.
 struct Line {
     members: [Member; RELAYS as usize],
     rounds: [Round; RELAYS as usize],
@@ -87,7 +88,7 @@ impl Line {
     }
 }
 
-/// Delivers all messages between the relays until `ends` returns true for one; returns them all.
+/// Delivers messages between the relays until `ends` returns true for one. Returns the delivered messages.
 fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
     let mut all = Vec::new();
     for _ in 0..100_000 {

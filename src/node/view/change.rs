@@ -255,7 +255,8 @@ impl ViewChange {
     }
 
     /// Decides the outstanding view proposal, because this relay is the last one that can be reached. All reachable
-    /// relays have voted on it.
+    /// relays have then voted on it. If the proposal has been forwarded before, a later view is requested instead,
+    /// because two different views with the same identifier could result.
     pub(crate) fn decide(&mut self, context: &Context<'_>) -> Effects {
         let Some(proposed) = self.outstanding() else {
             return Effects::NONE;
@@ -509,7 +510,8 @@ pub(crate) struct Proposed {
     /// Node to which the proposal was forwarded; `None` before. It is never sent to a second node, because two
     /// different views with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decided view replaces. Before the decision, the newest view known to be agreed on.
+    /// View that the decided view replaces. Before the decision it is the newest view known to be agreed on, which
+    /// may still be another one.
     pub(crate) base: View,
     /// Number of relays that the proposal has reached; 0 until the decision is known.
     pub(super) reached: u16,
@@ -536,7 +538,8 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive view proposals that were refused.
     refusals: u8,
-    /// Earliest time to which a new reason can advance the next view request. Set after a refusal, else `None`.
+    /// Earliest time to which the next view request can be advanced after a refusal. A new reason for a view advances
+    /// the request. `None` if it cannot be advanced.
     not_before: Option<Instant>,
     jitter: Jitter,
 }

@@ -152,8 +152,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view `proposal` in the list of votes. If the list is full, one of its newer votes is
-    /// dropped, and the older half stays.
+    /// Records the vote on the view `proposal` in the list of votes. If the list is full, it keeps the latest four
+    /// votes, including the new one, and the earliest four.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };

@@ -516,8 +516,8 @@ impl Check {
 }
 
 impl Check {
-    /// Returns true if the agreed views form one sequence. Each one replaces another agreed view, and no two replace
-    /// the same one.
+    /// Returns true if the agreed views form one sequence. Each of them replaces the initial view or another agreed
+    /// view, and no two of them replace the same view.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {
             let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
@@ -542,8 +542,8 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, no more
-    /// relays may count as members of such a view than it has.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, the relays
+    /// that count as members of such a view must not be more than its number of relays.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule == Rule::Everybody
             || chain.relays.iter().all(|unit| {

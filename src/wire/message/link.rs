@@ -28,11 +28,11 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could be inserted between the destination and the destination's neighbour. That is its
-    /// neighbour on the side of the sender. The sender and that neighbour must receive each other.
+    /// True if the sender could be inserted between the destination and a neighbour of the destination. This is the
+    /// neighbour that the destination has selected on the sender's side.
     pub ready: bool,
-    /// Number of connected relays from the sender to the end of the chain away from the destination. It includes the
-    /// sender: 1 to 1000.
+    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are
+    /// the connected relays from the sender to the end of the chain away from the destination.
     pub behind: u16,
     /// Bit set of the nodes that the sender receives, on the side to which this message is sent. Bit i, 0 to 3,
     /// stands for the node whose number differs from the sender's by i + 1.
@@ -133,14 +133,15 @@ impl Hello {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node. Drawn at its start, and raised at most once while it is active.
+    /// Random claim number of the claiming node; of two nodes with one number, the larger claim wins. It is drawn at
+    /// the node's start, and raised at most once while the node is active.
     pub number: u32,
     /// Last claim number that the claiming node received from another node with its number; 0 for none.
     pub other_number: u32,
     /// True if the claiming node is passive because another node uses its number.
     pub passive: bool,
-    /// True for an echo of a claim that the sender received from a node with the destination's number. If two nodes
-    /// have that number, the echo tells each of them of the other's claim.
+    /// True for an echo: the sender returns a claim of a node that has the destination's number. If two nodes have
+    /// that number, both receive the echo, and so the claim of the other one.
     pub echo: bool,
 }
 

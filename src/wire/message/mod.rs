@@ -23,8 +23,8 @@ use self::parts::{Word, read, tag, write};
 use super::upload::{UPLOAD, Upload};
 use crate::guard::Fence;
 
-/// Maximum length of a sweep message's body, bytes. It has sixteen target SIRs, and a measured Upsilon or a lateral
-/// offset.
+/// Maximum length of a sweep message's body, bytes. Such a body has data for sixteen target SIRs, and the measured
+/// interference (Upsilon = E[1/I]) or a lateral offset.
 const SWEEP: usize = 88;
 
 /// Maximum length of a message body, bytes, without regard to mission offers. The longest message is the one that

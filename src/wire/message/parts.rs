@@ -8,8 +8,8 @@ use crate::mission::Profile;
 use crate::optimiser::PerTarget;
 use crate::place::Placement;
 
-/// Message tags: the first byte of a body, which names the kind of message. `SWEEP`, `MEASURED` and `ASIDE` are all
-/// sweeps.
+/// Message tags: the first byte of a body, which names the kind of message. There are three kinds of sweeps: `SWEEP`,
+/// `MEASURED` with measured interference, and `ASIDE` with a lateral offset.
 pub(super) mod tag {
     pub(crate) const SWEEP: u8 = 0;
     pub(crate) const VERDICT: u8 = 1;
@@ -74,9 +74,9 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
     }
 }
 
-/// Decodes a list of one number per target SIR; returns the list and the remaining bytes. A list whose count is
-/// padded with empty varint bytes is rejected, although postcard accepts it up to a limit that depends on the width
-/// of usize. So all nodes accept the same lists.
+/// Decodes a list of one number per target SIR; returns the list and the remaining bytes. The count before the list
+/// must be encoded in its shortest form. Postcard also accepts longer forms, up to a limit that depends on the width
+/// of `usize`, so nodes could differ in the lists that they accept.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;
@@ -87,8 +87,8 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum length or x in a message, m. It is twice the limit of 1e9 m for the last hop, so a sum of position (at
-/// most 1e6) and hop is always in range.
+/// Maximum of the x values and of the chain's spare lengths in a message, m. It is twice the 1e9 m to which the last
+/// hop is limited, so that the sum of a position (at most 1e6 m) and this hop is in range.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, Serialize, Deserialize)]

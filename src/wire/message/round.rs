@@ -18,8 +18,8 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep message of a pass along the chain: target SIRs, and the farthest x of the sender for each. Farthest means in
-/// the direction of the pass.
+/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x that meets each. Farthest means
+/// in the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, wrapping.
@@ -44,8 +44,8 @@ pub struct Sweep {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
-    /// Lower of the two middle target SIRs, or the only target. A negative sign marks a plain pass, in which every
-    /// relay takes the farthest x that meets the target.
+    /// Lower of the two middle target SIRs, or the only target; `gap` and `growth` give the other targets. A negative
+    /// sign marks a plain pass, in which every relay takes the farthest x that meets the target.
     anchor: f32,
     gap: u8,
     growth: u8,
@@ -72,8 +72,8 @@ impl SweepHead {
 }
 
 impl Sweep {
-    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured Upsilon or the
-    /// lateral offset is encoded between the head and the list of farthest x.
+    /// Encodes the sweep into `buffer`; returns its length, or `None` if it does not fit. The measured interference
+    /// (Upsilon) or the lateral offset is encoded between the head and the list of farthest x.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let (head, reaches) = (SweepHead::of(self), &self.reaches);
         match self.measured_per_w {
@@ -144,8 +144,8 @@ pub struct SweepVerdict {
     /// x that the destination must take if a target is committed, m. `None` if the destination must take the farthest
     /// x that it has reported for this target.
     pub required_x_m: Option<f32>,
-    /// True if the sender or a later relay of the pass has its own power or its own fixed altitude. They differ from
-    /// the profile that the mission has in common for all relays.
+    /// True if the power or the fixed altitude of some relay differs from the mission's common profile. This relay is
+    /// the sender or a later one of the pass.
     pub own: bool,
 }
 
@@ -200,7 +200,7 @@ pub struct OwnSeat {
 /// List of relay profiles (altitude and power), by rising index of the relays.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles, altitude and power. On the way onward it has those of the relays up to the
+/// Message that collects relay profiles, altitude and power. In a pass it has the profiles of the relays up to the
 /// sender, in the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
@@ -322,7 +322,7 @@ pub enum AdjustStep {
     Move {
         /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Method by which the relay searches a better position.
+        /// Method by which the relay searches for a better position.
         local: Local,
     },
     /// Token's action: stay for good, because Algorithm 2 has ended.
@@ -439,11 +439,12 @@ fn sir_in_range(sir: f32) -> Option<f32> {
     (0.0..=f32::MAX).contains(&sir).then_some(sir)
 }
 
-/// Length of a sensing message's body, bytes. Tag, pass, estimate, sums, interference level at Rx, and excluded node.
+/// Length of a sensing message's body, bytes: the sum of the lengths of its fields. They are the tag, the pass, the
+/// estimate, the sums, the interference level at Rx, and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: interference estimate, and sums of measurements. On the way onward the sums are those of the
-/// relays up to the sender, in the reply those of the sender and all later relays.
+/// Sensing message: interference estimate, and sums of measurements. In a pass they are the sums of the relays up to
+/// the sender, in the reply those of the sender and all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass along the chain, wrapping.
@@ -521,7 +522,7 @@ impl EstimateBody {
     }
 }
 
-/// Measurement sums on the wire. They are split into two arrays, because serde has no longer arrays.
+/// Measurement sums on the wire, as two arrays of nine numbers that are encoded one after the other.
 type SumsBody = ([f32; 9], [f32; SUMS - 9]);
 
 impl Heard {

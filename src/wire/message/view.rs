@@ -30,7 +30,8 @@ pub struct Poll {
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of the view `agreed` was polled. Exactly half of the votes are then a quorum, too.
+    /// True if the proposer of the view `agreed` was polled; for the initial view, its leader. The votes of exactly
+    /// half of the view's members are then enough for a quorum.
     pub proposer: bool,
     /// Upper bound of the remaining leases of unpolled members of the view `agreed`, in tenths of a second.
     pub lease_left: u16,

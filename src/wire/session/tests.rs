@@ -10,7 +10,7 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// Capacity of the session table, [`PEERS`], as a node number.
+/// Capacity of the session table ([`PEERS`]) in the type of node numbers, to count nodes with.
 const ROOM: u16 = 8;
 
 /// Silence after which a node is forgotten; the value of `Settings::dead_after`.
@@ -382,8 +382,8 @@ fn own_frames_are_recognised() {
     }
 }
 
-/// Checks that two nodes with the same number are detected. Node 1 accepts the one with the larger claim, and its
-/// reply tells the one with the smaller claim about the other.
+/// Checks that two nodes with the same number are detected. Node 1 accepts the node with the larger claim. Its reply
+/// to the node with the smaller claim contains the larger claim.
 #[test]
 fn the_smaller_claim_receives_the_larger_one() {
     const FAR: u32 = 1 << 20;
@@ -427,8 +427,9 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks that of two nodes with one number, the smaller claim is accepted once the other is silent. Recorded frames
-/// of the node with the larger claim are then rejected, until it sends again.
+/// Checks that of two nodes with one number, the one with the smaller claim may replace a silent one. It is accepted
+/// once the node with the larger claim is silent. Recorded frames of that node are then rejected, until it sends new
+/// ones.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

@@ -260,8 +260,8 @@ fn the_next_proposal_spreads_the_agreed_view() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Checks that the vote of a relay that does not know the newest view does not count. The relay votes before one that
-/// knows that view.
+/// Checks that the vote of a relay that does not know the newest view does not count. Relay 2, which does not know
+/// it, votes before relay 3, which does.
 #[test]
 fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);
