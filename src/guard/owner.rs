@@ -293,9 +293,9 @@ impl FenceOwner {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the smallest distance along x that the two agreed positions require, m. It is below the separation
-    /// only if the agreed positions are that close, and both relays have arrived at their lateral offsets and
-    /// altitudes.
+    /// Returns the smallest distance along x to the neighbour downstream, by both agreed positions, m. It is below
+    /// the separation only if the agreed positions are that close, and both relays have arrived at their lateral
+    /// offsets and altitudes.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -353,8 +353,8 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
-    /// Returns the pending message to the neighbour downstream; with a new fence (limit of x) if `moves`. Fences are
-    /// numbered only here, so that every numbered fence is sent.
+    /// Returns the pending message to the neighbour downstream. If `moves` is true, it may have a new fence (limit of
+    /// x). Fences are numbered only here, so that every numbered fence is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

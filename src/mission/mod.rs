@@ -655,8 +655,9 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. It is (`p_u` / `p_t`)(`mu_nlos` /
-    /// eta)((X - D)^2 + Y^2), with the powers of relay and Tx, and the interferer at (X, Y).
+    /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. The optimal position of a single
+    /// relay depends on it. It is (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2), with the powers of relay and Tx,
+    /// and the interferer at (X, Y).
     pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
@@ -748,8 +749,8 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or last hop that makes it half as long as the others at best. The SIR is gain over
-/// squared length, and is the same on all hops of the best chain.
+/// Factor on the gain of the first or last hop that makes it half as long as the other hops. In the best chain all
+/// hops have the same SIR, which is gain over squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -764,7 +765,8 @@ impl Mission {
     /// Returns the mission with another `interference`.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
-    /// `halved` is for the first and the last hop: true if that hop is to be half as long as the others.
+    /// `halved` has a flag for the first hop and one for the last: true to place the relays so that this hop is half
+    /// as long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.

@@ -21,8 +21,8 @@ pub struct Agreed {
     pub commit: u8,
     /// Committed target, linear SIR.
     pub target: f32,
-    /// Upper bound: a SIR that no chain at these altitudes has, linear. `None` with the paper's fixed step, which
-    /// excludes some chains.
+    /// Upper bound, linear: no chain at these altitudes meets this target SIR. `None` with the paper's fixed step,
+    /// whose passes do not try all chains, and for traffic in both directions.
     pub most: Option<f32>,
     /// Number of passes along the chain (sweeps) that the search took.
     pub sweeps: u32,

@@ -163,8 +163,8 @@ impl<'a> Retreat<'a> {
     /// Returns the smallest x of at least `place` at which this hop's sender receives the backward hop, m. The
     /// backward hop is sent by this hop's receiver, at x = `from_m`. `None` if there is no such x.
     ///
-    /// `c` is the gain over the target for the field's largest Upsilon. At most one root for each field point in
-    /// between.
+    /// `c` is the gain over the target for the field's largest Upsilon. Work: at most one root for each field point
+    /// from `place` to `from_m`.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(&self, c: f32, heard: HopInterference<'_>, place: f32, from_m: f32) -> Option<f32> {
         let apart = self.climb_squared;

@@ -99,7 +99,8 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change of the interference up to which a new estimate is never adopted.
+/// Mean square relative change of the interference that is too small for a new estimate. A changed level at Rx can
+/// justify one all the same.
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change of the interference up to which a new estimate is only a refinement. A refinement is
@@ -107,15 +108,15 @@ const WORTH: f64 = 1e-5;
 const CHANGE: f64 = 1e-4;
 
 /// Minimum ratio of an estimate's mean square change to that due to chance, for a stationary source. With a smaller
-/// ratio the estimate is not adopted.
+/// ratio the new estimate can only be a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
 /// Minimum ratio of an estimate's mean square change to that due to chance, for a moving source. With a smaller ratio
-/// the estimate is not adopted.
+/// the new estimate can only be a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Ratio above which a new estimate means another interferer, in a settled chain. It is the ratio of the estimate's
-/// mean square change to that due to chance. A settled chain no longer refines its estimate. The count of refinements
-/// then starts again.
+/// Minimum ratio of an estimate's mean square change to that due to chance, in a settled chain. A chain is settled
+/// after [`REFINED`] refinements; the source is stationary. A larger ratio shows another interferer: the new estimate
+/// is adopted, and may be refined again.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -171,7 +172,7 @@ pub(crate) struct Review {
     pub(crate) adopt: Option<InterferenceEstimate>,
     pub(crate) known: Knowledge,
     pub(crate) unfit: Option<Unfit>,
-    /// Result of the check which of the levels measured at Tx and Rx do not fit the relays' measurements.
+    /// Result of a check: the levels measured at Tx and Rx that do not fit the relays' measurements.
     pub(crate) ends: EndsOff,
 }
 

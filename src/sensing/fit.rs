@@ -142,7 +142,7 @@ pub struct Fit {
     expected: f64,
     /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
-    /// Number of measured positions less the number of unknowns; 0 if that is negative.
+    /// Degrees of freedom: number of measured positions less the number of unknowns; 0 if that is negative.
     beyond: f64,
     count: f64,
 }

@@ -325,7 +325,7 @@ impl Brief {
     }
 }
 
-/// Returns a finite value rounded to three digits.
+/// Compresses a finite f32 to 16 bits, which keep about three decimal digits; `widened` restores it.
 pub(super) const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

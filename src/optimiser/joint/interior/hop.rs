@@ -179,8 +179,8 @@ impl Gains {
 
     /// Returns the derivatives of hop `k`'s two levels by the positions of its ends `from` and `to`. The levels are
     /// ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The second
-    /// derivatives are summed with the `weights` of both levels, and negated. `convex` leaves out what would make
-    /// that sum indefinite.
+    /// derivatives are summed with the `weights` of both levels, and negated. If `convex` is true, terms that would
+    /// make that sum indefinite are left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -220,8 +220,8 @@ impl Gains {
     }
 
     /// Adds the derivatives of ln q by the position `at`; q is the inverse of interference plus noise. The first
-    /// derivatives are added to `slope`, and the second ones, multiplied by -`weight`, to `bend`. `convex` leaves out
-    /// what would make the second ones indefinite.
+    /// derivatives are added to `slope`, and the second ones, multiplied by -`weight`, to `bend`. If `convex` is
+    /// true, terms that would make `bend` indefinite are left out.
     fn add_quiet(
         &self,
         at: Triple,

@@ -55,7 +55,7 @@ const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Maximum fraction of the way to a coordinate's limit that a step may take.
+/// Maximum step of a coordinate toward its limit, as a fraction of its distance from that limit.
 const NEAR_BOX: f32 = 0.98;
 /// Factor by which a step is shortened for the next try, after a try that lowers the merit.
 const SHORTER: f32 = 0.4;
@@ -157,20 +157,21 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of the hops' levels from this hop on, with the positions that are tried. A level is the logarithm
-    /// of a hop's SIR in one direction.
+    /// Computation of all hops' levels at the tried positions; the field is the next hop. A level is the logarithm of
+    /// a hop's SIR in one direction.
     Levels(u16),
-    /// Computation of the target T from all levels, after this number of its Newton steps. T, in ln(SIR), is slightly
-    /// below the chain's worst SIR.
+    /// Computation of the target T from all levels; the field is the number of Newton steps already done. T, in
+    /// ln(SIR), is slightly below the chain's worst SIR.
     Target(u8),
-    /// Summation of the merit, from this hop on. The merit (target plus barrier) decides if a step is accepted.
+    /// Summation of the merit over all hops; the field is the next hop. The merit (target plus barrier) decides if a
+    /// step is accepted.
     Merit(u16),
-    /// Storage of the accepted positions, and of new Lagrange multipliers, from this hop on.
+    /// Storage of the accepted positions and of new Lagrange multipliers; the field is the next hop.
     Accept(u16),
-    /// Elimination of the relays of this segment from the Newton system.
+    /// Elimination of all relays from the Newton system; the field is the next segment of the chain.
     Eliminate(u16),
-    /// Computation of the Newton steps of the relays in one part of this segment. `true` for its second part, which
-    /// is computed before its first part.
+    /// Computation of the relays' Newton steps; the fields are the next segment of the chain and its part. `true` is
+    /// the second part, which is computed before the first one.
     Substitute(u16, bool),
 }
 
@@ -370,9 +371,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Processes one portion of the interior-point method. Ready at its end with a target in ln(SIR), slightly below
-    /// what the stored positions reach. Each forward SIR is above it, and each backward SIR over r, the required
-    /// ratio of backward to forward SIR.
+    /// Processes one portion of the interior-point method. After the last portion it is ready with a target in
+    /// ln(SIR), slightly below what the stored positions reach. Each forward SIR is above the target, and so is each
+    /// backward SIR over r, the required ratio of backward to forward SIR.
     pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let relays = chain.mission.relays();
         let done = match self.work {
@@ -420,9 +421,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds to the barrier the limits of their ends. The levels
-    /// are ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The barrier
-    /// is the sum of the logarithms of the distances to all limits.
+    /// Computes the levels of ten hops from hop `k` on, and adds the barrier terms of their ends. The levels are
+    /// ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. A barrier term
+    /// is the logarithm of the distance of an end's coordinate from its limit.
     fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -542,7 +543,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Begins the next Newton step from the accepted positions, or lowers the barrier weight mu. After the maximum
-    /// number of steps it ends: ready with the target, in ln(SIR).
+    /// number of steps the method ends: ready with the target, in ln(SIR).
     fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -562,7 +563,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Lowers the barrier weight mu and continues; after the last mu, ready with the target, in ln(SIR). `resets` is
-    /// true to replace the Lagrange multipliers, after no step with them raised the merit (target plus barrier).
+    /// true to replace the Lagrange multipliers, because no step with them has raised the merit (target plus
+    /// barrier).
     fn lower(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
