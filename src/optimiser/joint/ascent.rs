@@ -34,7 +34,7 @@ const EXCESS: f32 = 0.03;
 /// First cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. Spare length above the
 /// cap does not count, so that it cannot outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Value below which the cap on the chain's spare length at Rx is not lowered any further. It is a fraction of the
+/// Smallest cap on the chain's spare length at Rx: the cap is not lowered below this value. It is a fraction of the
 /// distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 

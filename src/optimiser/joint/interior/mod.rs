@@ -34,23 +34,25 @@ use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight mu for a start that may be far from the result, times the number of levels. A chain has two
-/// levels per hop: the logarithms of its forward and backward SIR.
+/// First barrier weight mu for all levels together, for a start that may be far from the result. mu of one level is
+/// this over the number of levels. A chain has two levels per hop: the logarithms of its forward and backward SIR.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight mu for a start close to the result, times the number of levels (two per hop).
+/// First barrier weight mu for all levels together (two per hop), for a start close to the result.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight mu, times the number of levels (two per hop). The result is within this of a local optimum, in
+/// Last barrier weight mu for all levels together (two per hop). The result is within this of a local optimum, in
 /// ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
 /// Factor by which the barrier weight mu falls once the positions have settled for the current mu.
 const LESS: f32 = 0.3;
 
-/// Gain of merit below which the barrier weight mu falls, after more than half of a Newton step. The merit is the
-/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
+/// Gain of the merit below which the positions count as settled, after more than half of a Newton step. The barrier
+/// weight mu then falls. The merit is the target plus the barrier; its gain is in units of mu times the number of
+/// levels (two per hop).
 const SETTLED: f32 = 0.1;
-/// Gain of merit below which the barrier weight mu falls, after any fraction of a Newton step. The merit is the
-/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
+/// Gain of the merit below which the positions count as settled, after any fraction of a Newton step. The barrier
+/// weight mu then falls. The merit is the target plus the barrier; its gain is in units of mu times the number of
+/// levels (two per hop).
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
@@ -61,14 +63,15 @@ const NEAR_BOX: f32 = 0.98;
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and its central value mu / s. mu is the barrier weight, s the excess
-/// of the level (logarithm of a hop's SIR in one direction) over the target.
+/// Maximum factor by which a Lagrange multiplier may differ from mu / s, its value at the optimum. Multipliers
+/// farther away are corrected to this factor. mu is the barrier weight, s the excess of the level (logarithm of a
+/// hop's SIR in one direction) over the target.
 const APART: f32 = 5.0;
 
-/// Number of Newton steps for the target T that one portion of the work takes. T, in ln(SIR), is slightly below the
-/// chain's worst SIR.
+/// Number of Newton steps for the target T in one portion of the work. T, in ln(SIR), is slightly below the chain's
+/// worst SIR.
 const STEPS: u8 = 4;
-/// Index, from 0 on, of the last Newton step for the target T. T, in ln(SIR), is slightly below the chain's worst
+/// Index of the last Newton step for the target T, counted from 0. T, in ln(SIR), is slightly below the chain's worst
 /// SIR.
 const TARGETS: u8 = 12;
 /// Relative error at which the Newton steps for the target T end. T, in ln(SIR), is slightly below the chain's worst
@@ -185,7 +188,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Newton steps of the current segment's second part, until those of its first part are known.
+    /// Newton steps of the current segment's second part, kept until its first part is computed.
     second: [Step; SECOND],
     /// Newton step of the next relay toward Rx, from which the current relay's step follows.
     ahead: Triple,
@@ -202,8 +205,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     share: f32,
     sums: Sums,
     by_target: f32,
-    /// True if the stored Lagrange multipliers are to be replaced by mu / s. mu is the barrier weight, s the excess
-    /// of a level (logarithm of a hop's SIR in one direction) over the target.
+    /// True if the stored Lagrange multipliers are to be replaced by mu / s, their values at the optimum. mu is the
+    /// barrier weight, s the excess of a level (logarithm of a hop's SIR in one direction) over the target.
     resets: bool,
     convex: bool,
     tries: u8,
@@ -337,7 +340,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         step.map_or([0.0; 3], |step| step.map(widened))
     }
 
-    /// Returns the position and limits of node `index` after the tried fraction of its Newton step.
+    /// Returns the position of node `index` plus the tried fraction of its Newton step, and its limits.
     #[inline(never)]
     fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
@@ -357,8 +360,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Begins to evaluate the stored positions without a step. If `resets`, new Lagrange multipliers then replace the
-    /// stored ones.
+    /// Begins to evaluate the stored positions, without a step. If `resets` is true, new Lagrange multipliers then
+    /// replace the stored ones.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -521,9 +524,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k`, and limits the multipliers of the hop that ends there. A multiplier
-    /// stays within a factor of mu / s; mu is the barrier weight, s the excess of a level (logarithm of the SIR) over
-    /// the target.
+    /// Stores the new position of relay `k`, and corrects the multipliers of the hop that ends there. A Lagrange
+    /// multiplier stays within the factor [`APART`] of mu / s; mu is the barrier weight, s the excess of a level
+    /// (logarithm of the SIR) over the target.
     fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         if self.share > 0.0 && k <= relays {
@@ -702,7 +705,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Shortens the Newton steps of all relays, so that the `step` of the relay at `spot` keeps its limits.
+    /// Shortens the Newton steps of all relays, so that the relay at `spot` stays within its limits. `step` is that
+    /// relay's whole step.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let spans = (spot.below(), spot.above());
         for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
@@ -714,8 +718,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Updates the Lagrange multipliers of hop `k` for the whole Newton steps `from` and `to` of its ends. `ends` are
-    /// their positions before the steps.
+    /// Updates the Lagrange multipliers of hop `k` for whole (not shortened) Newton steps of its ends. `from` and
+    /// `to` are these steps, and `ends` the positions before them.
     fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
         let (hop, weights) = self.derivatives(relays, k, ends);
         let ([a, b], [c, d]) = (&hop.by_from, &hop.by_to);
