@@ -69,9 +69,9 @@ impl Planner {
 
     /// Computes at most `hops` hops of a pass along the chain; `Ok(Some(..))` once the chain is solved.
     ///
-    /// A hop is the farthest x of one relay for each of at most 16 targets. In an interference field it is as many of
-    /// these x as take 128 evaluations of the field's points, at least one. `profile_of` returns the profile of relay
-    /// 1..=N, and must always return the same.
+    /// For a hop it computes the farthest x of one relay for each of at most 16 targets. In an interference field it
+    /// is as many of these x as take 128 evaluations of the field's points, at least one. `profile_of` returns the
+    /// profile of relay 1..=N, and must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left to try.

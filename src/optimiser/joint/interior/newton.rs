@@ -106,8 +106,8 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop` from the Newton system. `self` has the rows of that relay, and then those of
-    /// the node at `spot`, where `hop` ends.
+    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of that relay, and on
+    /// return those of the node at `spot`, where `hop` ends.
     ///
     /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
     /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.

@@ -464,6 +464,6 @@ const NEW: f32 = 3e-4;
 /// Maximum number of runs of the interior-point method from x of Algorithm 1, per initial chain.
 const AGAIN: u8 = 4;
 
-/// Distance of the first target to try above the result of the interior-point method, in ln(SIR). It is as much as
-/// the method may miss a local optimum by.
+/// Excess of the first target to try over the result of the interior-point method, in ln(SIR). The method may miss a
+/// local optimum by this much.
 const ABOVE: f32 = 1e-4;

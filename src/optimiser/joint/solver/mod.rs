@@ -419,9 +419,9 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solved chain, and the number of `step` calls. The chain is the target, and each relay's lateral
-    /// offset and altitude, as the bits of f32 numbers. If `once_more`, the best chain is computed a second time
-    /// instead of stored.
+    /// Returns the solved chain as the bits of f32 numbers, and the number of `step` calls. The first entry has the
+    /// target, and the others each relay's lateral offset and altitude. If `once_more`, the best chain is computed a
+    /// second time instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
