@@ -24,7 +24,7 @@ pub(super) struct FenceFollower {
     /// request.
     requested_m: f32,
     /// Distance along x to the neighbour upstream to which this relay has agreed, m. Infinity stands for the
-    /// separation, and is also the value before any agreement.
+    /// separation; it is the value before any agreement.
     agreed_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,

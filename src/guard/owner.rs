@@ -21,8 +21,8 @@ pub(super) struct FenceOwner {
     fence_m: f32,
     /// Distance along x that this relay requests to stay before the fence, m; infinite before any request.
     requested_m: f32,
-    /// Distance along x to the neighbour downstream that is in force, m. The neighbour has agreed to it, or this
-    /// relay has requested a larger one since. Infinity stands for the separation.
+    /// Distance along x that has to be kept to the neighbour downstream now, m. It is the distance to which the
+    /// neighbour has agreed, or a larger one that this relay has requested since. Infinity stands for the separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
@@ -311,10 +311,11 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the next fence: its x, m, the distance that this relay stays before it, m, and a flag. The flag is
-    /// true if the x is final, false if the fence can come nearer once relays have moved. `None` if the neighbour
-    /// downstream is not known to be beyond this relay. `kept_m` is the distance to the neighbour upstream,
-    /// `upstream_m` the highest possible x of the relays upstream, m.
+    /// Returns the next fence for the neighbour downstream: its x, m, a distance, m, and a flag. The neighbour stays
+    /// beyond the fence, and this relay that distance before it. The flag is true if the x is final, false if the
+    /// fence can come nearer once relays have moved. `None` if the neighbour is not known to be beyond this relay.
+    /// `kept_m` is the distance to the neighbour upstream, `upstream_m` the highest possible x of the relays
+    /// upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {

@@ -807,9 +807,9 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns gains for a mission with an unknown interferer, with which hops of equal length are best. They are those
-/// of the first hop, of other hops per W, and of the last hop per W. With relays of `power_w`, W, every hop of length
-/// d has the SIR (`distance_m` / d)^2.
+/// Returns three gains, for an unknown interferer, with which hops of equal length are best. They are the gain of the
+/// first hop, and the gains per watt of the other hops and of the last hop. With relays of `power_w`, W, every hop of
+/// length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

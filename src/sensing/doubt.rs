@@ -49,8 +49,8 @@ use crate::place::Placement;
 /// variance the search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Squared number of standard deviations of a measurement's deviation that shows a faulty relay. The exclusion of
-/// that relay has to reduce the fit's residual by at least this many variances. A relay that checks its own
+/// Square of the deviation, in standard deviations, from which on a measurement shows a faulty relay. The exclusion
+/// of that relay has to reduce the fit's residual by at least this many variances. A relay that checks its own
 /// measurements uses the same limit.
 const DEVIATIONS: f64 = 49.0;
 

@@ -59,7 +59,7 @@ struct Factor {
 }
 
 /// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
-/// separate the unknowns. An f32 has enough digits for sums of some hundred positions.
+/// separate the unknowns. The limit is above the rounding errors of f32 sums over some hundred positions.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {

@@ -424,9 +424,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds the barrier terms of their ends. The levels are
-    /// ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. A barrier term
-    /// is the logarithm of the distance of an end's coordinate from its limit.
+    /// Computes the levels of ten hops from hop `k` on, and adds the part of their ends to the barrier. A level is
+    /// ln(forward SIR) or ln(backward SIR / r); r is the required ratio of backward to forward SIR. The barrier keeps
+    /// positions between their limits: it is the sum of ln(distance to a limit).
     fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
