@@ -155,9 +155,9 @@ impl ChannelLoad {
 
     /// Returns the minimum [`Settings::hop_time`](crate::Settings::hop_time) on a channel of `baud` bit/s.
     ///
-    /// It is the transmission time of a sweep (the message of 100 bytes that carries target SIRs from relay to
-    /// relay), times the wait for a channel that many relays share, plus `latency`, the time from the end of a
-    /// transmission to the end of the receiver's computation.
+    /// It is the time to transmit a sweep (the message of 100 bytes that carries target SIRs from relay to relay),
+    /// with the wait for a channel that many relays share, plus `latency`, the time from the end of a transmission to
+    /// the end of the receiver's computation.
     pub const fn hop_time(self, baud: u32, latency: Duration) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         let sweep = (MAX_SWEEP as u64 * BITS * 1_000_000).div_ceil(baud);

@@ -33,7 +33,8 @@ struct LeaveNotice {
     due: bool,
 }
 
-/// Association (session) with the neighbour on one side: its numbers, pending messages and requests.
+/// State of the association (session) with the neighbour on one side. It has the numbers of the session, and the
+/// messages and requests that are pending.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "flags of the messages, each for itself"
@@ -379,7 +380,8 @@ impl KeepOut {
     }
 
     /// Stores the position of a neighbour that reports that its drone does not fly to setpoints. A report with the
-    /// number of the current association (session) is late, and ignored.
+    /// number of the current association (session) is ignored, because it is a late one: the drone flies to setpoints
+    /// again.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.peer_number;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {

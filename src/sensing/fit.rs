@@ -274,7 +274,8 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// `side_m`, a y, selects the source's side of the line Tx to Rx if the positions do not determine it.
+    /// `side_m`, a lateral offset y, selects the source's side of the line Tx to Rx if the measured positions do not
+    /// determine it.
     ///
     /// # Errors
     /// [`Unfit::NoSource`] if no source on the ground fits.

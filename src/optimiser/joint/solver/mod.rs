@@ -104,7 +104,7 @@ impl Purpose {
     }
 }
 
-/// Solver of a chain for one direction.
+/// Joint solver of a chain that carries data in one direction only, from Tx to Rx.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is told on its own, by another part of the work"
@@ -236,7 +236,8 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
     0
 };
 
-/// State of the solver for one direction, or of that for both. A mission needs only one, so they share their memory.
+/// Joint solver of a chain: the solver for data in one direction, or the one for both directions. A mission needs
+/// only one of them, so they share their memory.
 #[cfg_attr(
     feature = "altitude",
     expect(
