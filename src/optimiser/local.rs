@@ -446,8 +446,8 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. The relay is at the altitude
-    /// `altitude_m`, the neighbours are at `beside_m`. `apart_m` is the minimum separation, and `band` the allowed
+    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. `altitude_m` is the relay's
+    /// altitude, and `beside_m` that of the neighbours. `apart_m` is the minimum separation, and `band` the allowed
     /// altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;

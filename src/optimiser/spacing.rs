@@ -304,9 +304,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver, m, for traffic in both directions. The sender is in [0, `from_m`].
-    /// `back` is the backward hop. `place` is the largest x with the sender at `from_m`; the result is larger if a
-    /// sender farther back receives the backward hop better.
+    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The sender is in [0,
+    /// `from_m`]. `back` is the backward hop. `place` is the largest x with the sender at `from_m`; the result is
+    /// larger if a sender farther back receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;

@@ -625,7 +625,7 @@ impl OffLine {
 pub(super) struct OffLineDetector {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
-    /// True after a report on the ground of a position far from the line, until a position near the line.
+    /// True from a report on the ground of a position far from the line, until a position near the line.
     reported_on_ground: bool,
 }
 

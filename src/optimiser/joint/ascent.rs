@@ -49,8 +49,8 @@ const CLOSE: f32 = 3e-6;
 /// Expected increase of the target SIR below which the improvement of a chain ends, in ln(SIR).
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of the target SIR below which its final value can be predicted, in ln(SIR). Final is the value
-/// at the end of the ascent, the improvement of one chain.
+/// Expected increase of the target SIR below which an ascent's final target is predicted, in ln(SIR). An ascent
+/// improves one chain.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which an ascent (improvement of one chain) is checked for divergence. It has diverged

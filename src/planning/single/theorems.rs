@@ -94,7 +94,8 @@ pub enum PlaceCase {
     /// Optimum above Rx: the first hop's SIR falls all the way to Rx, and is the higher one even there.
     AboveRx = 3,
     /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is above Rx
-    /// instead if the first hop's SIR has risen enough beyond its minimum.
+    /// instead if the worse hop's SIR is higher there, because the first hop's SIR has risen again beyond its
+    /// minimum.
     BeforeValley = 4,
     /// Optimum above Rx: the first hop's SIR has a minimum before Rx, and is the higher one even there.
     OverValley = 5,
@@ -109,8 +110,8 @@ pub enum PlaceCase {
     Level = 9,
     /// Optimum above Rx: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 10,
-    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. Beyond it is where both hops
-    /// have the same SIR. Only with noise.
+    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. Beyond it only at the x where
+    /// both hops have the same SIR. Only with noise.
     SecondHill = 11,
 }
 
