@@ -193,8 +193,9 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the distance along x to the neighbour downstream is below the separation. This relay must not
-    /// change its lateral offset or altitude then, because these may be all that separates the two.
+    /// Returns true if this relay has requested or agreed to a distance along x below the separation. The distance is
+    /// that to the neighbour downstream. This relay must not change its lateral offset or altitude then, because
+    /// these may be all that separates the two.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }

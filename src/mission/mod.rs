@@ -319,7 +319,7 @@ pub struct Mission {
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
-    /// Maximum number of relays of a mission; addresses on the wire are 12 bits wide.
+    /// Maximum number of relays of a mission. Frames on the wire have room for more: node numbers up to 4094.
     pub const MAX_RELAYS: u16 = MAX_RELAYS;
 
     /// Creates a mission after checking every parameter.

@@ -142,7 +142,7 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 const CONTRADICTED: f64 = 0.25;
 
 /// Minimum mean square error of measurements that contradicts the mission's interference. It is in units of the
-/// measurements' variance. The relays then treat the interference as unknown.
+/// variance that the operator expects of a measurement. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
@@ -152,8 +152,8 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Mean square relative error that the current estimate is expected to have.
     chance: f64,
-    /// Number of new estimates adopted for the same interferer, which [`REFINED`] limits. If the interferer moves, an
-    /// estimate with a large change resets the number to 0.
+    /// Number of new estimates adopted for the same interferer, which [`REFINED`] limits. With settings for a moving
+    /// interferer, an estimate with a large change resets the number to 0.
     refined: u8,
     track: Track,
 }
@@ -304,7 +304,7 @@ fn fitted(
 }
 
 /// Returns a moving interferer at its predicted position at the time when the drones have moved. `None` if it does
-/// not move. `heard` is the mean time of the measurements.
+/// not move, or if its track deviates too much from the fit. `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,

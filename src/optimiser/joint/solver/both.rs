@@ -129,7 +129,8 @@ enum Work {
 /// Progress of Algorithm 1 for one target: in its pass from Tx to Rx, or in its pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
-    /// Index of the last relay that the pass has computed; 0 before the first and at the end.
+    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
+    /// back.
     index: u16,
     /// True during the pass back to Tx.
     is_back: bool,
