@@ -294,7 +294,7 @@ impl FenceOwner {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the smallest distance along x to the neighbour downstream, by both agreed positions, m. It is below
+    /// Returns the smallest distance along x to the neighbour downstream for both agreed positions, m. It is below
     /// the separation only if the agreed positions are that close, and both relays have arrived at their lateral
     /// offsets and altitudes.
     fn best_step(&self, own: &Own) -> f32 {

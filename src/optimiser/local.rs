@@ -28,8 +28,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals of x on each side of the interferer, at whose ends hops are evaluated. They are in a row
-/// of one altitude. Only for traffic in both directions.
+/// Number of equal intervals of x on each side of the interferer, at whose ends hops are evaluated. All are at one
+/// altitude. Only for traffic in both directions.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;

@@ -49,7 +49,7 @@ const LEAST_PART: f32 = 0.1;
 const TURN_PART: f32 = 2.0;
 
 /// Remaining distance of the moving target to the setpoint at which a stop counts as complete, m. The drone lags
-/// behind the moving target, so that it then has up to 0.5 m left.
+/// behind the moving target, so that the drone then has up to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
 /// Time from a new setpoint until the drone reacts, ms. 200 are for the way to the flight controller, and 1000 for

@@ -503,8 +503,8 @@ const LEAST: u8 = 8;
 
 /// Assumed maximum relative drift between the clocks of relay and autopilot, as an exponent: 2^-10.
 ///
-/// If the clocks drift faster, messages seem late: by the time that the clocks drift apart within the window in which
-/// the minimum delay is taken.
+/// If the clocks drift faster, messages seem late. The apparent delay is the drift during the window in which the
+/// minimum delay is taken.
 const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's clock.

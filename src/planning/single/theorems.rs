@@ -110,8 +110,8 @@ pub enum PlaceCase {
     Level = 9,
     /// Optimum above Rx: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 10,
-    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. Beyond it only at the x where
-    /// both hops have the same SIR. Only with noise.
+    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. If it is beyond, both hops
+    /// have the same SIR there. Only with noise.
     SecondHill = 11,
 }
 

@@ -161,7 +161,7 @@ impl Front {
         barrier(mu, c, f, h, hh);
     }
 
-    /// Adds the hop that leads to the next node to this relay's rows, and eliminates this relay. `None` if a pivot is
+    /// Adds to this relay's rows the hop that leads to the next node, and eliminates this relay. `None` if a pivot is
     /// not positive.
     fn eliminate(
         &mut self,
