@@ -27,7 +27,8 @@ const FRAMES: u64 = 8;
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3 / 20.
+/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3 / 20. The rest is for other
+/// messages, retransmissions, and waits for a free channel.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
@@ -154,9 +155,9 @@ impl ChannelLoad {
 
     /// Returns the minimum [`Settings::hop_time`](crate::Settings::hop_time) on a channel of `baud` bit/s.
     ///
-    /// It is the transmission time of a sweep (the message of 100 bytes that carries target SIRs from relay to
-    /// relay), times the wait for a channel that many relays share, plus `latency`, the time from the end of a
-    /// transmission to the end of the receiver's computation.
+    /// It is the time to transmit a sweep (the message of 100 bytes that carries target SIRs from relay to relay),
+    /// with the wait for a channel that many relays share, plus `latency`, the time from the end of a transmission to
+    /// the end of the receiver's computation.
     pub const fn hop_time(self, baud: u32, latency: Duration) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         let sweep = (MAX_SWEEP as u64 * BITS * 1_000_000).div_ceil(baud);

@@ -8,13 +8,14 @@ use crate::side::Side;
 
 /// Event of the relay that a firmware may react to. The firmware reads the changed state from the relay.
 ///
-/// A *node* is a relay's index before flight, as in [`Relay::neighbours`](crate::Relay::neighbours).
+/// A field `node` is a relay's index in the chain as configured before flight, as in
+/// [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Event {
     /// `Relay::setpoint` has changed: fly there, or hold the position if there is none.
     SetpointChanged,
-    /// The chain has agreed on positions. Where the interference is known, it has agreed on a target SIR (`Relay::target`), too.
+    /// The chain has agreed on positions. If the interference is known, also on a target SIR (`Relay::target`).
     Converged,
     /// Every allowed target SIR is infeasible, and all relays keep their positions. Raised at the leader, which is
     /// relay 1, or relay N if the mission gives the interference as a distribution along x. `Relay::restart`, a new
@@ -39,8 +40,8 @@ pub enum Event {
         node: u16,
     },
     /// A node has reported eight times in a row that it does not receive this relay. The node therefore cannot be a
-    /// neighbour. Not raised again before the node has received this relay. An operator checks this transmitter and
-    /// that receiver: antenna, power, channel.
+    /// neighbour. Not raised again before the node has received this relay. An operator checks this relay's
+    /// transmitter and the node's receiver: antenna, power, channel.
     NotHeard {
         /// Index of the node that does not receive this relay.
         node: u16,

@@ -51,7 +51,7 @@ const fn node(event: Event) -> Option<u16> {
     }
 }
 
-/// Returns the text of an event; of one that concerns a node, the text behind the node's number.
+/// Returns the text of an event in a log line. If the event concerns a node, the text follows the node's number.
 fn text(event: Event) -> defmt::Str {
     match event {
         Event::SetpointChanged => defmt::intern!("the setpoint has changed"),
@@ -112,7 +112,7 @@ fn text(event: Event) -> defmt::Str {
     }
 }
 
-/// Log texts of the autopilot's states, modes, events and reasons.
+/// Log texts of the autopilot's states, modes and events, and the reasons for lost or denied control.
 #[cfg(feature = "flight")]
 mod autopilot {
     use crate::flight::autopilot::state::{FlightMode, Release, ReleaseCause, State, WaitReason};

@@ -272,7 +272,8 @@ pub enum SetupError {
     /// distribution along x, it is the joint method for more than 100 relays, or it needs a feature that the crate
     /// was built without.
     Method,
-    /// The mission has traffic from Rx to Tx (`reverse` above 0), which the method Joint does not support.
+    /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
+    /// traffic in both directions this method needs a known interferer.
     Reverse,
     /// `method.explore_m` is not within 0 to 1e5, or its search grid has fewer than 2 columns or rows.
     Adjust,

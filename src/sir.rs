@@ -123,8 +123,8 @@ pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns K of the hop from a relay to Tx, m^2: the SIR at Tx is K / squared distance. It is the counterpart of
-/// [`Mission::receiver_gain`].
+/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K over the squared length of the hop. It
+/// is the counterpart of [`Mission::receiver_gain`].
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"

@@ -50,7 +50,8 @@ impl ViewId {
         }
     }
 
-    /// Returns `view` with its number limited to at most `most` above the number of this view.
+    /// Returns `view`, but with its number at most `most` above this view's number. Views received from other nodes
+    /// thus raise the number only by bounded steps.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {

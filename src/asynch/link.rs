@@ -201,7 +201,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         true
     }
 
-    /// Waits until every written byte has left the port. Does nothing without a driver-enable pin.
+    /// Waits until every written byte has left the port. The driver-enable pin must stay high until then. Does
+    /// nothing without a pin.
     async fn flush(&mut self, port: Port, relay: &AsyncRelay<'_>, clock: &impl Clock) {
         if self.pin.is_some() && self.quiet_at > Instant::ZERO {
             if self.tx.flush().await.is_err() {

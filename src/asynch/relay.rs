@@ -101,8 +101,8 @@ impl<'a> AsyncRelay<'a> {
         self.changed.set(false);
     }
 
-    /// Completes once the relay has input that the task which runs its ports has not handled. At once if there is
-    /// some.
+    /// Completes once the relay has input that the task which runs its ports has not handled. If there already is
+    /// some, it completes at once.
     pub(super) fn changed(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             store_waker(&self.runner, cx);

@@ -205,10 +205,11 @@ impl FieldPoint {
     /// Returns Upsilon = E[1/I], 1/W, if I / `i_max_w` has a Beta distribution.
     ///
     /// It is (alpha + beta - 1) / ((alpha - 1) `i_max_w`), with the shape parameters `alpha` and `beta`, and the
-    /// maximum power `i_max_w` in W. The paper prints it without `I_max`, for I relative to it. `None` unless alpha >
-    /// 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are finite. In f64,
-    /// since near alpha = 1 an f32 of alpha would be too coarse; intended for constants, where it is free. Accuracy:
-    /// `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in `host-tests/tests/field/closed_forms.rs`.
+    /// maximum power `i_max_w` in W. The paper's formula has no `I_max`, because its I is relative to `I_max`. `None`
+    /// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are
+    /// finite. In f64, since near alpha = 1 an f32 of alpha would be too coarse; intended for constants, where it is
+    /// free. Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in
+    /// `host-tests/tests/field/closed_forms.rs`.
     pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
         let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();
         if !(shapes && i_max_w > 0.0 && i_max_w.is_finite()) {

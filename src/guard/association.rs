@@ -33,7 +33,8 @@ struct LeaveNotice {
     due: bool,
 }
 
-/// Association (session) with the neighbour on one side: its numbers, pending messages and requests.
+/// State of the association (session) with the neighbour on one side. It has the numbers of the session, and the
+/// messages and requests that are pending.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "flags of the messages, each for itself"
@@ -103,7 +104,7 @@ impl Association {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance along x by which this relay is on the right side of its neighbour, m.
+    /// Returns the distance along x by which this relay is on the correct side of its neighbour, m.
     ///
     /// The neighbour is at `side`; its last received x counts. Negative on the wrong side; NaN if a position is
     /// unknown.
@@ -131,8 +132,8 @@ impl Association {
         self.beyond_m(own, side) < -2.0 * own.config.hover_m
     }
 
-    /// Returns true if this relay's reported x is on the right side of the neighbour's last x. The difference must be
-    /// at least the sum of the errors of both reports.
+    /// Returns true if this relay's reported x is on the correct side of the neighbour's last x. The difference must
+    /// be at least the sum of the errors of both reports.
     pub(super) fn is_seen_in_order(&self, own: &Own, side: Side) -> bool {
         self.beyond_m(own, side) >= 2.0 * own.config.hover_m
     }
@@ -327,8 +328,8 @@ pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
     /// is lost.
     lost: Option<(u16, f32)>,
-    /// Nearest x at which this relay is the separation away from a lost relay, m; NaN if none is near. Until this
-    /// relay has reached that x, perhaps only lateral offset and altitude keep the two apart.
+    /// x to which this relay must move to be the separation away from a lost relay, m; NaN if none is near. Until
+    /// then, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
     /// True if a lost relay was last reported on the wrong side of this one along x.
     disordered: bool,
@@ -362,8 +363,9 @@ impl KeepOut {
         });
     }
 
-    /// Removes obstacles after a message from `node`: that node, and nodes farther away on `side`. They are lost
-    /// relays, or drones that do not fly to setpoints.
+    /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Those beyond are
+    /// behind `node`, and so no obstacles for this relay. The obstacles are lost relays, or drones that do not fly to
+    /// setpoints.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -378,7 +380,8 @@ impl KeepOut {
     }
 
     /// Stores the position of a neighbour that reports that its drone does not fly to setpoints. A report with the
-    /// number of the current association (session) is late, and ignored.
+    /// number of the current association (session) is ignored, because it is a late one: the drone flies to setpoints
+    /// again.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.peer_number;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
@@ -473,9 +476,9 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay has passed the x `near_m`, away from the lost relay. From then
-    /// on `near_m`, at which the two are the separation apart, is the limit of this relay's x. `is_beyond` returns
-    /// true if this relay has passed the x that is its argument.
+    /// Ends [`is_near`](Self::is_near) once this relay is the separation away from the lost relay. That is at the x
+    /// `near_m`, which limits this relay's x from then on. `is_beyond` returns true if this relay has passed the x
+    /// that is its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {

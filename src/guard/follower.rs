@@ -24,7 +24,7 @@ pub(super) struct FenceFollower {
     /// request.
     requested_m: f32,
     /// Distance along x to the neighbour upstream to which this relay has agreed, m. Infinity stands for the
-    /// separation, and is also the value before any agreement.
+    /// separation; it is the value before any agreement.
     agreed_m: f32,
     /// Agreed x of the neighbour upstream, m.
     target_m: f32,
@@ -220,7 +220,8 @@ impl FenceFollower {
     }
 
     /// Returns the least possible distance along x to the neighbour upstream, m. Infinity stands for the separation.
-    /// The limits toward the neighbour downstream are computed from this distance.
+    /// It is 0 near a lost relay, and until this relay is beyond the first fence (limit of x). The limits toward the
+    /// neighbour downstream are computed from this distance.
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0

@@ -47,7 +47,7 @@ pub(super) struct ReachableInterval {
     /// have been on its way to one of them.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report is recent enough to show that the relay flies to the first setpoint.
+    /// True once a position report was measured late enough after the first setpoint to show its effect.
     known: bool,
 }
 

@@ -21,8 +21,8 @@ pub(super) struct FenceOwner {
     fence_m: f32,
     /// Distance along x that this relay requests to stay before the fence, m; infinite before any request.
     requested_m: f32,
-    /// Distance along x to the neighbour downstream that is in force, m. The neighbour has agreed to it, or this
-    /// relay has requested a larger one since. Infinity stands for the separation.
+    /// Distance along x that has to be kept to the neighbour downstream now, m. It is the distance to which the
+    /// neighbour has agreed, or a larger one that this relay has requested since. Infinity stands for the separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
@@ -193,8 +193,9 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the distance along x to the neighbour downstream is below the separation. This relay must not
-    /// change its lateral offset or altitude then, because these may be all that separates the two.
+    /// Returns true if this relay has requested or agreed to a distance along x below the separation. The distance is
+    /// that to the neighbour downstream. This relay must not change its lateral offset or altitude then, because
+    /// these may be all that separates the two.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
@@ -293,9 +294,9 @@ impl FenceOwner {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the smallest distance along x that the two agreed positions require, m. It is below the separation
-    /// only if the agreed positions are that close, and both relays have arrived at their lateral offsets and
-    /// altitudes.
+    /// Returns the smallest distance along x to the neighbour downstream for both agreed positions, m. It is below
+    /// the separation only if the agreed positions are that close, and both relays have arrived at their lateral
+    /// offsets and altitudes.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -311,10 +312,11 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the next fence: its x, m, the distance that this relay stays before it, m, and a flag. The flag is
-    /// true if the x is final, false if the fence can come nearer once relays have moved. `None` if the neighbour
-    /// downstream is not known to be beyond this relay. `kept_m` is the distance to the neighbour upstream,
-    /// `upstream_m` the highest possible x of the relays upstream, m.
+    /// Returns the next fence for the neighbour downstream: its x, m, a distance, m, and a flag. The neighbour stays
+    /// beyond the fence, and this relay that distance before it. The flag is true if the x is final, false if the
+    /// fence can come nearer once relays have moved. `None` if the neighbour is not known to be beyond this relay.
+    /// `kept_m` is the distance to the neighbour upstream, `upstream_m` the highest possible x of the relays
+    /// upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -353,8 +355,8 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
-    /// Returns the pending message to the neighbour downstream; with a new fence (limit of x) if `moves`. Fences are
-    /// numbered only here, so that every numbered fence is sent.
+    /// Returns the pending message to the neighbour downstream. If `moves` is true, it may have a new fence (limit of
+    /// x). Fences are numbered only here, so that every numbered fence is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

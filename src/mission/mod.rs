@@ -319,7 +319,7 @@ pub struct Mission {
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
-    /// Maximum number of relays of a mission; addresses on the wire are 12 bits wide.
+    /// Maximum number of relays of a mission. Frames on the wire have room for more: node numbers up to 4094.
     pub const MAX_RELAYS: u16 = MAX_RELAYS;
 
     /// Creates a mission after checking every parameter.
@@ -655,8 +655,9 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. It is (`p_u` / `p_t`)(`mu_nlos` /
-    /// eta)((X - D)^2 + Y^2), with the powers of relay and Tx, and the interferer at (X, Y).
+    /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. The optimal position of a single
+    /// relay depends on it. It is (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2), with the powers of relay and Tx,
+    /// and the interferer at (X, Y).
     pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
@@ -748,8 +749,8 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or last hop that makes it half as long as the others at best. The SIR is gain over
-/// squared length, and is the same on all hops of the best chain.
+/// Factor on the gain of the first or last hop that makes it half as long as the other hops. In the best chain all
+/// hops have the same SIR, which is gain over squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -764,7 +765,8 @@ impl Mission {
     /// Returns the mission with another `interference`.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
-    /// `halved` is for the first and the last hop: true if that hop is to be half as long as the others.
+    /// `halved` has a flag for the first hop and one for the last: true to place the relays so that this hop is half
+    /// as long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -805,9 +807,9 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns gains for a mission with an unknown interferer, with which hops of equal length are best. They are those
-/// of the first hop, of other hops per W, and of the last hop per W. With relays of `power_w`, W, every hop of length
-/// d has the SIR (`distance_m` / d)^2.
+/// Returns three gains, for an unknown interferer, with which hops of equal length are best. They are the gain of the
+/// first hop, and the gains per watt of the other hops and of the last hop. With relays of `power_w`, W, every hop of
+/// length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

@@ -171,8 +171,9 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the ratio of the highest target to the lower of the two middle targets. The ratio of the higher of those
-/// two to the lowest target is the same. `gap` and `growth` are the codes in a [`Ladder`].
+/// Returns the span of half a ladder: its highest target over the lower of its two middle targets. The other half,
+/// from the higher middle target down to the lowest target, has the same span. `gap` and `growth` are the codes in a
+/// [`Ladder`].
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()

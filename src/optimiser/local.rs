@@ -28,8 +28,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of intervals into which a row of positions is sampled on each side of the interferer. Only for traffic in
-/// both directions; a row has one altitude.
+/// Number of equal intervals of x on each side of the interferer, at whose ends hops are evaluated. All are at one
+/// altitude. Only for traffic in both directions.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -326,8 +326,8 @@ impl LocalSearch {
         })
     }
 
-    /// Searches the x at `altitude_m` at which both hops have equal SIRs. Returns the SIR of the worse hop at the
-    /// best x found, or -1 if no x is allowed.
+    /// Searches the best x at `altitude_m`. For traffic in one direction both hops usually have equal SIRs there.
+    /// Returns the SIR of the worse hop at the best x found, or -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
@@ -446,8 +446,8 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. The relay is at the altitude
-    /// `altitude_m`, the neighbours are at `beside_m`. `apart_m` is the minimum separation, and `band` the allowed
+    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. `altitude_m` is the relay's
+    /// altitude, and `beside_m` that of the neighbours. `apart_m` is the minimum separation, and `band` the allowed
     /// altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;

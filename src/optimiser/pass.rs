@@ -403,8 +403,8 @@ pub struct Verdict {
 impl Verdict {
     /// Returns the result of a pass of `ladder`. `slacks` are the chain's spare lengths for its `targets`.
     ///
-    /// A target is committed if the next higher one is missed and is within the mission's tolerance of it, or if the
-    /// ladder has no other target: the step of the paper's Algorithm 1.
+    /// The highest target that is met is committed in two cases. The next higher one is missed and within the
+    /// mission's tolerance of it. Or the ladder has no other target, as in the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,

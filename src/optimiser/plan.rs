@@ -21,8 +21,8 @@ pub struct Agreed {
     pub commit: u8,
     /// Committed target, linear SIR.
     pub target: f32,
-    /// Upper bound: a SIR that no chain at these altitudes has, linear. `None` with the paper's fixed step, which
-    /// excludes some chains.
+    /// Upper bound, linear: no chain at these altitudes meets this target SIR. `None` with the paper's fixed step,
+    /// whose passes do not try all chains, and for traffic in both directions.
     pub most: Option<f32>,
     /// Number of passes along the chain (sweeps) that the search took.
     pub sweeps: u32,
@@ -69,9 +69,9 @@ impl Planner {
 
     /// Computes at most `hops` hops of a pass along the chain; `Ok(Some(..))` once the chain is solved.
     ///
-    /// A hop is the farthest x of one relay for each of at most 16 targets. In an interference field it is as many of
-    /// these x as take 128 evaluations of the field's points, at least one. `profile_of` returns the profile of relay
-    /// 1..=N, and must always return the same.
+    /// For a hop it computes the farthest x of one relay for each of at most 16 targets. In an interference field it
+    /// is as many of these x as take 128 evaluations of the field's points, at least one. `profile_of` returns the
+    /// profile of relay 1..=N, and must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left to try.

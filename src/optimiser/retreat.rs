@@ -168,8 +168,8 @@ impl<'a> Retreat<'a> {
     /// Returns the smallest x in [`place`, `most_m`) at which this hop's sender receives the backward hop, m. The
     /// backward hop is sent by this hop's receiver, at x = `from_m`. `None` if there is no such x.
     ///
-    /// `c` is the gain over the target for the field's largest Upsilon. At most one root for each field point in
-    /// between.
+    /// `c` is the gain over the target for the field's largest Upsilon. Work: at most one root for each field point
+    /// from `place` to `from_m`.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(
         &self,

@@ -167,7 +167,8 @@ impl Search {
     }
 
     /// Returns the lowest target known to be infeasible for every chain, after a pass with these `slacks`. A slack is
-    /// the chain's spare length for a target, m. `None` if all passes were plain, which proves nothing.
+    /// the chain's spare length for a target, m. Plain passes prove nothing, because they do not try all chains.
+    /// `None` if no such target is known, and for traffic in both directions.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if cfg!(feature = "reverse") && self.both_ways {
             // Reaches and held positions of both directions are not proven to exclude no chain.
@@ -325,7 +326,8 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Returns the value at 0 of the polynomial through `points` (x, value). `None` unless their x strictly falls.
+/// Returns the value at 0 of the polynomial through `points`, pairs of x and value. `None` unless the x of
+/// consecutive points strictly fall.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {

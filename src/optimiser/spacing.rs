@@ -105,9 +105,9 @@ pub struct Hop {
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Part of the hop's equation that depends neither on the target nor on the length, m^2. With the interferer at
-    /// (X, Y) on the ground, the sender at (y0, h0) and the receiver at (y, h) across x, it is (Y - y0) (Y + y0 - 2y)
-    /// + h0 (2h - h0).
+    /// Constant term of the equation for the hop's maximum length, m^2: it does not depend on the target. With the
+    /// interferer at (X, Y) on the ground, the sender at (y0, h0) and the receiver at (y, h) across x, it is (Y - y0)
+    /// (Y + y0 - 2y) + h0 (2h - h0).
     base: f32,
     /// Squared distance of receiver and sender perpendicular to x, m^2.
     across_squared: f32,
@@ -304,9 +304,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver, m, for traffic in both directions. The sender is in [0, `from_m`].
-    /// `back` is the backward hop. `place` is the largest x with the sender at `from_m`; the result is larger if a
-    /// sender farther back receives the backward hop better.
+    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The sender is in [0,
+    /// `from_m`]. `back` is the backward hop. `place` is the largest x with the sender at `from_m`; the result is
+    /// larger if a sender farther back receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -564,8 +564,8 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns the receiver noise over the interferer's power received at 1 m: nu, 1/m^2. A constant 0 without the
-    /// feature `noise` removes the search in noise from the image.
+    /// Returns the receiver noise over the interferer's power received at 1 m: nu, 1/m^2. Without the feature `noise`
+    /// it is the constant 0, so that the compiler drops the search in noise.
     fn nu(&self) -> f32 {
         if cfg!(feature = "noise") {
             self.noise

@@ -49,9 +49,9 @@ use crate::place::Placement;
 /// variance the search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Squared number of standard deviations from which on a deviation shows that a relay is faulty. It is the minimum
-/// fall of the fit's residual by the exclusion of that relay, over the variance. A relay that checks its own
-/// measurements uses it, too.
+/// Square of the deviation, in standard deviations, from which on a measurement shows a faulty relay. The exclusion
+/// of that relay has to reduce the fit's residual by at least this many variances. A relay that checks its own
+/// measurements uses the same limit.
 const DEVIATIONS: f64 = 49.0;
 
 /// Minimum residual of the fit to all measurements for which a faulty relay is searched. The exclusion of the faulty
@@ -93,8 +93,8 @@ enum Stage {
     /// Collection of measurements without the node of this number. It shows if the other nodes' measurements are
     /// consistent.
     Trying(u16),
-    /// Collection that tells the node of this number that it is excluded. Two collections do so: the `bool` is false
-    /// for the first one, and true for the second one, from whose other measurements the estimate is computed.
+    /// Collection that tells the node of this number that it is excluded. There are two in a row: the measurements of
+    /// the first one (`false`) are discarded, and those of the second one (`true`) give the estimate.
     Announcing(u16, bool),
 }
 

@@ -99,7 +99,8 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change of the interference up to which a new estimate is never adopted.
+/// Mean square relative change of the interference that is too small for a new estimate. A changed level at Rx can
+/// justify one all the same.
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change of the interference up to which a new estimate is only a refinement. A refinement is
@@ -107,15 +108,15 @@ const WORTH: f64 = 1e-5;
 const CHANGE: f64 = 1e-4;
 
 /// Minimum ratio of an estimate's mean square change to that due to chance, for a stationary source. With a smaller
-/// ratio the estimate is not adopted.
+/// ratio the new estimate can only be a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
 /// Minimum ratio of an estimate's mean square change to that due to chance, for a moving source. With a smaller ratio
-/// the estimate is not adopted.
+/// the new estimate can only be a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Ratio above which a new estimate means another interferer, in a settled chain. It is the ratio of the estimate's
-/// mean square change to that due to chance. A settled chain no longer refines its estimate. The count of refinements
-/// then starts again.
+/// Minimum ratio of an estimate's mean square change to that due to chance, in a settled chain. A chain is settled
+/// after [`REFINED`] refinements; the source is stationary. A larger ratio shows another interferer: the new estimate
+/// is adopted, and may be refined again.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -141,7 +142,7 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 const CONTRADICTED: f64 = 0.25;
 
 /// Minimum mean square error of measurements that contradicts the mission's interference. It is in units of the
-/// measurements' variance. The relays then treat the interference as unknown.
+/// variance that the operator expects of a measurement. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
@@ -151,8 +152,8 @@ pub(crate) struct Knowledge {
     information: f64,
     /// Mean square relative error that the current estimate is expected to have.
     chance: f64,
-    /// Number of new estimates adopted for the same interferer, which [`REFINED`] limits. If the interferer moves, an
-    /// estimate with a large change resets the number to 0.
+    /// Number of new estimates adopted for the same interferer, which [`REFINED`] limits. With settings for a moving
+    /// interferer, an estimate with a large change resets the number to 0.
     refined: u8,
     track: Track,
 }
@@ -171,7 +172,7 @@ pub(crate) struct Review {
     pub(crate) adopt: Option<InterferenceEstimate>,
     pub(crate) known: Knowledge,
     pub(crate) unfit: Option<Unfit>,
-    /// Result of the check which of the levels measured at Tx and Rx do not fit the relays' measurements.
+    /// Result of a check: the levels measured at Tx and Rx that do not fit the relays' measurements.
     pub(crate) ends: EndsOff,
 }
 
@@ -303,7 +304,7 @@ fn fitted(
 }
 
 /// Returns a moving interferer at its predicted position at the time when the drones have moved. `None` if it does
-/// not move. `heard` is the mean time of the measurements.
+/// not move, or if its track deviates too much from the fit. `heard` is the mean time of the measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,

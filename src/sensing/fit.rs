@@ -59,7 +59,7 @@ struct Factor {
 }
 
 /// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
-/// separate the unknowns. An f32 has enough digits for sums of some hundred positions.
+/// separate the unknowns. The limit is above the rounding errors of f32 sums over some hundred positions.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -142,7 +142,7 @@ pub struct Fit {
     expected: f64,
     /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
-    /// Number of measured positions less the number of unknowns; 0 if that is negative.
+    /// Degrees of freedom: number of measured positions less the number of unknowns; 0 if that is negative.
     beyond: f64,
     count: f64,
 }
@@ -274,7 +274,8 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// `side_m`, a y, selects the source's side of the line Tx to Rx if the positions do not determine it.
+    /// `side_m`, a lateral offset y, selects the source's side of the line Tx to Rx if the measured positions do not
+    /// determine it.
     ///
     /// # Errors
     /// [`Unfit::NoSource`] if no source on the ground fits.

@@ -163,9 +163,9 @@ impl Sums {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a measured position with its `terms`, the measured `v` and the `expected` v, both above 0. v is 1e-12 W /
-    /// I. The position's weight is multiplied by `share`. `measured` is the number of measurements there. At most 60
-    /// instructions.
+    /// Adds a measured position with its `terms`, the measured `v`, and the `expected` v, both above 0. v is 1e-12 W
+    /// / I. The position's weight follows from both, and is multiplied by `share`. `measured` is the number of
+    /// measurements there. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
         let weight = 2.0 * share * even / (v * v + expected * expected);

@@ -48,8 +48,8 @@ const LEAST_PART: f32 = 0.1;
 /// directions is gone within [`Pace::stopping_time`].
 const TURN_PART: f32 = 2.0;
 
-/// Remaining distance to the setpoint at which the moving target counts as stopped, m. The drone lags behind the
-/// target, and then has up to 0.5 m left.
+/// Remaining distance of the moving target to the setpoint at which a stop counts as complete, m. The drone lags
+/// behind the moving target, so that the drone then has up to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
 /// Time from a new setpoint until the drone reacts, ms. 200 are for the way to the flight controller, and 1000 for
@@ -123,14 +123,14 @@ impl Pace {
         }
     }
 
-    /// Returns the time from a new setpoint until a drone at maximum speed has stopped; 9.8 s by default.
+    /// Returns the time from a changed setpoint until a drone that flew at maximum speed has stopped.
     ///
-    /// Intended for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
+    /// It is 9.8 s by default, and intended for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
     ///
     /// The drone reacts after 1.2 s. The moving target that it follows then slows down: first with the deceleration a
-    /// (maximum acceleration) to the speed a / k, where k is the gain near the setpoint, and from there in
-    /// proportion to the remaining distance, which is at most 0.25 m after this time. a is the acceleration of this
-    /// pace, and k is 0.5 /s. At most 8 steps.
+    /// (maximum acceleration) to the speed a / k, where k is the gain near the setpoint, and from there in proportion
+    /// to the remaining distance, which is at most 0.25 m after this time. a is the acceleration of this pace, and k
+    /// is 0.5 /s. At most 8 steps.
     ///
     /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
     #[expect(
@@ -558,9 +558,10 @@ mod tests {
         }
     }
 
-    /// Returns how often reports of a moving target count as another target, in 20 s.
+    /// Returns how often, in 20 s, an autopilot's reports of a moving target count as another target.
     ///
-    /// The autopilot reports twice a second. A report is `lag` reports of 100 ms old and `aside_m` beside the target.
+    /// The autopilot reports twice a second. It reports the position that was sent `lag` times 100 ms earlier, moved
+    /// sideways by `aside_m`.
     fn other_targets(lag: usize, aside_m: f32) -> usize {
         let site = |lat_e7| Geodetic {
             lat_e7,

@@ -96,7 +96,7 @@ pub struct Autopilot {
     recovery: Duration,
     /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason for which the relay cannot control the drone, `None` if it can, and the time since then.
+    /// Reason for which the relay cannot control the drone (`None`: it can), and the start of that state.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason for which the relay cannot control the drone, and the time of the report. An inner `None`
     /// is the report that it can.

@@ -170,8 +170,8 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`: not within 10 s after an equal line. Marks it as
-    /// sent.
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. It may not be sent within 10
+    /// s after an equal line.
     fn passes(&mut self, now: Instant, hash: u32) -> bool {
         self.recent.retain(|(_, until)| *until > now);
         self.recent.iter().all(|(of, _)| *of != hash)

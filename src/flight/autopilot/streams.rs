@@ -152,7 +152,9 @@ impl Streams {
         self.since = now;
     }
 
-    /// Requests the autopilot's report of its target again, because an ArduCopter sends it only in GUIDED.
+    /// Requests the autopilot's report of its target again, once the relay controls the drone.
+    ///
+    /// An ArduCopter sends that report only in GUIDED, so that earlier requests may have been given up.
     pub(super) fn renew(&mut self) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;

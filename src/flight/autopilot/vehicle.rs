@@ -497,12 +497,14 @@ const HALF: Duration = Duration::from_millis(4_000);
 
 /// Minimum number of messages in each half of the window in which the minimum delay is taken.
 ///
-/// With fewer, a gap and the late messages that arrive at once after it could increase the minimum.
+/// If the link pauses, a half may contain only the late messages that arrive after the pause. Their delay would then
+/// count as normal.
 const LEAST: u8 = 8;
 
 /// Assumed maximum relative drift between the clocks of relay and autopilot, as an exponent: 2^-10.
 ///
-/// With more drift, messages seem late by the drift within the window for the minimum delay.
+/// If the clocks drift faster, messages seem late. The apparent delay is the drift during the window in which the
+/// minimum delay is taken.
 const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's clock.
@@ -623,7 +625,7 @@ impl OffLine {
 pub(super) struct OffLineDetector {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
-    /// True after a report on the ground of a position far from the line, until a position near the line.
+    /// True from a report on the ground of a position far from the line, until a position near the line.
     reported_on_ground: bool,
 }
 

@@ -71,8 +71,9 @@ fn a_start_outside_the_geofence_goes_no_farther_out() {
     assert_eq!(one.guard.setpoint().map(|place| place.x_m), Some(40.0));
 }
 
-/// Checks that two relays within the errors of their reports are in order only if they may pass. They may pass each
-/// other if lateral offset and altitude keep them the separation apart.
+/// Checks that relays too close along x to tell their order count as in order only if they may pass. Their reported x
+/// differ by less than the errors of the reports. They may pass each other if lateral offset and altitude keep them
+/// the separation apart.
 #[test]
 fn relays_within_the_error_are_in_order_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {
@@ -111,7 +112,7 @@ fn relays_within_the_error_are_in_order_if_they_may_pass() {
 }
 
 /// Checks that two neighbours in the wrong order along x halt the relay between them. Each of the two may seem to be
-/// on the right side of that relay, within the errors of the reports.
+/// on the correct side of that relay, within the errors of the reports.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -495,9 +496,9 @@ fn gaps_that_are_negative_by_the_error_add_up() {
     assert!((100.0..=100.5).contains(&told), "{told}");
 }
 
-/// Checks that a new neighbour upstream raises a fence (limit of x) that relay 3 has already passed. The fence is
-/// that of relay 2, beside which relay 1 starts; the two are in order only within the error of the reports. Each next
-/// fence of relay 2 then is the separation beyond relay 1, too (rule 7).
+/// Checks that relay 2 raises its fence (limit of x for relay 3) after relay 1 has started beside it. Relay 3 has
+/// passed the lower fence before. Relay 1, upstream, is in order with relay 2 only within the error of the reports,
+/// so that the fence of relay 2 must be the separation beyond relay 1, too (rule 7).
 #[test]
 fn a_new_neighbour_upstream_raises_a_fence_that_was_cleared() {
     let config = GuardConfig {

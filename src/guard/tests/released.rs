@@ -310,8 +310,8 @@ fn lost_messages_are_repeated() {
     assert!(row.all.iter().all(|one| one.guard.has_arrived()));
 }
 
-/// Checks that late messages change nothing after a pilot has taken a drone over or given it back. For the
-/// neighbours, old fence messages do not end the manual control, and old leave notices do not begin it again.
+/// Checks that late messages change nothing after a pilot has taken a drone over or given it back. Its neighbours
+/// take neither an old fence message for the end of the manual control, nor an old leave notice for its beginning.
 #[test]
 fn late_messages_do_not_change_who_is_flown() {
     let mut row = Row::new();

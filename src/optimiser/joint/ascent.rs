@@ -14,9 +14,8 @@ const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 /// relay's distance from the interferer. The same number limits the change of the target SIR, in ln(SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust region (limit of a relay's move) at which the result of an ascent is predicted. An ascent improves
-/// one chain; its result is the final target SIR. A smaller limit holds the relays back, so that the prediction would
-/// be too low.
+/// Minimum trust region (limit of a relay's move) at which an ascent's final target SIR is predicted. An ascent
+/// improves one chain. A smaller limit holds the relays back, so that the prediction would be too low.
 const RESTRAINED: f32 = 0.05;
 
 /// Trust region (limit of a relay's move) below which an ascent ends, because it makes no progress. An ascent
@@ -28,14 +27,14 @@ const LEAST_TRUST: f32 = 1e-4;
 /// make them too long. The usual rate is 0.5, since hop lengths vary as 1 / sqrt(SIR).
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the upper limit of a chain's target SIR is raised, in ln(SIR). The limit is raised if a
-/// chain that meets it fails the check against the upper bound of all chains.
+/// First amount by which a chain's limit of the target SIR is raised, in ln(SIR). At its limit a chain is checked
+/// against the upper bound of all chains. If it misses the bound, its limit is raised.
 const EXCESS: f32 = 0.03;
 
 /// First cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. Spare length above the
 /// cap does not count, so that it cannot outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
-/// Value below which the cap on the chain's spare length at Rx is not lowered any further. It is a fraction of the
+/// Smallest cap on the chain's spare length at Rx: the cap is not lowered below this value. It is a fraction of the
 /// distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
@@ -50,8 +49,8 @@ const CLOSE: f32 = 3e-6;
 /// Expected increase of the target SIR below which the improvement of a chain ends, in ln(SIR).
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of the target SIR below which its final value can be predicted, in ln(SIR). Final is the value
-/// at the end of the ascent, the improvement of one chain.
+/// Expected increase of the target SIR below which an ascent's final target is predicted, in ln(SIR). An ascent
+/// improves one chain.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which an ascent (improvement of one chain) is checked for divergence. It has diverged
@@ -86,11 +85,11 @@ pub(crate) struct Ascent {
     /// 0 if the chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Upper limit of the target SIR, in ln(SIR). A chain that meets the limit is checked against the upper bound of
-    /// all chains.
+    /// Target SIR at which the chain is checked against the upper bound of all chains, in ln(SIR). If it meets the
+    /// bound, no chain can be better. If it misses the bound, this limit is raised.
     limit: f32,
-    /// Next increase of the upper limit of the target SIR, in ln(SIR). It is made if a chain that meets the limit
-    /// fails the check against the upper bound of all chains.
+    /// Next increase of `limit`, the target SIR at which the chain is checked, in ln(SIR). It is made if the chain
+    /// misses the upper bound of all chains.
     excess: f32,
     /// Cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. It is lowered if relays
     /// too near the interferer cause a penalty, so that spare length cannot outweigh the penalty.
@@ -140,8 +139,8 @@ impl Ascent {
         }
     }
 
-    /// Returns this ascent with an upper limit of its target SIR, in ln(SIR). A chain that meets the limit is checked
-    /// against the upper bound of all chains.
+    /// Returns this ascent with a `limit`: the target SIR at which its chain is checked, in ln(SIR). If the chain
+    /// then meets the upper bound of all chains, no chain can be better.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -184,13 +183,14 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the target SIR has reached its upper limit, and the current chain meets that target.
+    /// Returns true if the chain has to be checked against the upper bound of all chains. This is so if the target
+    /// SIR has reached its limit, and the chain meets that target.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the upper limit of the target SIR, and returns the next action. The chain that met the old limit has
-    /// failed the check against the upper bound of all chains.
+    /// Raises the limit of the target SIR, and returns the next action. The chain has met the old limit, but was
+    /// found to miss the upper bound of all chains.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -243,8 +243,8 @@ impl Ascent {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only then it
-    /// is improved again with a lower cap on its spare length.
+    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a
+    /// chain is improved again, with a lower cap on its spare length.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }

@@ -43,8 +43,9 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
-    /// Returns c of the hop to relay `index`, target SIR over gain. c determines the hop's maximum length. It
-    /// includes the factor 1 + noise / interference at the sender's position `from`.
+    /// Returns c of the hop to relay `index`: its target SIR over its gain. c determines the hop's maximum length.
+    /// With noise c includes the factor 1 + noise / interference at the sender's position `from`, because the
+    /// position of the relay is not chosen yet.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -117,8 +118,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     }
 }
 
-/// Returns the lateral offset and altitude, at the x of Rx, at which a relay receives Tx best. Both are limits of the
-/// ranges in `room`, or the lateral offset is 0.
+/// Returns the lateral offset and altitude at which a relay at the x of Rx receives Tx best. Candidates are the
+/// limits of the ranges in `room`, and the lateral offset 0. The initial chain `Far` begins there.
 pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -135,7 +136,8 @@ pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Roo
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays in one segment of the chain; the policies of one segment are in memory. 0 without `altitude`.
+/// Number of relays in one segment of the chain; 0 without the feature `altitude`. The policies (computed moves) of
+/// one segment are in memory at a time.
 pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
     SEGMENT
 } else {

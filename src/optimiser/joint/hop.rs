@@ -66,7 +66,8 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Derivatives of a hop whose end depends neither on its start nor on its target: all are 0.
+    /// Derivatives of a hop whose end is at the x of Rx, or at the rim of what the hop reaches: all are 0. No
+    /// coordinate of such an end depends on the others, on the hop's start, or on the target.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],

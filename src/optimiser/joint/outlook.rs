@@ -21,13 +21,13 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient of f in the predicted gain of slack (spare length at Rx), m.
+    /// Coefficient a in the predicted gain a f + b f^2 of slack (spare length at Rx), m.
     ///
-    /// The gain is predicted for relays toward Rx that make a fraction f of their computed moves.
+    /// f is the fraction of their computed moves that the relays toward Rx make.
     pub(crate) linear: f32,
-    /// Coefficient of f^2 in the predicted gain of slack (spare length at Rx), m.
+    /// Coefficient b in the predicted gain a f + b f^2 of slack (spare length at Rx), m.
     ///
-    /// The gain is predicted for relays toward Rx that make a fraction f of their computed moves.
+    /// f is the fraction of their computed moves that the relays toward Rx make.
     pub(crate) square: f32,
 }
 
@@ -74,9 +74,9 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function from the receiver of `hop` to its sender; returns the policy. The policy is the
-    /// receiver's move in two coordinates, within [`low`, `high`], m, relative to its current position. Its third
-    /// coordinate, `axis`, then follows from the hop's maximum length.
+    /// Propagates the value function from `hop`'s receiver to its sender; returns the receiver's policy. The policy
+    /// is a move of the receiver in two coordinates, within [`low`, `high`], m, relative to its current position. The
+    /// third coordinate, `axis`, then follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -172,8 +172,8 @@ pub(crate) struct Policy {
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature of the value function, relative to the largest one. A relay's move is divided by the curvature,
-/// and a smaller value is only rounding noise.
+/// Minimum curvature of the value function, relative to its largest curvature. A relay's move is divided by the
+/// curvature, and a smaller one would be only rounding noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
@@ -325,7 +325,7 @@ impl Brief {
     }
 }
 
-/// Returns a finite value rounded to three digits.
+/// Compresses a finite f32 to 16 bits, which keep about three decimal digits; `widened` restores it.
 pub(super) const fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }

@@ -634,9 +634,9 @@ impl Site<'_> {
 
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// It is the one with the steepest slope of those that are not at a limit of their allowed range, `low` to
-    /// `high`. The second result is the derivative of F by the selected coordinate. F is half the margin of the hop
-    /// to its target: 0 for a hop of maximum length (see `hop`).
+    /// It is the coordinate by which F changes most, of those that are not at a limit of their allowed range, `low`
+    /// to `high`. x is preferred. F is half the margin of the hop to its target: 0 for a hop of maximum length (see
+    /// `hop`). The second result is the derivative of F by the selected coordinate.
     fn axis(
         &self,
         c: f32,

@@ -20,8 +20,8 @@ pub(super) enum Start {
     /// Initial chain on a spiral about the interferer. It leads from Tx to Rx through a position right above or
     /// beside the interferer.
     ///
-    /// `aside` and `up` are the direction of that position from the interferer; `far` is its distance, relative to
-    /// the geometric mean of the distances of Tx and Rx.
+    /// `aside` and `up` are the direction of that position from the interferer. `far` is its distance from the
+    /// interferer, relative to the geometric mean of those of Tx and Rx.
     Around { aside: f32, up: f32, far: f32 },
     /// Initial chain on a parabola as `Arch`, computed without a minimum separation. Its highest target is then
     /// searched with hops computed exactly as the relays compute them; a relay may stay short of its farthest
@@ -61,7 +61,8 @@ const ARCHES: [(f32, f32); 7] = [
 const THROUGH: usize = 3;
 
 /// Initial chains for relays of which some have a fixed altitude. Each has the lateral offset of its middle, in units
-/// of half the distance from Tx to Rx. The `bool` is true if the altitude is level toward Tx and Rx.
+/// of half the distance from Tx to Rx. The `bool` is true if the altitude is constant before the first and after the
+/// last fixed one.
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -71,8 +72,9 @@ const HELD: [(f32, bool); 6] = [
     (0.25, true),
 ];
 
-/// Spiral initial chains: `aside`, `up` and `far` of each. These are the direction of an intermediate position from
-/// the interferer (lateral, up), and its distance relative to the geometric mean of the distances of Tx and Rx.
+/// Spiral initial chains: `aside`, `up` and `far` of each. `aside` and `up` are the direction of an intermediate
+/// position from the interferer. `far` is its distance from the interferer, relative to the geometric mean of those
+/// of Tx and Rx.
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
     (1.0, 0.0, 1.0),

@@ -79,12 +79,14 @@ use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Extremum, first_hop_turn, square};
 
-/// Case of the optimal x at a given altitude. The first five cases are those of Corollary 1, for X >= 0.
+/// Case of the optimal x at a given altitude. The first five cases are those of the paper's Corollary 1, for an
+/// interferer at X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum PlaceCase {
-    /// Optimum at x = 0: the first hop is the worse one even right above Tx. The power ratio p_t / p_u is below C_1.
+    /// Optimum at x = 0: the first hop is the worse one even right above Tx. The ratio of the powers of Tx and relay
+    /// is below C_1 ([`Guide::c1`]).
     AboveTx = 1,
     /// Optimum at the only x where both hops have the same SIR. The first hop's SIR falls all the way to Rx, and
     /// crosses the second's once.
@@ -92,7 +94,8 @@ pub enum PlaceCase {
     /// Optimum above Rx: the first hop's SIR falls all the way to Rx, and is the higher one even there.
     AboveRx = 3,
     /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is above Rx
-    /// instead if the first hop's SIR has risen enough beyond its minimum.
+    /// instead if the worse hop's SIR is higher there, because the first hop's SIR has risen again beyond its
+    /// minimum.
     BeforeValley = 4,
     /// Optimum above Rx: the first hop's SIR has a minimum before Rx, and is the higher one even there.
     OverValley = 5,
@@ -107,8 +110,8 @@ pub enum PlaceCase {
     Level = 9,
     /// Optimum above Rx: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 10,
-    /// Optimum at the maximum of the first hop's SIR after its minimum, or at the SIRs' crossing after it. Only with
-    /// noise.
+    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. If it is beyond, both hops
+    /// have the same SIR there. Only with noise.
     SecondHill = 11,
 }
 
@@ -198,7 +201,7 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
 #[repr(u8)]
 pub enum AltitudeCase {
     /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises. This is so if X <= 0, or if x <=
-    /// (X^2 + Y^2) / 2X, the paper's Psi^h.
+    /// (X^2 + Y^2) / 2X (the paper's Psi^h), with the interferer at (X, Y).
     BothFall = 1,
     /// Optimum at the altitude where the first hop's SIR, rising with altitude, equals the second's.
     Crossing = 2,
@@ -333,7 +336,8 @@ pub struct Guide {
     pub c2: f32,
     /// Ratio C_3: above it the first hop is the better one even at the minimum of its SIR.
     ///
-    /// The minimum is between Tx and Rx or beyond. `None` for X <= 0; with noise, the minimum before the maximum.
+    /// The minimum is between Tx and Rx or beyond. `None` without a minimum, as for an interferer at X <= 0. With
+    /// noise it is the minimum before the maximum.
     pub c3: Option<f32>,
 }
 

@@ -113,8 +113,8 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
 }
 
 /// Returns both extrema of the first hop's mean SIR along x, ascending, m. Upsilon = E[1/I] is linear in [`low`,
-/// `high`]: for Upsilon = a + b x they are the roots of b x^2 + 2 a x - b h^2 = 0. `high` twice if Upsilon is
-/// constant.
+/// `high`]: for Upsilon = a + b x they are the roots of b x^2 + 2 a x - b h^2 = 0, with the altitude h. `high` twice
+/// if Upsilon is constant.
 fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
     let b = (at_high - at_low) / (high - low);

@@ -21,8 +21,8 @@ use super::super::chain::{Seat, SolverContext};
 use super::super::hop::{Triple, minus};
 use crate::sir::{Sender, transmitter_gain};
 
-/// Amount added to each squared hop length, so that its logarithm is finite. Relays may share a position. The amount
-/// is in units of D^2; D is the distance from Tx to Rx.
+/// Amount added to each squared hop length, so that its logarithm is finite. Two relays may be at one place. The
+/// amount is in units of D^2; D is the distance from Tx to Rx.
 const SHORTEST: f32 = 1e-8;
 
 /// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
@@ -70,14 +70,14 @@ pub(super) struct Gains {
     /// Receiver noise over the interferer's power received at the distance D (nu). D is the distance from Tx to Rx.
     noise: f32,
     common_w: f32,
-    /// Logarithm of the gain of a hop between relays, if the sender has the common power. The hop's SIR is its gain
-    /// times the inverse interference at the receiver, over the squared length.
+    /// Logarithm of the gain of a hop between relays, if the sender has the mission's common relay power. The hop's
+    /// SIR is its gain times the inverse interference at the receiver, over the squared length.
     relay: f32,
-    /// Logarithm of the gain of the hop to Rx, if the sender has the common power. The SIR at Rx is the gain over the
-    /// squared length.
+    /// Logarithm of the gain of the hop to Rx, if the sender has the mission's common relay power. The SIR at Rx is
+    /// the gain over the squared length.
     to_rx: f32,
-    /// Logarithm of the gain of the return hop to Tx, if the sender has the common power. The SIR at Tx is the gain
-    /// over the squared length.
+    /// Logarithm of the gain of the return hop to Tx, if the sender has the mission's common relay power. The SIR at
+    /// Tx is the gain over the squared length.
     to_tx: f32,
     /// Logarithm of the gain of the hop from Tx to a relay. The hop's SIR is its gain times the inverse interference
     /// at the relay, over the squared length.
@@ -121,8 +121,8 @@ impl Gains {
         }
     }
 
-    /// Returns the logarithms of hop `k`'s gains, 1..=N + 1: forward (toward Rx), and backward over r. r is the
-    /// required ratio of backward to forward SIR.
+    /// Returns the logarithms of two gains of hop `k`: forward (toward Rx), and backward divided by r. r is the
+    /// required ratio of backward to forward SIR. `k` is 1 (from Tx) to N + 1 (to Rx).
     fn of(&self, k: u16, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> [f32; 2] {
         let relays = chain.mission.relays();
         let power = |index: u16| {
@@ -156,7 +156,7 @@ impl Gains {
 
     /// Returns the two levels of hop `k`: ln(forward SIR), and ln(backward SIR / r). r is the required ratio of
     /// backward to forward SIR. The hop leads from `from` to `to`; `quiet_from` and `quiet_to` are ln(inverse
-    /// interference) there.
+    /// interference) at these two positions.
     pub(super) fn levels(
         &self,
         k: u16,
@@ -179,8 +179,8 @@ impl Gains {
 
     /// Returns the derivatives of hop `k`'s two levels by the positions of its ends `from` and `to`. The levels are
     /// ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The second
-    /// derivatives are summed with the `weights` of both levels, and negated. `convex` leaves out what would make
-    /// that sum indefinite.
+    /// derivatives are summed with the `weights` of both levels, and negated. If `convex` is true, terms that would
+    /// make that sum indefinite are left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -220,8 +220,8 @@ impl Gains {
     }
 
     /// Adds the derivatives of ln q by the position `at`; q is the inverse of interference plus noise. The first
-    /// derivatives are added to `slope`, and the second ones, multiplied by -`weight`, to `bend`. `convex` leaves out
-    /// what would make the second ones indefinite.
+    /// derivatives are added to `slope`, and the second ones, multiplied by -`weight`, to `bend`. If `convex` is
+    /// true, terms that would make `bend` indefinite are left out.
     fn add_quiet(
         &self,
         at: Triple,

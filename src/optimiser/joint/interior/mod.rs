@@ -34,41 +34,44 @@ use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight mu for a start that may be far from the result, times the number of levels. A chain has two
-/// levels per hop: the logarithms of its forward and backward SIR.
+/// First barrier weight mu for all levels together, for a start that may be far from the result. mu of one level is
+/// this over the number of levels. A chain has two levels per hop: the logarithms of its forward and backward SIR.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight mu for a start close to the result, times the number of levels (two per hop).
+/// First barrier weight mu for all levels together (two per hop), for a start close to the result.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight mu, times the number of levels (two per hop). The result is within this of a local optimum, in
+/// Last barrier weight mu for all levels together (two per hop). The result is within this of a local optimum, in
 /// ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
 /// Factor by which the barrier weight mu falls once the positions have settled for the current mu.
 const LESS: f32 = 0.3;
 
-/// Gain of merit below which the barrier weight mu falls, after more than half of a Newton step. The merit is the
-/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
+/// Gain of the merit below which the positions count as settled, after more than half of a Newton step. The barrier
+/// weight mu then falls. The merit is the target plus the barrier; its gain is in units of mu times the number of
+/// levels (two per hop).
 const SETTLED: f32 = 0.1;
-/// Gain of merit below which the barrier weight mu falls, after any fraction of a Newton step. The merit is the
-/// target plus the barrier; the gain is in units of mu times the number of levels (two per hop).
+/// Gain of the merit below which the positions count as settled, after any fraction of a Newton step. The barrier
+/// weight mu then falls. The merit is the target plus the barrier; its gain is in units of mu times the number of
+/// levels (two per hop).
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Maximum fraction of the way to a coordinate's limit that a step may take.
+/// Maximum step of a coordinate toward its limit, as a fraction of its distance from that limit.
 const NEAR_BOX: f32 = 0.98;
 /// Factor by which a step is shortened for the next try, after a try that lowers the merit.
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and its central value mu / s. mu is the barrier weight, s the excess
-/// of the level (logarithm of a hop's SIR in one direction) over the target.
+/// Maximum factor by which a Lagrange multiplier may differ from mu / s, its value at the optimum. Multipliers
+/// farther away are corrected to this factor. mu is the barrier weight, s the excess of the level (logarithm of a
+/// hop's SIR in one direction) over the target.
 const APART: f32 = 5.0;
 
-/// Number of Newton steps for the target T that one portion of the work takes. T, in ln(SIR), is slightly below the
-/// chain's worst SIR.
+/// Number of Newton steps for the target T in one portion of the work. T, in ln(SIR), is slightly below the chain's
+/// worst SIR.
 const STEPS: u8 = 4;
-/// Index, from 0 on, of the last Newton step for the target T. T, in ln(SIR), is slightly below the chain's worst
+/// Index of the last Newton step for the target T, counted from 0. T, in ln(SIR), is slightly below the chain's worst
 /// SIR.
 const TARGETS: u8 = 12;
 /// Relative error at which the Newton steps for the target T end. T, in ln(SIR), is slightly below the chain's worst
@@ -157,20 +160,21 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of the hops' levels from this hop on, with the positions that are tried. A level is the logarithm
-    /// of a hop's SIR in one direction.
+    /// Computation of all hops' levels at the tried positions; the field is the next hop. A level is the logarithm of
+    /// a hop's SIR in one direction.
     Levels(u16),
-    /// Computation of the target T from all levels, after this number of its Newton steps. T, in ln(SIR), is slightly
-    /// below the chain's worst SIR.
+    /// Computation of the target T from all levels; the field is the number of Newton steps already done. T, in
+    /// ln(SIR), is slightly below the chain's worst SIR.
     Target(u8),
-    /// Summation of the merit, from this hop on. The merit (target plus barrier) decides if a step is accepted.
+    /// Summation of the merit over all hops; the field is the next hop. The merit (target plus barrier) decides if a
+    /// step is accepted.
     Merit(u16),
-    /// Storage of the accepted positions, and of new Lagrange multipliers, from this hop on.
+    /// Storage of the accepted positions and of new Lagrange multipliers; the field is the next hop.
     Accept(u16),
-    /// Elimination of the relays of this segment from the Newton system.
+    /// Elimination of all relays from the Newton system; the field is the next segment of the chain.
     Eliminate(u16),
-    /// Computation of the Newton steps of the relays in one part of this segment. `true` for its second part, which
-    /// is computed before its first part.
+    /// Computation of the relays' Newton steps; the fields are the next segment of the chain and its part. `true` is
+    /// the second part, which is computed before the first one.
     Substitute(u16, bool),
 }
 
@@ -184,7 +188,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
-    /// Newton steps of the current segment's second part, until those of its first part are known.
+    /// Newton steps of the current segment's second part, kept until its first part is computed.
     second: [Step; SECOND],
     /// Newton step of the next relay toward Rx, from which the current relay's step follows.
     ahead: Triple,
@@ -201,8 +205,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     share: f32,
     sums: Sums,
     by_target: f32,
-    /// True if the stored Lagrange multipliers are to be replaced by mu / s. mu is the barrier weight, s the excess
-    /// of a level (logarithm of a hop's SIR in one direction) over the target.
+    /// True if the stored Lagrange multipliers are to be replaced by mu / s, their values at the optimum. mu is the
+    /// barrier weight, s the excess of a level (logarithm of a hop's SIR in one direction) over the target.
     resets: bool,
     convex: bool,
     tries: u8,
@@ -336,7 +340,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         step.map_or([0.0; 3], |step| step.map(widened))
     }
 
-    /// Returns the position and limits of node `index` after the tried fraction of its Newton step.
+    /// Returns the position of node `index` plus the tried fraction of its Newton step, and its limits.
     #[inline(never)]
     fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
@@ -356,8 +360,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Begins to evaluate the stored positions without a step. If `resets`, new Lagrange multipliers then replace the
-    /// stored ones.
+    /// Begins to evaluate the stored positions, without a step. If `resets` is true, new Lagrange multipliers then
+    /// replace the stored ones.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -370,9 +374,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Processes one portion of the interior-point method. Ready at its end with a target in ln(SIR), slightly below
-    /// what the stored positions reach. Each forward SIR is above it, and each backward SIR over r, the required
-    /// ratio of backward to forward SIR.
+    /// Processes one portion of the interior-point method. After the last portion it is ready with a target in
+    /// ln(SIR), slightly below what the stored positions reach. Each forward SIR is above the target, and so is each
+    /// backward SIR over r, the required ratio of backward to forward SIR.
     pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let relays = chain.mission.relays();
         let done = match self.work {
@@ -420,9 +424,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds to the barrier the limits of their ends. The levels
-    /// are ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The barrier
-    /// is the sum of the logarithms of the distances to all limits.
+    /// Computes the levels of ten hops from hop `k` on, and adds the part of their ends to the barrier. A level is
+    /// ln(forward SIR) or ln(backward SIR / r); r is the required ratio of backward to forward SIR. The barrier keeps
+    /// positions between their limits: it is the sum of ln(distance to a limit).
     fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -520,9 +524,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k`, and limits the multipliers of the hop that ends there. A multiplier
-    /// stays within a factor of mu / s; mu is the barrier weight, s the excess of a level (logarithm of the SIR) over
-    /// the target.
+    /// Stores the new position of relay `k`, and corrects the multipliers of the hop that ends there. A Lagrange
+    /// multiplier stays within the factor [`APART`] of mu / s; mu is the barrier weight, s the excess of a level
+    /// (logarithm of the SIR) over the target.
     fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         if self.share > 0.0 && k <= relays {
@@ -542,7 +546,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Begins the next Newton step from the accepted positions, or lowers the barrier weight mu. After the maximum
-    /// number of steps it ends: ready with the target, in ln(SIR).
+    /// number of steps the method ends: ready with the target, in ln(SIR).
     fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -562,7 +566,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Lowers the barrier weight mu and continues; after the last mu, ready with the target, in ln(SIR). `resets` is
-    /// true to replace the Lagrange multipliers, after no step with them raised the merit (target plus barrier).
+    /// true to replace the Lagrange multipliers, because no step with them has raised the merit (target plus
+    /// barrier).
     fn lower(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -700,7 +705,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Shortens the Newton steps of all relays, so that the `step` of the relay at `spot` keeps its limits.
+    /// Shortens the Newton steps of all relays, so that the relay at `spot` stays within its limits. `step` is that
+    /// relay's whole step.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let spans = (spot.below(), spot.above());
         for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
@@ -712,8 +718,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Updates the Lagrange multipliers of hop `k` for the whole Newton steps `from` and `to` of its ends. `ends` are
-    /// their positions before the steps.
+    /// Updates the Lagrange multipliers of hop `k` for whole (not shortened) Newton steps of its ends. `from` and
+    /// `to` are these steps, and `ends` the positions before them.
     fn follow(&mut self, relays: u16, k: u16, ends: [Triple; 2], [from, to]: [Triple; 2]) {
         let (hop, weights) = self.derivatives(relays, k, ends);
         let ([a, b], [c, d]) = (&hop.by_from, &hop.by_to);

@@ -43,15 +43,16 @@ pub(super) struct Front {
     taken: Triple,
 }
 
-/// Row of the equation for one coordinate of an eliminated relay, divided by its Cholesky factor. The first three
-/// values are for the next relay's x, y and h. The last two are right sides: for a constant target, and per unit that
-/// the target changes.
+/// Row of an eliminated relay's equations, after forward substitution with its Cholesky factor. The first three
+/// values are the coefficients of the next relay's steps in x, y and h. The last two are right sides: for a constant
+/// target, and per unit that the target changes.
 type Row = [f32; 5];
 
 /// Equations of one relay after its elimination, from which its Newton step follows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh.
+    /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. Those of the
+    /// diagonal are stored inverted, because they are divisors.
     lower: [f32; 6],
     /// Rows of the equations for the relay's x, y and h.
     rows: [Row; 3],
@@ -76,15 +77,15 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns Lagrange multiplier over slack for both directions of the hop. A slack is the excess of ln(SIR) over
-    /// the target.
+    /// Returns the Lagrange multiplier divided by the slack, for both directions of the hop. A slack is the excess of
+    /// ln(SIR) over the target.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the barrier weight mu over the slack for both directions of the hop. At the optimum for one mu the
-    /// Lagrange multipliers have these values. A slack is the excess of ln(SIR) over the target.
+    /// Returns the barrier weight mu divided by the slack, for both directions of the hop. At the optimum for one mu
+    /// the Lagrange multipliers have these values. A slack is the excess of ln(SIR) over the target.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
@@ -105,8 +106,8 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop` from the Newton system. `self` has the rows of that relay, and then those of
-    /// the node at `spot`, where `hop` ends.
+    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of that relay, and on
+    /// return those of the node at `spot`, where `hop` ends.
     ///
     /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
     /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
@@ -160,8 +161,8 @@ impl Front {
         barrier(mu, c, f, h, hh);
     }
 
-    /// Adds the hop to the next node to this relay's rows, and eliminates this relay. `None` if a pivot is not
-    /// positive.
+    /// Adds to this relay's rows the hop that leads to the next node, and eliminates this relay. `None` if a pivot is
+    /// not positive.
     fn eliminate(
         &mut self,
         hop: &Derivatives,

@@ -28,9 +28,9 @@ const LINE: u16 = 2;
 /// Number of relays whose initial positions one portion of the work sets.
 const PUT: u16 = 20;
 
-/// Fraction by which the initial x of relays move toward even spacing, to separate relays at one x. It is also the
-/// relays' minimum distance to their limits, as a fraction of the permitted range. The first value is for a first run
-/// of the interior-point method, the second for its repetitions.
+/// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays
+/// at the same x. The fraction is also the relays' minimum distance to their limits, relative to the permitted range.
+/// The first value is for the first run of the method, the second for its repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Initial chain of the search, described from the end (Tx or Rx) with more power to the other end.
@@ -129,7 +129,8 @@ enum Work {
 /// Progress of Algorithm 1 for one target: in its pass from Tx to Rx, or in its pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
-    /// Index of the last relay that the pass has computed; 0 before the first and at the end.
+    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
+    /// back.
     index: u16,
     /// True during the pass back to Tx.
     is_back: bool,
@@ -280,7 +281,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
-    /// altitude, gets that of chain 1, of which it uses nothing but that its x are those of Algorithm 1.
+    /// altitude, has the description of chain 1, of which it only uses `even`: the x are those of Algorithm 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
@@ -464,6 +465,6 @@ const NEW: f32 = 3e-4;
 /// Maximum number of runs of the interior-point method from x of Algorithm 1, per initial chain.
 const AGAIN: u8 = 4;
 
-/// Distance of the first target to try above the result of the interior-point method, in ln(SIR). It is as much as
-/// the method may miss a local optimum by.
+/// Excess of the first target to try over the result of the interior-point method, in ln(SIR). The method may miss a
+/// local optimum by this much.
 const ABOVE: f32 = 1e-4;

@@ -20,8 +20,8 @@ pub(super) const JUDGED: f32 = 4e-6;
 /// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Excess of the first upper limit of a chain's target over the bound of all chains, in ln(SIR). A chain that meets
-/// its limit is checked against the bound, which the first and the last hop set.
+/// Excess of a chain's first limit of the target SIR over the upper bound of all chains, in ln(SIR). At its limit the
+/// chain is checked against that bound, which the first and the last hop set.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {

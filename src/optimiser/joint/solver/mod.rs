@@ -104,7 +104,7 @@ impl Purpose {
     }
 }
 
-/// Solver of a chain for one direction.
+/// Joint solver of a chain that carries data in one direction only, from Tx to Rx.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is told on its own, by another part of the work"
@@ -236,7 +236,8 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
     0
 };
 
-/// State of the solver for one direction, or of that for both. A mission needs only one, so they share their memory.
+/// Joint solver of a chain: the solver for data in one direction, or the one for both directions. A mission needs
+/// only one of them, so they share their memory.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -419,9 +420,9 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solved chain, and the number of `step` calls. The chain is the target, and each relay's lateral
-    /// offset and altitude, as the bits of f32 numbers. If `once_more`, the best chain is computed a second time
-    /// instead of stored.
+    /// Returns the solved chain as the bits of f32 numbers, and the number of `step` calls. The first entry has the
+    /// target, and the others each relay's lateral offset and altitude. If `once_more`, the best chain is computed a
+    /// second time instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
