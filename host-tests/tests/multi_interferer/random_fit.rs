@@ -8,7 +8,7 @@ use uav_relay_scenario::hypothetical::{Raster, fit};
 use super::above;
 use super::scenes::scene;
 
-/// Number of positions that are drawn for a single interferer in place of several, in each scene.
+/// Number of random positions that are tried, in each scene, for one interferer in place of several.
 const DRAWN: usize = 20_000;
 
 /// Number of best drawn positions of the interferer whose error is computed again on the fine raster.

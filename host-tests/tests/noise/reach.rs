@@ -31,8 +31,8 @@ fn reaches_in_noise_agree_with_the_reference() {
     );
 }
 
-/// Checks that the reach of a hop falls with the target SIR, and rises with the hop's start. The reach is the
-/// farthest position that meets the target; the tolerance is two f32 steps.
+/// Checks that a hop's reach falls with the target SIR, and rises with the x of the hop's sender. The reach is the
+/// receiver's farthest x that meets the target; the tolerance is two f32 steps.
 #[test]
 fn the_reach_in_noise_is_monotonic() {
     let mut rng = generator(1112);

@@ -112,7 +112,7 @@ fn single_hops_match_the_file() {
     }
 }
 
-/// Checks that hops between air and ground use eta and hops between drones `mu_los`.
+/// Checks that hops between air and ground use the path loss `eta`, and hops between drones `mu_los`.
 ///
 /// The SIRs are worked out by hand, because the two factors are equal in all cases of the file.
 #[test]

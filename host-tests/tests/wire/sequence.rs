@@ -167,7 +167,7 @@ fn unexpected_or_unfit_messages_are_stale() {
     }
 }
 
-/// Checks that a sweep in a field of interference loses the targets that need its sender beyond Rx.
+/// Checks that targets that need the previous sender beyond Rx are removed from a sweep in a field.
 ///
 /// The message lists the position that its sender needs for each target SIR. Here no target remains, so that the
 /// relay forwards an empty list.
