@@ -69,7 +69,7 @@ proptest! {
     }
 }
 
-/// Checks that the crate decodes a body by the tables of `FORMAT.md`, or refuses it for the same reason.
+/// Checks that the crate decodes a body by the tables of `FORMAT.md`, or refuses it as they do.
 fn check_by_tables(body: &[u8]) {
     let read = Message::decode(body);
     match WireMessage::read(body) {
