@@ -186,7 +186,7 @@ pub struct DrawnHop {
     pub index: u16,
     /// Distance of the hop's sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// SIR of the hop, linear, without noise, if its sender and the interferer are equally far away.
+    /// SIR of the hop, linear, without noise, if sender and interferer are equally far from the receiver.
     pub gain: f64,
     relays: u16,
 }

@@ -28,8 +28,8 @@ fn with(link: &Link, relays: usize) -> Link {
     link
 }
 
-/// Returns the fewest relays that meet `target`, by trying each number in f64. Returns 0 if there is none up to
-/// `most`.
+/// Returns the fewest relays that meet `target`, by trying every number of relays in f64. Returns 0 if no number up
+/// to `most` suffices.
 fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
     let all = with(link, most);
     let mut from = 0.0;

@@ -29,7 +29,7 @@ fn golden() -> Vec<Frame> {
 
 /// Returns corpus inputs for the target `deframe`: test vectors, and three of them with noise between.
 ///
-/// Each input begins with the lengths of the two pieces into which its stream is cut.
+/// Each input begins with two lengths. The stream is cut into pieces of these lengths in turn.
 fn deframe() -> Vec<Vec<u8>> {
     let wires: Vec<_> = golden().into_iter().map(|frame| frame.wire).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();

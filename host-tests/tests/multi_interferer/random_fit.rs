@@ -13,7 +13,7 @@ const DRAWN: usize = 20_000;
 
 /// Number of best drawn positions of the interferer whose error is computed again on the fine raster.
 ///
-/// A coarse raster has selected them.
+/// The first comparison of all drawn positions uses a coarse raster, because it is faster.
 const WEIGHED: usize = 100;
 
 #[test]
