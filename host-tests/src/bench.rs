@@ -28,7 +28,7 @@ pub struct Frame {
     pub from: usize,
     /// Node that receives the frame: 0 is the transmitter, then come the relays, and last the receiver.
     pub to: usize,
-    /// Port at which the receiver gets the frame.
+    /// Port of the receiving node at which the frame arrives.
     pub port: Port,
     pub bytes: Vec<u8>,
 }
@@ -94,7 +94,7 @@ impl Bench {
         bench
     }
 
-    /// Creates a bench with all relays of `mission`; `settings` returns those of a relay by its index.
+    /// Creates a bench with all relays of `mission`. `settings` returns the settings of the relay with an index.
     ///
     /// The seed of a relay's random numbers is its index.
     ///

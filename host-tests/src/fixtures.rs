@@ -6,7 +6,7 @@ use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission;
 
-/// Network number of the relays in these tests.
+/// Network number of the relays in these tests. A relay ignores frames with another network number.
 pub const NETWORK: u16 = 7;
 
 /// Returns the mission of the paper's chain with `relays` relays, without a minimum separation.

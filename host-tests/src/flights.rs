@@ -84,7 +84,9 @@ pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
     start.collect()
 }
 
-/// Returns eight drones that start in a row `gap_m` apart, with random speeds and exact positions.
+/// Returns eight drones that start in a row at least `gap_m` apart, with random speeds.
+///
+/// The positions that the drones report have no errors.
 pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     let start = in_a_row(rng, gap_m);
     let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
@@ -107,6 +109,8 @@ pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
 }
 
 /// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list.
+///
+/// With an empty list, all relays have the common profile of the mission.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();
@@ -123,7 +127,7 @@ pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     own.collect()
 }
 
-/// Returns random fault probabilities: loss up to 50 %, the three others up to 20 % each.
+/// Returns random fault probabilities: frame loss to 50 %; corruption, duplication, reordering to 20 %.
 pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     Faults {
         loss: rng.random_range(0.0..=0.5),

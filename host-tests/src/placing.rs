@@ -61,7 +61,7 @@ pub fn reference(at: Placement) -> Place {
 
 /// Checks the crate's hop SIRs on 4 000 random chains against the reference, to 1e-6 relative.
 ///
-/// `draw` draws a link; its relays get random x in rising order.
+/// `draw` draws a chain of the reference model. This function then draws x of its relays, in rising order.
 pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Link) {
     let mut worst = 0.0_f64;
     for _ in 0..4_000 {
@@ -106,9 +106,9 @@ pub struct Solved {
 
 /// Checks that the crate's solution is at most `allowed` (relative) below the optimum, never above.
 ///
-/// The relays of the link have one altitude; for these the crate's rule, that each relay goes as far as the target
-/// SIR allows, finds the optimum. Returns `None` if every chain has an SIR of 0, after a check that the crate reports
-/// so.
+/// The relays of `link`, the chain, have one altitude; for these the crate's rule, that each relay goes as far as the
+/// target SIR allows, finds the optimum. Returns `None` if every chain has an SIR of 0, after a check that the crate
+/// reports so.
 pub fn optimum_is_found(
     link: &Link,
     (mission, own): &(Mission, Vec<(u16, Profile)>),
@@ -175,25 +175,25 @@ impl Mixed {
     }
 }
 
-/// Hop of a random link, with the position of its sender.
+/// Hop of a random chain, with the position of the hop's sender.
 #[derive(Debug)]
 pub struct DrawnHop {
-    /// Random link of 1 to 4 relays that has the hop, with numbers rounded to the relays' f32.
+    /// Random chain of 1 to 4 relays that has the hop. Its numbers are rounded to the relays' f32.
     pub link: Link,
-    /// Hop of the link as a value of the crate, for comparison with the reference.
+    /// Tested hop as a value of the crate. The reference computes the same hop from `link`.
     pub hop: Hop,
-    /// Index of the relay that receives the hop, from 1.
+    /// Index of the relay at the receiving end of the hop, from 1.
     pub index: u16,
     /// Distance of the hop's sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// Limit of the hop's SIR without noise, linear, far from the sender and the interferer.
+    /// SIR of the hop, linear, without noise, if sender and interferer are equally far from the receiver.
     pub gain: f64,
     relays: u16,
 }
 
-/// Draws a hop of a random link, with receiver noise if `noisy`.
+/// Draws a hop of a random chain, with receiver noise if `noisy`.
 ///
-/// `None` if a relay would reject the link.
+/// `None` if a relay would reject the chain's mission.
 pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
     let style = Style {
         relays: 1..=4,
@@ -226,21 +226,23 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
     })
 }
 
-/// Counters of tested hops. Each hop's farthest position that meets a target SIR is compared with the reference.
+/// Counters of hops for which the receiver's farthest x that meets a target SIR was tested.
+///
+/// The crate's x is compared with that of the reference.
 #[derive(Debug, Default)]
 pub struct Reaches {
-    /// Number of hops whose farthest position is before Rx, so that the target limits it.
+    /// Number of hops whose receiver cannot be as far as Rx, because the target SIR limits its x.
     pub inside: u32,
-    /// Number of hops whose farthest position is beyond the interferer, while nearer positions fail.
+    /// Number of hops whose receiver meets the target SIR beyond the interferer, but not at some nearer x.
     pub leaps: u32,
-    /// Number of hops whose target SIR no position meets.
+    /// Number of hops that meet their target SIR at no position of the receiver.
     pub infeasible: u32,
 }
 
-/// Checks the farthest positions at which `count` random hops meet a target SIR.
+/// Checks the receiver's farthest x at which each of `count` random hops meets a target SIR.
 ///
-/// Each position must lie between the exact positions for two targets: 1e-6 (relative) below and above the target,
-/// with a tolerance of two f32 steps. `target` draws the target of a hop.
+/// This x must lie between the exact x for two targets: 1e-6 (relative) below and above the target, with a tolerance
+/// of two f32 steps. `target` draws the target of a hop.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,

@@ -16,8 +16,8 @@ use uav_relay_oracle::reference::joint::{Place, sir};
 use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Returns a chain of `relays` relays at 220 m, as reference model and as simulation setup. The interferer is at
-/// (500, 150) m, altitudes may be 20 m to 300 m, and the least separation is 4 m.
+/// Returns a chain of `relays` relays at an altitude of 220 m, as reference model and simulation setup. The
+/// interferer is at (500, 150) m, altitudes may be 20 m to 300 m, and the least separation is 4 m.
 fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     let mut link = Link {
         y_i: 150.0,

@@ -68,8 +68,9 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// Returns the largest value of the weakest signal, W, over positions on a grid. `left` relays are placed in order
-/// after the positions in `chosen`.
+/// Returns the largest value that the weakest signal can have with relays at grid points, W. `points` is the number
+/// of grid steps. `chosen` has the positions of the first relays; the other `left` relays follow at the same or later
+/// points.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {
         return weakest_signal(link, chosen);
@@ -120,8 +121,9 @@ fn no_grid_has_a_stronger_weakest_signal() {
     assert!((5..145).contains(&capped), "{capped}");
 }
 
-/// Checks that the last relay is placed above Rx if there are more relays than needed. All other hops are shortened
-/// by the same factor.
+/// Checks that the last relay is above Rx if fewer relays would give the same weakest signal.
+///
+/// The hop from there straight down to Rx is then the weakest one. All other hops are shortened by the same factor.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);

@@ -77,7 +77,8 @@ struct Tally {
 }
 
 impl Tally {
-    /// Solves a scene with the known optimum `best`, and records the result. `sir` evaluates positions.
+    /// Solves a scene with the known optimum `best`, and records the result. `sir` returns the SIR of a chain with
+    /// its relays at given positions.
     fn judge(
         &mut self,
         mission: &Mission,
@@ -233,8 +234,8 @@ fn near_optimal_with_a_separation() {
     assert!(tally.tight() >= 70.0);
 }
 
-/// Draws identical relays in an uneven field of interference. The mean inverse interference, Upsilon, has two to
-/// twelve points within a factor of up to 300.
+/// Draws identical relays in an uneven field of interference. The mean inverse interference, Upsilon, is given at two
+/// to twelve points. Its values differ by a factor of up to 300.
 fn uneven(rng: &mut impl Rng, relays: usize) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -322,9 +323,10 @@ fn near_optimal_in_uneven_fields_by_unlike_relays() {
     assert!(tally.near * 100 >= tally.scenes * 88 && tally.tight() >= 80.0);
 }
 
-/// Checks that chains agree by messages on target SIRs that they meet, with a correct upper bound.
+/// Checks that chains agree by messages on target SIRs that they meet, and state a correct upper bound.
 ///
-/// The bound is on the SIR of all chains. Runs are with and without prediction and message faults.
+/// No positions of the relays may have a higher SIR than the bound. Runs are with and without prediction and message
+/// faults.
 #[test]
 fn chains_agree_by_messages_on_feasible_targets() {
     let mut rng = generator(904);

@@ -24,7 +24,8 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
     );
 }
 
-/// Returns the recorded problems whose optimum has positions, of tests whose name begins with `set`.
+/// Returns the recorded problems of the tests whose name begins with `set`, and their optima. Problems whose optimum
+/// is recorded without positions are left out.
 fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     let wanted = move |record: &&Record| record.set.starts_with(set);
     let placed = |record: &'static Record| {
@@ -128,9 +129,10 @@ fn optima_of_independent_programs_are_recorded() {
     }
 }
 
-/// Checks that forty of the 2 000 numbered optima were found again, from another random seed.
+/// Checks that two records of the same forty optima agree. They are of searches with different random seeds.
 ///
-/// The numbered optima are recorded without positions, the forty others with positions.
+/// One record has the optima of all 2 000 numbered scenarios, without positions. The other has the forty with
+/// positions.
 #[test]
 fn the_numbered_optima_are_reproduced() {
     let stored = optima().unwrap();

@@ -18,8 +18,8 @@ fn mission(link: &StochasticLink, min_separation_m: f32) -> Mission {
     of_stochastic_link(link, min_separation_m).unwrap()
 }
 
-/// Draws a link of identical relays in a field of interference. The mean inverse interference, Upsilon, has `points`
-/// points within a factor of `spread`.
+/// Draws a chain of identical relays in a field of interference. The mean inverse interference, Upsilon, is given at
+/// `points` points. Its values differ by a factor of up to `spread`.
 fn link(rng: &mut impl Rng, relays: usize, points: usize, spread: f64) -> StochasticLink {
     let round = |value: f64| f64::from(value as f32);
     let d = round(log_uniform(rng, 100.0, 1e4));
@@ -55,9 +55,9 @@ fn places(outcome: &Outcome) -> Vec<f64> {
     xs(&setpoints(outcome))
 }
 
-/// Checks the closed form for a hop's farthest start that meets a target SIR against the reference.
+/// Checks the closed form for how far before its receiver a hop may begin and still meet a target SIR.
 ///
-/// The hop's end is given. The tolerance is a fraction of the hop's length.
+/// The comparison is with the reference. The tolerance is a fraction of the hop's length.
 #[test]
 fn retreats_agree_with_the_reference() {
     let mut rng = generator(61);

@@ -43,12 +43,12 @@ pub struct Medium {
     injected: Injected,
     flying: BinaryHeap<Reverse<Flying>>,
     order: u64,
-    /// State of each sender: bytes since its last frame delimiter, and the time when its link is idle.
+    /// State of each sender: bytes since its last frame delimiter, and the time when its link becomes idle.
     lines: Vec<(Vec<u8>, Instant)>,
 }
 
 impl Medium {
-    /// Creates the links of `senders` drones' ports, without bytes in transit at `now`.
+    /// Creates links for `senders` sending ports, one port of a drone each. No bytes are in transit at `now`.
     ///
     /// The times in `link` are those of the drones' own clocks. `seed` determines the random `faults`.
     pub fn new(senders: usize, link: LinkSpec, faults: Faults, seed: u64, now: Instant) -> Self {
@@ -98,7 +98,7 @@ impl Medium {
         }
     }
 
-    /// Returns the next bytes that have arrived by `now` and the number of their receiver; `None` if none.
+    /// Returns the receiver's index and the next bytes that have arrived there by `now`; `None` if none.
     pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
         if self.next()? > now {
             return None;

@@ -15,7 +15,7 @@ use rustix::net::sockopt::set_socket_send_buffer_size;
 use super::medium::Medium;
 use uav_relay_sim::simulator::faults::Injected;
 
-/// Time limit for writing a frame to a socket that accepts the frame's beginning.
+/// Timeout of a write to a drone's socket that has accepted only the first bytes of a frame.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Size of a port's send buffer in the kernel, bytes: some four frames with their overhead.
@@ -29,14 +29,14 @@ pub struct Network {
     injected: Arc<Mutex<Injected>>,
 }
 
-/// Bytes sent by the port with number `sender`. No bytes mean that the network is to end.
+/// Bytes sent by the port with index `sender`. An empty `bytes` ends the network.
 #[derive(Debug)]
 struct PortBytes {
     sender: usize,
     bytes: Vec<u8>,
 }
 
-/// Topology of a network: for each port of the list, the ports that receive its bytes.
+/// Topology of a network. Entry n of the list has the indices of the ports that receive the bytes of port n.
 pub type Hearers = Vec<Vec<usize>>;
 
 /// Returns the topology of a chain of `drones` with wires: each port leads to one neighbour.
@@ -65,7 +65,7 @@ pub fn radio(drones: usize, range: usize) -> Hearers {
 }
 
 impl Network {
-    /// Connects the drones' `ports` through `medium`. Frames that were complete before are discarded.
+    /// Connects the drones' `ports` through `medium`. Frames that arrived completely before this call are discarded.
     ///
     /// # Errors
     /// A socket cannot be read, configured, or shared between two threads.

@@ -53,7 +53,7 @@ impl Bench {
         Self::new(access, (0..nodes).map(others).collect(), seed)
     }
 
-    /// Advances the clock to `at`, then gives `node` a frame to send. Returns true if it accepts the frame.
+    /// Advances the clock to `at`, then gives `node` a frame to send. Returns true if the node accepts the frame.
     fn offer(&mut self, at: Instant, node: usize, frame: &[u8]) -> bool {
         self.go_on(at);
         let mut agenda = Agenda::new();

@@ -24,7 +24,7 @@ struct Taker {
     taken: Rc<RefCell<Vec<u8>>>,
     /// Number of writes that still complete; the next one blocks for ever.
     writes: Rc<Cell<usize>>,
-    /// Interval of failing writes: every write with a multiple of this number fails; 0 for none.
+    /// Interval of failing writes: every n-th write fails, where n is this number; 0 if none fails.
     fails: usize,
     done: usize,
 }

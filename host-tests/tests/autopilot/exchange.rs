@@ -15,13 +15,14 @@ use mavlink::dialects::common::{
 use super::*;
 use crate::vehicle::{Target, axis};
 
-/// Creates the only relay of a chain, with a motion guard. Tx and Rx are where the simulated vehicle expects them.
+/// Creates the only relay of a chain, with a motion guard. The mission's Tx and Rx are as far apart as the simulated
+/// vehicle's.
 fn relay(settings: Settings) -> Relay {
     of(1, 1, settings)
 }
 
-/// Creates relay `index` of `relays` relays with a motion guard. Tx and Rx are where the simulated vehicle expects
-/// them.
+/// Creates relay `index` of `relays` relays with a motion guard. The mission's Tx and Rx are as far apart as the
+/// simulated vehicle's.
 fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -303,7 +304,7 @@ fn a_drone_out_of_sequence_cannot_be_engaged() {
     assert_eq!(vehicle.events.last(), Some(&waits));
 }
 
-/// Checks that the autopilot link uses the new line if its relay adopts a mission that moves Tx.
+/// Checks that the autopilot link uses the new Tx-Rx line if its relay adopts a mission that moves Tx.
 ///
 /// A second mission then moves Tx back.
 #[test]

@@ -32,7 +32,7 @@ enum Fault {
     Delay(u64),
 }
 
-/// Direction of a serial cable with faults. It keeps the order of the bytes.
+/// Model of one direction of a serial cable, with faults. The bytes stay in order.
 struct Cable {
     /// Bytes in transit, with their times of arrival and of sending.
     waiting: VecDeque<(Instant, Instant, Vec<u8>)>,

@@ -158,7 +158,9 @@ pub(crate) struct Real {
     fell_at: Instant,
     /// Time at which the companion sent the newest target.
     sent_at: Instant,
-    /// Number of times that a PX4 resumed OFFBOARD because the companion sent targets in a known failsafe.
+    /// Number of times that a PX4 resumed OFFBOARD because the companion sent targets in a failsafe.
+    ///
+    /// Only failsafes of which the companion already knew count here.
     pub(crate) resumed: u32,
     /// Number of times that a PX4 resumed OFFBOARD before the companion knew of the failsafe.
     pub(crate) resumed_late: u32,

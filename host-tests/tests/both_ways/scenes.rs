@@ -64,10 +64,10 @@ pub(crate) fn mission(chain: &Chain) -> Mission {
     .unwrap()
 }
 
-/// Draws a scene as in the specification of two-way chains.
+/// Draws a scene of usual size: Tx and Rx 1 km apart, 1 to 50 relays at 20 m.
 ///
-/// `ends` are the powers of Tx and Rx, W. `reverse` is the fraction of the target SIR that suffices on the way from
-/// Rx to Tx.
+/// The interferer is 50 m to 800 m beside the line. `ends` are the powers of Tx and Rx, W. `reverse` is the fraction
+/// of the target SIR that suffices on the way from Rx to Tx.
 pub(crate) fn usual(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> Chain {
     let relays = log_uniform(rng, 1.0, 50.99) as usize;
     let mut powers_w = vec![1.0; relays + 2];
@@ -110,8 +110,9 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
     chain
 }
 
-/// Draws a scene with an interference field of the given `kind`, known by points along the line. Kind 0 has the same
-/// interference everywhere, kind 1 has random values within a factor, and kind 2 is caused by some interferers.
+/// Draws a scene with a field of interference, given at points along the line. `kind` is 0 for the same interference
+/// everywhere, 1 for random interference that varies by a factor of up to 25, and 2 for that of one to three
+/// interferers.
 pub(crate) fn in_field(rng: &mut impl Rng, ends: [f64; 2], reverse: f64, kind: usize) -> Chain {
     let mut chain = usual(rng, ends, reverse);
     let points: usize = [1, rng.random_range(2..=9), 41][kind];

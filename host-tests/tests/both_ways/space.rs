@@ -108,7 +108,7 @@ fn joint(mission: &Mission) -> Vec<Placement> {
 }
 
 /// Prints worst value, first percentile and median of `shares`, by kind of scene and for all kinds. A share is the
-/// method's SIR over the judge's. The shares are sorted, the worst one first.
+/// method's SIR divided by the judge's. The shares are sorted, the worst one first.
 fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     let all: Vec<f64> = shares.values().flatten().copied().collect();
     shares.insert("all".to_owned(), all);
@@ -125,7 +125,7 @@ fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     }
 }
 
-/// Returns the joint method's SIR over the judge's for random scenes, the worst one first. The judge is an
+/// Returns ratios for random scenes, the worst first: the joint method's SIR divided by the judge's. The judge is an
 /// independent search. The interferer is near the line Tx-Rx if `wild`.
 fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();

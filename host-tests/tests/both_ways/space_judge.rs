@@ -70,8 +70,8 @@ impl Space {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the best positions of all relays, each from the list of its `candidates`. Best are those with the
-    /// highest SIR of the worst hop, in the worse direction.
+    /// Returns the best positions of all relays, each from the list of its `candidates`. Best is the highest two-way
+    /// SIR of the worst hop. The two-way SIR of a hop is the smaller of its forward SIR and its backward SIR / r.
     fn best_on(&self, candidates: &[Vec<Place>]) -> Vec<Place> {
         let first = candidates[0].iter().map(|to| self.hop(1, [0.0; 3], *to));
         let mut best: Vec<f64> = first.collect();
@@ -145,9 +145,9 @@ impl Space {
         points
     }
 
-    /// Improves the positions `start` by searches in a window around each. The windows shrink when they no longer
-    /// help; the first ones reach `width` metres to each side. Returns the SIR of the worst hop, in the worse
-    /// direction, and the positions.
+    /// Improves the positions `start` by searches in a window around each. Returns the worst hop's two-way SIR
+    /// (smaller of forward SIR and backward SIR / r), and the positions. The first windows extend `width` metres to
+    /// each side. They shrink when they no longer help.
     pub(crate) fn refined(
         &self,
         start: &[Place],
@@ -177,7 +177,8 @@ impl Space {
         (value, places)
     }
 
-    /// Returns the best SIR of the worst hop, in the worse direction, that the whole search finds.
+    /// Returns the best two-way SIR of the worst hop that the whole search finds. The two-way SIR of a hop is the
+    /// smaller of its forward SIR and its backward SIR / r.
     pub(crate) fn best(&self, rng: &mut impl Rng) -> f64 {
         let (relays, d) = (self.relays(), self.chain.distance_m);
         let start = self.best_on(&vec![self.grid(); relays]);

@@ -27,7 +27,7 @@ while True:
         os.write(masters[1 - masters.index(ready)], os.read(ready, 4096))
 "#;
 
-/// Replaces `socat` by a Python program in a script of `examples/LINUX.md`, if it is not installed.
+/// Replaces `socat` by a Python program in a script of `examples/LINUX.md` if `socat` is not installed.
 fn with_socat(script: &str, folder: &Path) -> String {
     if Command::new("socat").arg("-V").output().is_ok() {
         return script.to_owned();

@@ -15,7 +15,7 @@ pub(crate) struct Ports {
 }
 
 impl Ports {
-    /// Returns a pair of ports as in PX4's simulation: 14580 + i and 14540 + i.
+    /// Returns a free pair of UDP ports of PX4's simulation: 14580 + i and 14540 + i for simulated drone i.
     fn of_px4() -> Self {
         let first = std::process::id() as u16;
         let pairs = (0..10).map(|i| (first.wrapping_add(i)) % 10);

@@ -12,7 +12,7 @@ pub(crate) const ASKED: [(u64, u64); 3] = [(33, 200_000), (245, 500_000), (87, 5
 /// Take-off position along the line, m: about 20 m from the setpoint.
 const START_M: f64 = 380.0;
 
-/// Time of observation. A companion that streams targets would send several of them in this time.
+/// Time for which a test watches for targets. A companion that streams targets sends several in this time.
 const MOMENT: Duration = Duration::from_millis(1_500);
 
 /// Simulated drone in flight and the relay that controls it.

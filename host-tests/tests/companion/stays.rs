@@ -177,7 +177,7 @@ fn the_log_is_reopened_on_sighup() {
     assert!(has(&moved, "started")["index"] == 1);
 }
 
-/// Returns the difference between an RFC 3339 time in UTC and now, s, by the system's `date`.
+/// Returns the distance in time, s, from an RFC 3339 time in UTC to now, by the system's `date`.
 fn seconds_from_now(text: &str) -> u64 {
     assert!(text.ends_with('Z'), "{text} is not in UTC");
     let output = Command::new("date").args(["--date", text, "+%s"]).output();

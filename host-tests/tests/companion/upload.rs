@@ -339,7 +339,7 @@ const WRONG: &[&str] = &[
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Wrong options that the ground station recognises after it has requested the relays' present mission.
+/// Wrong options that the ground station refuses only after it has received the mission in flight.
 const UNFIT: &[&str] = &[
     "--new-band 30,300",
     "--new-min-separation 1001",

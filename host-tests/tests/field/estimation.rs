@@ -37,7 +37,8 @@ fn estimate(alpha: f64, beta: f64, samples: u32, seed: u64) -> Option<Estimate> 
     estimator.estimate()
 }
 
-/// Returns statistics of estimates from `samples` samples each, one for each of [`SEEDS`] seeds.
+/// Returns statistics of [`SEEDS`] estimates, each of `samples` samples. `first` and the Beta shapes alpha and beta
+/// determine the random seeds.
 fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> EstimateStatistics {
     let truth = FieldPoint::beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);
     let mut found = EstimateStatistics::default();

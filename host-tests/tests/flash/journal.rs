@@ -47,7 +47,7 @@ fn records_fill_both_sectors_and_the_newest_is_read() {
     assert_eq!(newest(&mut flash), Some(entry(12)));
 }
 
-/// Checks that a full journal erases the sector without the newest record, and continues in it.
+/// Checks that a full journal erases the sector that lacks the newest record, and continues there.
 #[test]
 fn a_full_log_continues_in_the_older_sector() {
     let mut flash = Ram::blank(4 * RECORD, 1);

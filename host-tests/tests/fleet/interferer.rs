@@ -28,8 +28,8 @@ fn with(link: &Link, relays: usize) -> Link {
     link
 }
 
-/// Returns the fewest relays that meet `target`, by trying each number in f64. Returns 0 if there is none up to
-/// `most`.
+/// Returns the fewest relays that meet `target`, by trying every number of relays in f64. Returns 0 if no number up
+/// to `most` suffices.
 fn exhaustive(link: &Link, target: f64, most: usize) -> usize {
     let all = with(link, most);
     let mut from = 0.0;
@@ -53,7 +53,8 @@ fn with_rx(all: &Link, n: usize, x: f64) -> f64 {
 
 /// Draws a target SIR: 1e-4 to 1.2 times the highest SIR that both the first and the last hop can have.
 ///
-/// A target that can be met needs one to several dozen relays. Returns `None` if the last hop has no SIR.
+/// This range gives targets that need one to several dozen relays, and some that no chain meets. Returns `None` if
+/// the last hop has no SIR.
 fn target(rng: &mut impl Rng, link: &Link) -> Option<f64> {
     let d = link.distance_m;
     let first = (0..200)

@@ -19,7 +19,7 @@ use super::*;
 
 const STORM_S: u64 = 180;
 
-/// Draws a span of time that begins within the storm, the phase of random faults.
+/// Draws begin and end of a fault that begins in the storm, the phase of random faults. The end is never `None`.
 fn span(rng: &mut ChaCha8Rng) -> (Instant, Option<Instant>) {
     let from = rng.random_range(0..STORM_S * 1_000);
     let until = from + rng.random_range(2_000..100_000);

@@ -21,7 +21,8 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// Creates a chain on the paper's link. Altitudes are within `band` and start at `altitude_m`.
+    /// Creates the paper's chain with the interferer at y = 150 m. Altitudes are within `band` and start at
+    /// `altitude_m`.
     pub(crate) fn new(relays: usize, altitude_m: f64, band: Band, settings: Settings) -> Self {
         let mut link = Link {
             y_i: 150.0,

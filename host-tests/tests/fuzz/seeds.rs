@@ -29,7 +29,7 @@ fn golden() -> Vec<Frame> {
 
 /// Returns corpus inputs for the target `deframe`: test vectors, and three of them with noise between.
 ///
-/// Each starts with the two lengths of the pieces into which the stream is cut.
+/// Each input begins with two lengths. The stream is cut into pieces of these lengths in turn.
 fn deframe() -> Vec<Vec<u8>> {
     let wires: Vec<_> = golden().into_iter().map(|frame| frame.wire).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();
@@ -70,7 +70,9 @@ fn missions() -> Vec<Vec<u8>> {
     align.chain(joint).chain(adjust).collect()
 }
 
-/// Returns inputs for the target `chain`: every mission, and each operation and fault between rounds.
+/// Returns inputs for the target `chain`: all missions and operations, frame faults, mission uploads.
+///
+/// An operation comes between two rounds of messages.
 fn chain() -> Vec<Vec<u8>> {
     let with = |mission: &[u8], operations: &[u8]| {
         // Seed, four relays without individual settings, to the end.

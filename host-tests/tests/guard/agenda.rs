@@ -104,7 +104,8 @@ pub(crate) fn failures(rng: &mut ChaCha8Rng, relays: usize) -> Vec<(f64, FlightE
     plan
 }
 
-/// Plans takeovers by pilots, but none next to a removed drone, which an operator has cleared.
+/// Plans takeovers by pilots, but none of a removed drone or of a drone next to it. `troubles` has the planned
+/// removals and silent relays.
 pub(crate) fn pilots(
     rng: &mut ChaCha8Rng,
     relays: usize,

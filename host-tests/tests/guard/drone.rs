@@ -44,7 +44,7 @@ pub(crate) struct Drone {
     pub(crate) latency_s: f64,
     /// Motion guard of the drone; `None` while the relay is switched off.
     pub(crate) guard: Option<Guard>,
-    /// First setpoint since the guard last had none; `None` while the guard has none.
+    /// First setpoint that the guard has given since it last had none; `None` while the guard has none.
     begun: Option<Placement>,
     /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],
@@ -103,7 +103,7 @@ impl Drone {
         }
     }
 
-    /// Switches the guard on with the mission's neighbours, then tells it the links that exist.
+    /// Creates the guard with the mission's neighbours, then sets the neighbours that the relay really has.
     pub(crate) fn boot(
         &mut self,
         config: GuardConfig,

@@ -21,7 +21,7 @@ fn count() -> u64 {
     count.and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// Checks all schedules: every two drones keep the separation, and every drone arrives.
+/// Checks in random flights that every two drones keep the separation, and that every drone arrives.
 #[test]
 fn drones_keep_apart_and_all_arrive() {
     let first = seed(20_260);

@@ -241,10 +241,11 @@ fn one_of_two_hidden_duplicates_has_a_setpoint() {
     at_most_one_flies(Medium::HiddenLinks, HIDDEN_MS);
 }
 
-/// Test of two chains that meet on a shared channel. Each chain has a relay with the same index, a duplicate.
+/// Test of two chains that meet on a shared channel. Each chain has one of two relays with the same index
+/// (duplicates).
 ///
-/// Each chain has half of the other relays. The chains come into range of each other once both have agreed on
-/// positions.
+/// Half of the other relays are in one chain, and half in the other. The chains come into range of each other once
+/// both have agreed on positions.
 #[derive(Clone, Copy, Debug)]
 struct Meeting {
     relays: u16,
@@ -274,7 +275,7 @@ impl Meeting {
         }
     }
 
-    /// Returns the other relays in the chain of the first duplicate, by index.
+    /// Draws the relays that form a chain with the first duplicate. Returns their indices, without the duplicate's.
     fn first_chain(&self, rng: &mut ChaCha8Rng) -> Vec<u16> {
         let mut others: Vec<u16> = (1..=self.relays).collect();
         others.retain(|index| *index != self.twice);

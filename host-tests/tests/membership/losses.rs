@@ -7,7 +7,8 @@ use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
 
-/// Returns the time from the last loss to the settled chain, and the number of sweeps in this time.
+/// Returns the time from the last detection of a lost relay to the settled chain, and a pass count. A pass is a round
+/// of messages along the chain. The first `sweeps_before` passes do not count.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, TimelineEvent::Lost(_));
     let last = outcome

@@ -8,7 +8,7 @@ use uav_relay_oracle::random::seed;
 
 use super::*;
 
-/// Draws faults for eight relays: up to 50 % loss, up to 20 % corruption, up to three lost relays.
+/// Draws faults for eight relays: up to 50 % of frames lost, 20 % corrupted, up to three lost relays.
 fn schedule(rng: &mut ChaCha8Rng) -> Setup {
     let mut setup = paper(8);
     setup.profiles = own_profiles(rng);

@@ -18,10 +18,10 @@ use super::wires::Pass;
 /// that travels along the chain. No other pass has a multiple of this number.
 const FIRST: u16 = 64;
 
-/// Number of passes (rounds of messages along the chain) before the last one that count as late.
+/// Largest difference by which the number of a late pass is below that of the last pass.
 ///
-/// A pass with an older number counts as a pass from before a reboot. A leader's next pass has a number that is at
-/// most this much larger.
+/// A pass is a round of messages along the chain. A pass whose number is farther below counts as one from before a
+/// reboot. A leader's next number is above its last one by at most this difference.
 const NEAR: u16 = 32;
 
 /// Returns the number that messages along the chain add to the mission digest in a membership view.

@@ -59,9 +59,9 @@ impl Kind {
 /// Agreement of a chain without faults.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Calm {
-    /// Bits of the agreed x, y and altitude of every relay.
+    /// Agreed x, y and altitude of every relay, as f32 bits.
     pub(crate) places: Vec<[u32; 3]>,
-    /// Bits of the agreed target SIR.
+    /// Agreed target SIR, as f32 bits.
     pub(crate) target: u32,
     /// Virtual time until the agreement, µs.
     pub(crate) took_us: u64,

@@ -18,7 +18,7 @@ pub(crate) const LONGEST: u32 = 8;
 /// Model of what a relay knows about the life of a neighbour.
 #[derive(Debug)]
 pub(crate) struct Signs {
-    /// Number and time of every heartbeat request to the neighbour.
+    /// Sequence number and time of every heartbeat request to the neighbour.
     pub(crate) asked: Vec<(u16, Instant)>,
     /// Last time at which the neighbour was certainly alive.
     pub(crate) certainly_alive: Instant,

@@ -48,7 +48,7 @@ impl Tally {
         *most = value.max(*most);
     }
 
-    /// Adds the counters of one sequence of operations, which ended with an agreement after `took`.
+    /// Adds `other`, the counters of one sequence of operations. The sequence ended with an agreement after `took`.
     pub(crate) fn sequence(&mut self, scenario: &Scenario, other: &Self, took: Duration) {
         let kind = (scenario.kind, scenario.signs());
         for (what, count) in &other.counts {

@@ -138,8 +138,8 @@ impl Wires {
         recorded.get(at).cloned()
     }
 
-    /// Returns the number of a line (one direction of a link) with a frame in transit. `pick` selects one of these
-    /// lines.
+    /// Returns the index of a line (direction of a link) with a frame in transit; `None` if there is none. `pick`
+    /// selects one of these lines.
     pub(crate) fn pick(&self, pick: u8) -> Option<usize> {
         let busy: Vec<usize> = (0..self.lines.len())
             .filter(|&line| !self.lines[line].flying.is_empty())
@@ -181,8 +181,8 @@ impl Wires {
         }
     }
 
-    /// Cuts a link, so that its frames in transit are lost. Returns the number and the next frame of each of its
-    /// directions, because first bytes of these frames may still arrive.
+    /// Cuts a link, so that its frames in transit are lost. Returns the line index and the next frame of both
+    /// directions of the link, because first bytes of these frames may still arrive.
     pub(crate) fn cut(&mut self, link: usize) -> [(usize, Option<Flying>); 2] {
         self.cut[link] = true;
         [2 * link, 2 * link + 1].map(|line| {

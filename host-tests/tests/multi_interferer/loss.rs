@@ -61,7 +61,7 @@ fn outcomes(default_seed: u64, kind: Sources) -> Vec<Outcome> {
     outcomes
 }
 
-/// Returns the number of outcomes that lose more than `limit`.
+/// Returns the number of outcomes whose loss is more than the fraction `limit` of the best SIR.
 fn losing(outcomes: &[&Outcome], limit: f64) -> usize {
     outcomes
         .iter()

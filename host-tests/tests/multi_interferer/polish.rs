@@ -74,7 +74,8 @@ fn at_one_altitude_polishing_stays_below_the_optimum() {
     assert!(4 * reached > 3 * count && start_reached < reached / 2);
 }
 
-/// Checks that polishing comes near the joint optimum for one source, without exceeding it.
+/// Checks that polishing comes near the joint optimum for one interferer, without exceeding it. Polishing improves a
+/// chain one relay at a time.
 #[test]
 fn in_a_band_polishing_comes_near_the_joint_optimum() {
     let mut rng = ChaCha8Rng::seed_from_u64(80);
@@ -125,7 +126,8 @@ fn with_several_sources_in_a_band_the_rules_are_kept() {
     assert!(gained >= 20, "{gained}");
 }
 
-/// Checks that polishing with lateral offsets never lowers the SIR, and keeps to their permitted range.
+/// Checks that polishing with lateral offsets never lowers the SIR or exceeds the offset limits. Polishing
+/// improves a chain one relay at a time.
 #[test]
 fn with_lateral_range_polishing_gains() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(83));

@@ -8,12 +8,12 @@ use uav_relay_scenario::hypothetical::{Raster, fit};
 use super::above;
 use super::scenes::scene;
 
-/// Number of positions that are drawn for a single interferer in place of several, in each scene.
+/// Number of random positions that are tried, in each scene, for one interferer in place of several.
 const DRAWN: usize = 20_000;
 
 /// Number of best drawn positions of the interferer whose error is computed again on the fine raster.
 ///
-/// A coarse raster has selected them.
+/// The first comparison of all drawn positions uses a coarse raster, because it is faster.
 const WEIGHED: usize = 100;
 
 #[test]

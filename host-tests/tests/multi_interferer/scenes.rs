@@ -105,7 +105,7 @@ pub(crate) fn scene(
     Scene::new(&scenario, n).unwrap()
 }
 
-/// Returns the scene of a reference link. Its relays may only have the altitude of the link's first relay.
+/// Returns the scene of a chain of the reference model. All relays may only have the first relay's altitude.
 pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }

@@ -10,7 +10,7 @@ use uav_relay_oracle::reference::Link;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Draws a link, in nine of ten cases with receiver noise. Numbers are rounded to f32.
+/// Draws a chain of relays, in nine of ten cases with receiver noise. Numbers are rounded to f32.
 fn drawn(rng: &mut impl Rng, style: &Style) -> Link {
     let link = random::link(rng, style);
     as_relays_know_it(&if rng.random_bool(0.1) {

@@ -6,7 +6,7 @@ use uav_relay_oracle::random::{count, log_uniform};
 
 /// Draws a target SIR for a hop: one that some positions meet, or one near the hop's gain.
 ///
-/// The gain is the SIR if the hop's sender and the interferer are equally far away.
+/// The gain is the SIR if the hop's sender and the interferer are equally far from the receiver.
 fn target(rng: &mut impl Rng, of: &DrawnHop) -> f32 {
     if rng.random_bool(0.2) {
         let by = f64::from(rng.random_range(-3..=3)) * log_uniform(rng, 1e-9, 1e-3);
@@ -31,8 +31,8 @@ fn reaches_in_noise_agree_with_the_reference() {
     );
 }
 
-/// Checks that the reach of a hop falls with the target SIR, and rises with the hop's start. The reach is the
-/// farthest position that meets the target; the tolerance is two f32 steps.
+/// Checks that a hop's reach falls with the target SIR, and rises with the x of the hop's sender. The reach is the
+/// receiver's farthest x that meets the target; the tolerance is two f32 steps.
 #[test]
 fn the_reach_in_noise_is_monotonic() {
     let mut rng = generator(1112);

@@ -120,7 +120,8 @@ fn random_request(rng: &mut impl Rng) -> PlanRequest {
     }
 }
 
-/// Returns the reference link of `n` relays at the plan's altitude; `None` without a single interferer.
+/// Returns the reference chain of `n` relays at the plan's altitude. Returns `None` unless the scenario has exactly
+/// one interferer.
 fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
     let Interference::Sources(sources) = &scenario.interference else {
         return None;

@@ -105,7 +105,8 @@ fn five_drones_settle_like_the_simulation_with_faults() {
     }
 }
 
-/// Checks that the smallest firmware image agrees as the simulated chain does. This image has no feature but the log.
+/// Checks that drones with the smallest image agree on the simulated chain's positions. This image has no feature but
+/// the log.
 #[test]
 fn five_of_the_smallest_image_settle_like_the_simulation() {
     let flight = paper(5);
@@ -121,7 +122,7 @@ fn five_of_the_smallest_image_settle_like_the_simulation() {
     }
 }
 
-/// Checks that the image with the runner of `uav_relay::asynch` agrees as the simulated chain does.
+/// Checks that drones with the runner of `uav_relay::asynch` agree on the simulated chain's positions.
 #[test]
 fn five_on_async_ports_settle_like_the_simulation() {
     let flight = paper(5);

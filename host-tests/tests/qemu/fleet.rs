@@ -17,7 +17,7 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::log::{self, Line};
 
-/// First log lines of every image: the emulator has no reset cause and no PLL.
+/// First log lines of every image. They report that the emulated chip has no reset cause and no PLL.
 pub(crate) const OF_THE_CHIP: [&str; 2] = [
     "started, cause of the reset: unknown",
     "clock 16 MHz, from the internal oscillator: the PLL did not start",

@@ -20,7 +20,7 @@ use crate::vehicle::{Vehicle, apart};
 
 /// Scenario in which the speed of the emulated drones' clocks has no effect on the measurements.
 ///
-/// The first query for measurements comes late, and old measurements do not lose weight.
+/// For this, the first query for measurements comes late, and old measurements do not lose weight.
 const LISTENING: &str = "[geometry]\naltitude_m = 30\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n\
     [site]\ntx = { lat_deg = 47.40, lon_deg = 8.54, amsl_m = 420.0 }\n\
     rx = { lat_deg = 47.41, lon_deg = 8.55, amsl_m = 431.0 }\n\

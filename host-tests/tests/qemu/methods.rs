@@ -68,7 +68,7 @@ fn noisy(method: Method, most_m: f64) -> Flight {
     Flight::new(&scenario, 5, 1e-4, 7).unwrap().by(method)
 }
 
-/// Checks that the iterative searches with noise give the same bits on the target as on the host.
+/// Checks that iterative searches with noise give the same bits on the emulated drones as on the host.
 #[test]
 fn five_drones_in_noise_settle_like_the_simulation() {
     let silent = Flight::new(&Scenario::default(), 5, 1e-4, 7).unwrap();

@@ -23,7 +23,7 @@ const SYSTEM: u8 = 7;
 
 const FASTEST_M_S: f32 = 8.0;
 
-/// Time for which the pilot chooses another mode, ms: that of six heartbeats.
+/// Time for which the pilot stays in a mode other than OFFBOARD and GUIDED, ms: that of six heartbeats.
 const ELSEWHERE: u64 = 1_500;
 
 /// Id of the MAVLink message HEARTBEAT.

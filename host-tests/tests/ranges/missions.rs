@@ -88,7 +88,7 @@ fn any_mission_ends_in_positions_or_infeasible() {
 
 /// Checks that every reported number is finite with settings that make an agreement arbitrarily slow.
 ///
-/// These are fixed steps, long hops, and any `dead_after`.
+/// Such settings are any fixed step between target SIRs, a long `hop_time`, and any `dead_after`.
 #[test]
 fn every_slow_setting_gives_finite_numbers() {
     let came = each(200, |seed| {

@@ -94,10 +94,10 @@ fn degenerate_reaches_are_right() {
     assert_eq!(base.chain_sir(&[1.0]), 0.0);
 }
 
-/// Checks that the reference finds a chain in which relay 1 must not go as far along as it could.
+/// Checks that the reference finds a chain in which relay 1 must stop short of its farthest position.
 ///
 /// With relay 1 at its farthest position, relay 2, which is lower, would have to be too near to the interferer. The
-/// chain with all relays as far along as possible has less than a fifth of the best SIR.
+/// chain with all relays at their farthest positions has less than a fifth of the best SIR.
 #[test]
 fn the_farthest_positions_are_not_best_at_mixed_altitudes() {
     let link = Link {

@@ -21,7 +21,9 @@ fn close_all(got: &[f64], want: &[f64], rtol: f64, what: &str) {
     }
 }
 
-/// Returns the cases of `function` from the file. Panics if there is none.
+/// Returns the test cases of a function from the file with results of a separate program.
+///
+/// Panics if the file has no case of `function`.
 fn of(function: &str) -> Vec<Case> {
     let found = cases::of(function).unwrap();
     assert!(!found.is_empty(), "no case of {function}");
@@ -112,7 +114,7 @@ fn single_hops_match_the_file() {
     }
 }
 
-/// Checks that hops between air and ground use eta and hops between drones `mu_los`.
+/// Checks that hops between air and ground use the path loss `eta`, and hops between drones `mu_los`.
 ///
 /// The SIRs are worked out by hand, because the two factors are equal in all cases of the file.
 #[test]

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
 
-/// Runs `check` on `count` random links with their random generator.
+/// Draws `count` random chains, and runs `check` on each. `check` also gets the random generator.
 fn for_links(
     default_seed: u64,
     count: u32,
@@ -19,7 +19,7 @@ fn for_links(
     }
 }
 
-/// Checks the farthest position that meets a target SIR against a scan of many positions.
+/// Checks the receiver's farthest x at which a hop meets a target SIR against a scan of many positions.
 #[test]
 fn reaches_agree_with_a_scan() {
     let (mut hills, mut blocked, mut inside) = (0, 0, 0);

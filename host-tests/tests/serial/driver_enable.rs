@@ -9,7 +9,8 @@ use uav_relay::{Instant, Wiring};
 use crate::chain::{BAUD, BYTE_TIME, relay};
 use crate::uart::{Bench, IoUart, Pin, Uart};
 
-/// Runs a relay with a missing neighbour for `millis` of real time. Returns the pin's error count.
+/// Runs a relay whose neighbour is missing for `millis` ms of simulated time. Returns the error count of the
+/// driver-enable pin.
 fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     let pin = Pin(Rc::clone(bench));
     let mut driver = Shared::new(SerialLink::half_duplex(port, BAUD, pin));
@@ -25,7 +26,8 @@ fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     driver.channel.stats().pin
 }
 
-/// Checks that the pin is high while any byte leaves. It may stay high for `late` µs after the last byte of a burst.
+/// Checks that the driver-enable pin is high while any byte leaves. It may stay high for `late` µs after the last
+/// byte of a burst.
 fn check(bench: &Bench, late: u64, name: &str) {
     let mut edges = bench.edges.iter();
     assert_eq!(

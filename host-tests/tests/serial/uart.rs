@@ -6,15 +6,15 @@ use std::rc::Rc;
 
 use embedded_hal::digital::{ErrorKind, ErrorType, OutputPin};
 
-/// Record of a UART's bytes and of its pin's edges, with times in µs.
+/// Record of a UART's bytes and of the edges of its driver-enable pin, with times in µs.
 #[derive(Default)]
 pub(crate) struct Bench {
-    /// Real time, µs, which advances during a poll.
+    /// Simulated present time, µs. It also advances while the driver is polled, as on a real processor.
     pub(crate) clock: u64,
     /// Start and end of the transmission of each byte, µs.
     pub(crate) bytes: Vec<(u64, u64)>,
     pub(crate) edges: Vec<(u64, bool)>,
-    /// Number of coming attempts to set the pin low, and high, that will fail.
+    /// Number of attempts that fail next: to set the driver-enable pin low, and to set it high.
     pub(crate) refusals: [u32; 2],
 }
 

@@ -9,8 +9,8 @@ use super::{all, assert_apart, assert_inside, chain, drawn, has_text, level, num
 /// Bottom of the view from the side without its legend, in units of the picture.
 const SIDE: f64 = 282.0;
 
-/// Returns the picture of a chain that swings to the left of its interferer. The largest offset is the fraction
-/// `edge` of the permitted offset.
+/// Returns the picture of a chain whose relays have offsets to the left, away from the interferer. The largest offset
+/// is the fraction `edge` of the permitted offset.
 fn swung(relays: usize, edge: f64) -> Picture {
     let picture = chain(relays, 1000.0, |share| 20.0 + 800.0 * share * (1.0 - share));
     let share = |number: usize| number as f64 / (relays as f64 + 1.0);

@@ -139,8 +139,8 @@ fn turns_agree_with_a_scan() {
     assert!(seen.iter().all(|&seen| seen > 50), "{seen:?}");
 }
 
-/// Checks that the power ratio p_t / p_u and its limits C_1 to C_3 predict the case of Corollary 1. The interferer's
-/// X is within [0, D].
+/// Checks that the ratio of Tx's power to the relay's, p_t / p_u, predicts the case of Corollary 1. The ratio is
+/// compared with the limits C_1 to C_3. The interferer's x is between Tx and Rx.
 #[test]
 fn the_guide_agrees_with_the_cases() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(506));

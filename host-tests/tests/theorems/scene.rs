@@ -8,7 +8,7 @@ use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
 
-/// Single relay: its link with numbers in f32 precision, and its range of altitudes.
+/// Scene with a single relay: the reference chain, rounded to f32, and the range of altitudes.
 pub(crate) struct Scene {
     pub(crate) link: Link,
     pub(crate) band: (f64, f64),

@@ -31,7 +31,8 @@ fn moved(base: &Mission, x_m: f32, y_m: f32) -> MissionConfig {
     }
 }
 
-/// Returns a chain of `base` with signed frames, on one radio channel or on wires.
+/// Returns the setup of a chain with the mission `base` and signed frames. The relays share one radio channel if
+/// `shared`, else they are on wires.
 fn signed(base: Mission, shared: bool) -> Setup {
     let mut setup = if shared {
         Setup::on_shared_channel(base)

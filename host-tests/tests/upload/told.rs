@@ -105,7 +105,7 @@ fn at(base: &Mission, altitude_m: f32) -> MissionConfig {
     }
 }
 
-/// Returns a mission at 120 m whose relays may choose altitudes within `band`.
+/// Returns a mission with the common altitude 120 m, whose relays may choose altitudes within `band`.
 fn at_120(relays: u16, band: Band) -> Mission {
     let config = *mission(relays).config();
     Mission::try_new(MissionConfig {

@@ -16,7 +16,7 @@ use super::*;
 /// Interval at which all main loops run. Frames arrive one interval after they are sent.
 const TURN: Duration = Duration::from_millis(5);
 
-/// Distance that a drone flies in an interval along each axis, m.
+/// Largest distance that a drone flies along each axis in one interval (`TURN`), m.
 const MOST_M: f32 = 0.05;
 
 const AUTH: Auth = Auth {
@@ -108,7 +108,7 @@ impl Wires {
             .all(|at| self.bench.has_raised(at, Event::Converged))
     }
 
-    /// Runs the chain for an interval, after which the drones move.
+    /// Runs the chain for one interval (`TURN`), after which the drones move.
     pub(crate) fn turn(&mut self) {
         self.bench.run_for(TURN);
         let now = self.bench.now;

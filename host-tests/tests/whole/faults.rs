@@ -99,9 +99,9 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
     assert!(worst.is_empty(), "{worst:?}");
 }
 
-/// Checks that a relay that is left out does not draw its neighbours away from the chain. The chain has closed over
-/// relay 3, which is linked to neither relay 1 nor relay 2. If its hello counted these two, relay 6 would select it
-/// in place of relay 5 every 16 s.
+/// Checks that a relay outside the chain does not attract a relay of the chain. Relay 3 is left out, and has links to
+/// neither relay 1 nor relay 2. If its hello counted these two as linked to it, relay 6 would choose relay 3 as its
+/// neighbour in place of relay 5 every 16 s.
 #[test]
 fn a_left_out_relay_attracts_no_other() {
     let (air, share) = flown_with_flaps(2, (10_191_000, 25_107_000), 325);

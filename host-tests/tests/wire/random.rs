@@ -69,7 +69,7 @@ proptest! {
     }
 }
 
-/// Checks that the crate decodes a body to the meaning of its fields, or refuses it as the tables do.
+/// Checks that the crate decodes a body by the tables of `FORMAT.md`, or refuses it as they do.
 fn check_by_tables(body: &[u8]) {
     let read = Message::decode(body);
     match WireMessage::read(body) {
@@ -140,7 +140,7 @@ proptest! {
 
 #[test]
 fn random_bodies_reach_messages_and_both_errors() {
-    /// First unused message tag; all later tags are counted with it.
+    /// First unused message tag. Bodies with this or a later tag, or without a tag, are counted together.
     const NONE: usize = 21;
 
     let mut runner = TestRunner::new(config(1));

@@ -42,7 +42,7 @@ fn deframed_in_runs(stream: &[u8]) -> Vec<Outcome> {
     out
 }
 
-/// Returns what the rules make of `stuffed`, the bytes between two delimiters: a frame or an error.
+/// Decodes `stuffed`, the bytes between two delimiters, by the rules of the format. Returns a frame or an error.
 pub(crate) fn unstuffed(stuffed: &[u8]) -> Outcome {
     let (plain, whole) = envelope::unstuffed(stuffed);
     if plain.len() > MAX_DECODED {

@@ -45,7 +45,7 @@ pub(crate) fn proposed(
 }
 
 /// Returns the decision that accepts a proposed membership view of `relays` relays. The relay at position `place`
-/// sends it, and the view's positions may be used at once.
+/// sends it, and the view's positions may be used at once. `of` is the digest and the version of the view's mission.
 pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> WireMessage {
     let accepted = json!({ "view": view, "relays": relays });
     let changes = json!({ "base_relays": relays, "accepted": accepted });
