@@ -235,9 +235,10 @@ pub struct BetaPoint {
 /// Altitude and power of one relay, if they differ from the common values. At least one is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
-    /// Fixed altitude of this relay, m, 0.1 to 1e4. It may be outside `altitude_min_m` to `altitude_max_m`.
+    /// Fixed altitude of this relay, m, 0.1 to 1e4; `None` for the common altitude. It may be outside
+    /// `altitude_min_m` to `altitude_max_m`.
     pub altitude_m: Option<f64>,
-    /// EIRP of this relay, W, 1e-6 to 1e6.
+    /// EIRP of this relay, W, 1e-6 to 1e6; `None` for the common one.
     pub power_w: Option<f64>,
 }
 
