@@ -60,7 +60,7 @@ pub(crate) struct Rivals {
 }
 
 impl Rivals {
-    /// Starts the Python process, and lets it solve a small problem with every solver before anything is timed.
+    /// Starts the Python process. It solves a small problem with every solver before anything is timed.
     ///
     /// `limit_s` is the limit of processor time for each later problem, s.
     pub(crate) fn start(python: &Path, limit_s: f64) -> Result<Self, String> {

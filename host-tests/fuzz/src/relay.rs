@@ -136,9 +136,9 @@ impl Bench {
         heard.map(|member| member.restarted())
     }
 
-    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream), and delivers its handshake to the relay.
+    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream).
     ///
-    /// With `None` there is no neighbour at this side any more.
+    /// Its handshake is delivered to the relay. With `None` there is no neighbour at this side any more.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;

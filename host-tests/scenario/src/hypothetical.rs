@@ -550,9 +550,9 @@ pub struct Centre {
 }
 
 impl Centre {
-    /// Returns the length over which the function changes at `x`: the larger, the farther `x` is from this position.
+    /// Returns the length over which the function changes at `x`. It grows with the distance from `at`.
     ///
-    /// It is the hypotenuse of two lengths: the distance from `x` to this position, and `width`.
+    /// It is the hypotenuse of two lengths: the distance from `x` to `at`, and `width`.
     fn scale(&self, x: f64) -> f64 {
         (x - self.at).hypot(self.width)
     }

@@ -53,9 +53,10 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots in which each hop sends once, or once per direction if `both_ways` is true.
+    /// Returns the number of time slots in which each hop sends once, or once per direction.
     ///
-    /// If every hop has its own frequency, all hops send in the same slot, so that it is 1 per direction.
+    /// The latter applies if `both_ways` is true. If every hop has its own frequency, all hops send in the same slot,
+    /// so that the number is 1 per direction.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,

@@ -162,6 +162,8 @@ impl Air {
     }
 
     /// Creates a chain of relays with the keys and epochs that `auth` returns for each index, from 1.
+    ///
+    /// `loss` is the probability that a receiver loses a frame.
     pub(crate) fn of(mission: &Mission, auth: impl Fn(u16) -> Option<Auth>, loss: f64) -> Self {
         let relays = (1..=mission.relays())
             .map(|index| relay(mission, index, auth(index), Instant::ZERO))
@@ -539,9 +541,10 @@ fn station(base: &Mission, epoch: u32) -> Ground {
     )
 }
 
-/// Returns a chain of relays that fly, and the offers of an upload that an attacker withheld from them.
+/// Returns a chain of relays that fly the mission `base`, and the withheld offers of an upload.
 ///
-/// The upload has version 1. The ground station is gone.
+/// An attacker has withheld them from the relays. The upload has version 1. The ground station is gone. `loss` is the
+/// probability that a receiver loses a frame.
 fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
     let mut air = Air::of(base, |_| auth(KEY, 1), loss);
     air.run(60);

@@ -237,7 +237,7 @@ fn read(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(stamp)
 }
 
-/// Returns the unsigned frame `frame` with a signature, whose link number and time stamp are `link` and `stamp`.
+/// Signs the unsigned frame `frame`. `link` and `stamp` are link number and time stamp of the signature.
 ///
 /// The frame's checksum is computed again, because it covers the flag that marks a signed frame.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {

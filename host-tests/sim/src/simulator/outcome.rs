@@ -329,7 +329,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Adds a frame that ended at `at`, with a description of its faults.
+    /// Adds a frame that ended at `at`. `note` describes the faults of the frame.
     pub fn put(&mut self, at: Instant, link: Link, bytes: &[u8], note: String) {
         self.frames.push(Reverse(OnAir {
             at,

@@ -408,6 +408,8 @@ pub fn places_of(outcome: &Outcome) -> Places {
 }
 
 /// Returns the positions in which a chain of only the relays `nodes` (from 1) settles without faults.
+///
+/// `version` is the version of the mission that they fly.
 pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {
     places_of(&run(without_other_relays(setup, nodes, version)?).ok()?)
 }

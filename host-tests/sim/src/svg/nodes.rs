@@ -248,9 +248,11 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
     }
 }
 
-/// Returns pairs of a point on the hop and a position for the text with its SIR, the best pair first.
+/// Returns possible positions for the text with a hop's SIR, the best first.
 ///
-/// `width` and `height` are the size of the text.
+/// Each has a point on the hop, to which a line can lead. `width` and `height` are the size of the text. `shares` are
+/// the points as fractions of the hop's length; `sides` are additional distances from the hop, whose sign selects the
+/// side.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);

@@ -160,10 +160,10 @@ impl Chain {
         }
     }
 
-    /// Simulates an operator who confirms to relays that the drones of lost neighbours have landed.
+    /// Simulates an operator who confirms to a relay that the drones of lost neighbours have landed.
     ///
-    /// Relays then no longer keep away from these drones. The operator waits while a pilot controls the next flying
-    /// drone, and for some time after that.
+    /// The relay then no longer keeps away from these drones. The operator waits until this relay and the relay of
+    /// the nearest flying drone on that side have controlled their drones for [`LANDS_AFTER`].
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {
