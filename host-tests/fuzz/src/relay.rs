@@ -15,7 +15,7 @@ use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
 
-/// Maximum number of fuzzed operations in one run. Each takes some milliseconds of computing.
+/// Maximum number of fuzzed operations in one run. It limits the run's duration: each takes some milliseconds.
 const MAX_OPERATIONS: usize = 256;
 
 /// Maximum number of relays in the fuzzed mission; but one mission in sixteen has a thousand.

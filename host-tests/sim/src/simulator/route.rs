@@ -104,7 +104,7 @@ impl Track {
         }
     }
 
-    /// Returns this record with other positions: relay 1 has the first position of `places` in all its states.
+    /// Returns this record with other positions: relay 1 has the first of `places` in all its states.
     ///
     /// The other relays follow in order. Positions are x, y and altitude, m. States in which a relay has no position
     /// keep none.
