@@ -259,7 +259,8 @@ impl Default for ChannelSpec {
 impl Default for Scenario {
     /// Returns the paper's multi-hop scenario.
     ///
-    /// Tx and Rx are 1 km apart, relays at 20 m altitude and at least 4 m apart, and one 80 W interferer is halfway.
+    /// Tx and Rx are 1 km apart, relays at 20 m altitude and at least 4 m apart. One interferer of 80 W is halfway
+    /// between Tx and Rx, 400 m to the right of their line.
     fn default() -> Self {
         Self {
             line: None,

@@ -264,7 +264,7 @@ pub(crate) fn mission(relays: u16) -> Mission {
 
 const TAKEN: Event = Event::DuplicateIndex { node: 3 };
 
-/// Returns a chain of five relays with positions to which a second relay with the number 3 was added.
+/// Returns a chain of five relays that have positions, and an added second relay with the number 3.
 ///
 /// The second value is the index (from 0) of the added relay.
 fn joined(loss: f64, seed: u64) -> (Air, usize) {
@@ -350,9 +350,9 @@ fn one_of_two_simultaneous_duplicates_flies() {
     }
 }
 
-/// Checks that of two relays with the key and one number, the relay with the larger epoch stays active.
+/// Checks that of two relays with the same number, the one with the larger epoch stays active.
 ///
-/// The other relay becomes passive: it gets no setpoint, and reports the duplicate.
+/// Both have the network key. The other relay becomes passive: it gets no setpoint, and reports the duplicate.
 #[test]
 fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {

@@ -280,7 +280,7 @@ pub struct Shot {
 /// Transmission of a frame, for the animation of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transmission {
-    /// Time when the frame was sent.
+    /// Time when the relay passed the frame to its port for transmission.
     pub at: Instant,
     /// Number of the sending relay, from 1.
     pub relay: u16,

@@ -58,7 +58,7 @@ pub const fn ps(instant: Instant) -> Ps {
 /// State of a relay that determines the route of the data and its rates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
-    /// State of the relay, with the true position of its drone as `place`.
+    /// State of the relay, with the position of its drone as `place`. Without simulated drones it is the setpoint.
     ///
     /// The position is `None` while the relay has no setpoint.
     pub observed: ObservedState,

@@ -227,7 +227,7 @@ impl Chain {
         parts
     }
 
-    /// Returns true if every living neighbour of a silent relay has reported its loss.
+    /// Returns true if every living neighbour of each silent relay has reported that relay as lost.
     fn all_noticed(&self) -> bool {
         let noticed = |by: usize, side| {
             let Some(member) = self.members.get(by) else {
