@@ -11,8 +11,9 @@ use crate::reference::{Link, Relay};
 
 /// Converts a reference link to a mission, and to the profiles of relays that differ from the first.
 ///
-/// The first relay's profile (altitude and power) is the common one of the mission. The u16 is a relay's index, from
-/// 1. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay would reject a number.
+/// The first relay's profile (altitude and power) is the common one of the mission. Each other profile has the
+/// relay's index, from 1, beside it. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay
+/// would reject a number.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     let channel = Channel::new(

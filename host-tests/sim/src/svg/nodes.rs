@@ -114,7 +114,7 @@ const SIR_SIZE: f64 = 10.0;
 
 /// Distance of the text with a hop's SIR from the line of the hop, in picture units.
 ///
-/// It is larger than the largest radius of a relay's circle, so that the text touches no circle.
+/// It is larger than the largest radius of a relay's circle, so that the text touches neither relay of the hop.
 const GAP: f64 = 4.6;
 
 /// Positions along a hop at which the text with its SIR may be, as fractions of its length.
