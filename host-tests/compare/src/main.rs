@@ -79,7 +79,7 @@ fn run(options: &Options) -> Result<String, Failure> {
     table::table(&results).map_err(Failure::input)
 }
 
-/// Comments that mark the begin and the end of the table in RESULTS.md.
+/// Comments in RESULTS.md between which the table stands. `--into` replaces the text between them.
 const MARKS: [&str; 2] = [
     "<!-- cargo compare --into examples/RESULTS.md -->\n",
     "<!-- end of that -->\n",

@@ -22,7 +22,7 @@ const TOLERANCE: f64 = 1e-4;
 
 /// Number of timed batches, of which the median counts.
 const BATCHES: usize = 5;
-/// Minimum duration of a timed batch. The processor clock has a resolution of milliseconds only.
+/// Minimum duration of a timed batch. It is far above the resolution of the processor clock, some milliseconds.
 const LONG_ENOUGH: Duration = Duration::from_millis(200);
 
 /// Solves `problem` with this crate: first by one computation, then by all relays with messages.

@@ -61,6 +61,8 @@ pub(crate) struct Rivals {
 
 impl Rivals {
     /// Starts the Python process. It solves a small problem with every solver before anything is timed.
+    ///
+    /// `limit_s` is the limit of processor time for each later problem, s.
     pub(crate) fn start(python: &Path, limit_s: f64) -> Result<Self, String> {
         let mut child = Command::new(python)
             .args(["-B", "-W", "ignore", PROGRAM])

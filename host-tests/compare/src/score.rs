@@ -51,8 +51,10 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// Checks a chain against the constraints, and returns the SIR (linear) of its worst hop. Each relay has [x, y,
-/// altitude] in m.
+/// Checks a chain against the constraints, and returns the SIR (linear) of its worst hop.
+///
+/// `room` limits the relays' altitudes and lateral positions. Each entry of `chain` is a relay's [x, y, altitude] in
+/// m.
 pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f64, Refusal> {
     let count = Refusal::Count(chain.len());
     if chain.len() != link.len() {

@@ -47,7 +47,7 @@ impl TagCheck {
 /// Several are tried, because frames that were signed before a new handshake may arrive after it.
 const TRIED: usize = 4;
 
-/// Network number, sender and destination of frames.
+/// Network number, sender and destination of frames, by which the sender's nonces are stored.
 type Pair = (u16, u16, u16);
 
 /// Verifier of authentication tags, with the nonces of all captured handshakes.

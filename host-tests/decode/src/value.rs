@@ -56,7 +56,7 @@ impl<'f> Fields<'f> {
     }
 }
 
-/// Deserializes a value as it is on the wire: a digest or flags are a number.
+/// Conversion of a value to a Rust type by serde. The value is as on the wire: a digest or flags are a number.
 impl<'de> Deserializer<'de> for &Value<'_> {
     type Error = de::value::Error;
 

@@ -12,7 +12,7 @@ use super::input::Input;
 use super::setting;
 use super::watch::{Sent, Watched};
 
-/// Maximum number of fuzzed operations in one run. Each takes some milliseconds of computing.
+/// Maximum number of fuzzed operations in one run. It limits the run's duration: each takes some milliseconds.
 const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;

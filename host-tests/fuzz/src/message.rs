@@ -14,6 +14,8 @@ use parts::Body;
 pub use parts::RelayState;
 
 /// Builds a message body of one of the kinds 0 to 19 with fuzzed fields, or arbitrary bytes.
+///
+/// Some fields are drawn near the values in `state`, so that the tested relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     let tag = match input.below(16) {
         15 => 15 + input.below(6),

@@ -15,7 +15,7 @@ use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
 
-/// Maximum number of fuzzed operations in one run. Each takes some milliseconds of computing.
+/// Maximum number of fuzzed operations in one run. It limits the run's duration: each takes some milliseconds.
 const MAX_OPERATIONS: usize = 256;
 
 /// Maximum number of relays in the fuzzed mission; but one mission in sixteen has a thousand.
@@ -136,7 +136,9 @@ impl Bench {
         heard.map(|member| member.restarted())
     }
 
-    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream). Delivers its handshake to the relay.
+    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream).
+    ///
+    /// Its handshake is delivered to the relay. With `None` there is no neighbour at this side any more.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;

@@ -192,6 +192,8 @@ pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
 }
 
 /// Reads an interferer between Tx and Rx or far away, on the line between them or beside it.
+///
+/// `distance_m` is the distance from Tx to Rx, m.
 fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {
     let power_w = input.scaled(1e-6, 1e9);
     let x_m = match input.below(4) {

@@ -126,8 +126,9 @@ impl Watched {
         self.frames.asked
     }
 
-    /// Returns view and number of the pass (round of messages) that gave the relay its agreed position. `None` if
-    /// unknown, as always with a guard.
+    /// Returns view and number of the pass (round of messages) that gave the relay its agreed position.
+    ///
+    /// `None` if the pass is not known. With a collision guard it is never known.
     pub const fn held(&self) -> Option<(ViewId, u16)> {
         self.held
     }

@@ -11,7 +11,9 @@ use crate::reference::{Link, Relay};
 
 /// Converts a reference link to a mission, and to the profiles of relays that differ from the first.
 ///
-/// The first relay's profile is the common profile of the mission. `None` if a relay would reject a number.
+/// The first relay's profile (altitude and power) is the common one of the mission. Each other profile has the
+/// relay's index, from 1, beside it. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay
+/// would reject a number.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
     let channel = Channel::new(
@@ -83,7 +85,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
 
 /// Converts a link with identical relays, and interference known only along the line, to a mission.
 ///
-/// `None` if a relay would reject a number.
+/// `min_separation_m` is the mission's minimum distance of two relays, m. `None` if a relay would reject a number.
 pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Option<Mission> {
     let relay = link.relays.first()?;
     let points: Vec<FieldPoint> = link

@@ -283,8 +283,8 @@ impl Space {
 
     /// Minimises the error by the simplex method from `start`, a point (x, u) of the search space.
     ///
-    /// `share` is the size of the first simplex relative to the length over which the error changes. The search ends
-    /// at the relative `tolerance` or after `most` steps.
+    /// `share` is the size of the first simplex as a fraction of the length over which the error changes noticeably.
+    /// The search ends at the relative `tolerance` of the error or after `most` steps.
     fn descend(
         &self,
         raster: &Raster,
@@ -550,7 +550,9 @@ pub struct Centre {
 }
 
 impl Centre {
-    /// Returns the length over which the function changes at `x`: the hypotenuse of distance and `width`.
+    /// Returns the length over which the function changes at `x`. It grows with the distance from `at`.
+    ///
+    /// It is the hypotenuse of two lengths: the distance from `x` to `at`, and `width`.
     fn scale(&self, x: f64) -> f64 {
         (x - self.at).hypot(self.width)
     }
@@ -558,8 +560,9 @@ impl Centre {
 
 /// Returns the ends of grid cells from `low` to `high`, in increasing order. Cells are smaller near the `centres`.
 ///
-/// A cell is at most 1.5 times `widest` wide, and at most about 1.5 times `step` (below 1) of the distance to a
-/// centre. There are about (high - low) / widest ends, and 2 ln(2 (high - low) / width) / step more for each centre.
+/// A cell is at most 1.5 times as wide as the smaller of `widest` and `step` (below 1) times the length over which
+/// the function changes there. There are about (high - low) / widest ends, and 2 ln(2 (high - low) / width) / step
+/// more for each centre.
 pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -> Vec<f64> {
     let mut ends = vec![low];
     let mut at = low;

@@ -53,8 +53,10 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots after which every hop has sent once in each direction. It is 1 per direction
-    /// if every hop has its own frequency.
+    /// Returns the number of time slots in which each hop sends once, or once per direction.
+    ///
+    /// The latter applies if `both_ways` is true. If every hop has its own frequency, all hops send in the same slot,
+    /// so that the number is 1 per direction.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,

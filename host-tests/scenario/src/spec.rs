@@ -235,9 +235,10 @@ pub struct BetaPoint {
 /// Altitude and power of one relay, if they differ from the common values. At least one is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
-    /// Fixed altitude of this relay, m, 0.1 to 1e4. It may be outside `altitude_min_m` to `altitude_max_m`.
+    /// Fixed altitude of this relay, m, 0.1 to 1e4; `None` for the common altitude. It may be outside
+    /// `altitude_min_m` to `altitude_max_m`.
     pub altitude_m: Option<f64>,
-    /// EIRP of this relay, W, 1e-6 to 1e6.
+    /// EIRP of this relay, W, 1e-6 to 1e6; `None` for the common one.
     pub power_w: Option<f64>,
 }
 
@@ -258,7 +259,8 @@ impl Default for ChannelSpec {
 impl Default for Scenario {
     /// Returns the paper's multi-hop scenario.
     ///
-    /// Tx and Rx are 1 km apart, relays at 20 m altitude and at least 4 m apart, and one 80 W interferer is halfway.
+    /// Tx and Rx are 1 km apart, relays at 20 m altitude and at least 4 m apart. One interferer of 80 W is halfway
+    /// between Tx and Rx, 400 m to the right of their line.
     fn default() -> Self {
         Self {
             line: None,

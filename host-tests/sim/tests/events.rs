@@ -162,6 +162,8 @@ impl Air {
     }
 
     /// Creates a chain of relays with the keys and epochs that `auth` returns for each index, from 1.
+    ///
+    /// `loss` is the probability that a receiver loses a frame.
     pub(crate) fn of(mission: &Mission, auth: impl Fn(u16) -> Option<Auth>, loss: f64) -> Self {
         let relays = (1..=mission.relays())
             .map(|index| relay(mission, index, auth(index), Instant::ZERO))
@@ -262,7 +264,7 @@ pub(crate) fn mission(relays: u16) -> Mission {
 
 const TAKEN: Event = Event::DuplicateIndex { node: 3 };
 
-/// Returns a chain of five relays with positions to which a second relay with the number 3 was added.
+/// Returns a chain of five relays that have positions, and an added second relay with the number 3.
 ///
 /// The second value is the index (from 0) of the added relay.
 fn joined(loss: f64, seed: u64) -> (Air, usize) {
@@ -348,9 +350,9 @@ fn one_of_two_simultaneous_duplicates_flies() {
     }
 }
 
-/// Checks that of two relays with the key and one number, the relay with the larger epoch stays active.
+/// Checks that of two relays with the same number, the one with the larger epoch stays active.
 ///
-/// The other relay becomes passive: it gets no setpoint, and reports the duplicate.
+/// Both have the network key. The other relay becomes passive: it gets no setpoint, and reports the duplicate.
 #[test]
 fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {
@@ -539,9 +541,10 @@ fn station(base: &Mission, epoch: u32) -> Ground {
     )
 }
 
-/// Returns a chain of relays that fly, and the offers of an upload that an attacker withheld from them.
+/// Returns a chain of relays that fly the mission `base`, and the withheld offers of an upload.
 ///
-/// The upload has version 1. The ground station is gone.
+/// An attacker has withheld them from the relays. The upload has version 1. The ground station is gone. `loss` is the
+/// probability that a receiver loses a frame.
 fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
     let mut air = Air::of(base, |_| auth(KEY, 1), loss);
     air.run(60);

@@ -134,8 +134,9 @@ fn the_readme_has_the_commands_figures_of_a_lost_relay() {
     assert_eq!(cells[2], expected, "{command} prints: {line}");
 }
 
-/// Checks that RESULTS.md does not list the measurement of interference as missing. FIRMWARE.md and LINUX.md describe
-/// this measurement.
+/// Checks that RESULTS.md does not list the measurement of interference as missing.
+///
+/// Relays can measure it: FIRMWARE.md and LINUX.md describe how.
 #[test]
 fn stated_limits_do_not_contradict_the_guides() {
     let limits = read("examples/RESULTS.md");

@@ -75,7 +75,8 @@ fn json_round_trip_is_the_identity() {
     );
 }
 
-/// Runs `compare` with only `folder` on PATH, which also contains the virtual environment.
+/// Runs `compare` with `folder` as its whole PATH, so that it finds no other programs. The virtual environment for
+/// Python is the subfolder `venv`.
 fn with_path(folder: &Path) -> Output {
     let venv = folder.join("venv");
     Command::new(env!("CARGO_BIN_EXE_compare"))

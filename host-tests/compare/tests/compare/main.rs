@@ -58,9 +58,9 @@ fn table(results: &Value) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Returns the SIR and the positions [x, y, altitude] of the best chain of eight relays at 20 m.
+/// Returns SIR (linear) and positions [x, y, altitude], m, of the best chain of eight relays.
 ///
-/// An independent program has computed them.
+/// The altitude is 20 m. An independent program has computed the chain, which the tests use as a correct result.
 fn best_of_eight() -> (f64, Vec<[f64; 3]>) {
     let cases = cases::of("gamma_star").unwrap();
     let found = cases.iter().find(|case| {

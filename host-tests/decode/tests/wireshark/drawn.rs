@@ -24,7 +24,9 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
     around(&body, flags, rng)
 }
 
-/// Returns a frame with this body, and a random header and authentication tag. Without `flags` it has no tag.
+/// Returns a frame with this body and a random header. `flags` are the flags of the header.
+///
+/// If `flags` is 0, the frame has no authentication tag, otherwise a random one.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let header = Header {
         network: rng.random(),

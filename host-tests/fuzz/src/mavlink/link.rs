@@ -19,15 +19,15 @@ use crate::input::Input;
 
 const MAX_OPERATIONS: usize = 256;
 
-/// Maximum number of frames that the link may have to send at once: twice the 13 kinds.
+/// Limit on the frames that the link sends in one turn. A link that exceeds it counts as never finished.
 ///
-/// These are a heartbeat, three message requests, a command answer, a flight target, three status texts and four
-/// named values.
+/// It is twice 13 frames: a heartbeat, three message requests, a command answer, a flight target, three status texts
+/// and four named values. A clock request (TIMESYNC) can come in addition.
 const MAX_FRAMES: usize = 26;
 
-/// Maximum distance of a flight target from the line Tx-Rx, m: 5 km, and 40 m of error.
+/// Maximum distance of a flight target from the line Tx-Rx, m.
 ///
-/// The error comes from the assumption of a flat earth.
+/// The link allows 5 km. The test adds 40 m, because it computes the distance on a flat earth, which is less exact.
 const AROUND_M: f64 = 5_040.0;
 
 /// Surveyed position of Tx: latitude and longitude in degrees, height in m above the sea.
@@ -57,6 +57,8 @@ fn line_to(rx: [f64; 3]) -> Option<Axis> {
 }
 
 /// Reads the rest of `input` as operations on an autopilot link, and checks the link after each.
+///
+/// `signs` is true if the link signs its frames and requires signed frames from the autopilot.
 pub(super) fn operate(input: &mut Input<'_>, signs: bool) {
     let Some(mut link) = Link::new(input, signs) else {
         return;

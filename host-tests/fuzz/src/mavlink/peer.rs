@@ -190,7 +190,9 @@ impl Peer {
         true
     }
 
-    /// Advances the expected clock of the tested link to `now`, by at most 71 minutes between two calls.
+    /// Advances the expected clock of the tested link to `now`.
+    ///
+    /// The clock advances by at most 71 minutes (2^32 µs) at each call, as the link's own clock does.
     fn advance(&mut self, now: Instant) {
         let passed = now.since(self.at).as_micros().min(u64::from(u32::MAX)) / 10;
         self.time = self.time.saturating_add(passed).min(LAST);
@@ -235,7 +237,9 @@ fn read(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(stamp)
 }
 
-/// Signs the unsigned frame `frame`. Its checksum is computed again, because it covers the signed flag.
+/// Signs the unsigned frame `frame`. `link` and `stamp` are link number and time stamp of the signature.
+///
+/// The frame's checksum is computed again, because it covers the flag that marks a signed frame.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.truncate(frame.len() - 2);

@@ -2,7 +2,7 @@
 
 use crate::input::Input;
 
-/// Returns the CRC-16/MCRF4XX over `covered` and one byte more, computed bit by bit.
+/// Returns the CRC-16/MCRF4XX over the bytes `covered` and then the byte `extra`, computed bit by bit.
 pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
     covered.iter().chain([&extra]).fold(0xFFFF, |crc, &byte| {
         (0..8).fold(crc ^ u16::from(byte), |crc, _| {
@@ -55,7 +55,10 @@ pub(super) fn extra(id: u32) -> u8 {
 
 pub(super) const SENT: [Kind; 7] = [HEARTBEAT, COMMAND, ACK, SET_POSITION, TIMESYNC, TEXT, VALUE];
 
-/// Builds a MAVLink frame. Trailing zeros of its payload are omitted, but its first byte stays.
+/// Builds a MAVLink frame from the system and component `from`. Trailing zeros of its payload are omitted, except for
+/// its first byte.
+///
+/// If `flags` has the bit for a signed frame (1), 13 arbitrary bytes follow as the signature.
 pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {
     let (id, extra, _) = kind;
     let zeros = payload.iter().rev().take_while(|byte| **byte == 0).count();

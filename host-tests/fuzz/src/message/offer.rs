@@ -42,7 +42,10 @@ impl Body<'_, '_> {
         self.answer(choice);
     }
 
-    /// Appends to the offer the number of the hello that it answers: mostly the relay's last hello.
+    /// Appends to the offer the number of the hello that it answers.
+    ///
+    /// It is the number in the relay's last hello for a `choice` below 240, otherwise a number from the fuzzer's
+    /// input.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
             0..240 => self.state.offer_number,
@@ -51,9 +54,10 @@ impl Body<'_, '_> {
         self.word(answer);
     }
 
-    /// Appends the surveyed positions of Tx and Rx to an offer, mostly zeros for no positions.
+    /// Appends the surveyed positions of Tx and Rx to an offer; `choice` selects them.
     ///
-    /// Otherwise they are a kilometre apart, as in the paper, or arbitrary numbers.
+    /// They are mostly zeros, which means no positions. Otherwise they are a kilometre apart, as in the paper, or
+    /// arbitrary numbers.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -127,7 +131,9 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, 1e5));
     }
 
-    /// Appends three path-loss factors to the offer. Rarely one of them is an arbitrary number.
+    /// Appends the three path-loss factors `losses` to the offer.
+    ///
+    /// In rare cases, which the fuzzer's input selects, an arbitrary number replaces one of them.
     fn losses(&mut self, mut losses: [f64; 3]) {
         let which = usize::from(self.input.byte());
         if let Some(loss) = losses.get_mut(which) {

@@ -58,8 +58,8 @@ impl Link {
     /// Returns the first target SIR (linear) that the paper's fixed-step search tries.
     ///
     /// It is the lesser of two SIRs: that of the first hop with relay 1 straight above Tx, and that of the last hop
-    /// with relay N straight above Rx. If the interferer is behind Tx (X < 0), the first hop's best SIR over [0, D]
-    /// takes the place of the one above Tx.
+    /// with relay N straight above Rx. If the interferer is behind Tx (its x is below 0), the largest SIR of the
+    /// first hop over x from 0 to D replaces the one above Tx.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {

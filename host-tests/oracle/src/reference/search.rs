@@ -18,8 +18,10 @@ impl Link {
         self.best_from(1, 0.0, points)
     }
 
-    /// Returns the best SIR of hops `k` to N+1 over all positions of the relays from `k` on. The SIR of several hops
-    /// is that of the worst one; relay k-1 is at `from_x`.
+    /// Returns the best SIR of hops `k` to N+1 over all positions of the relays from `k` on.
+    ///
+    /// The SIR of several hops is that of the worst one. Relay k-1 is at `from_x`; `points` is the number of grid
+    /// points per relay.
     fn best_from(&self, k: usize, from_x: f64, points: u32) -> f64 {
         let worst_hop = |x: f64| {
             let here = self.sir_relay(k, from_x, x).unwrap_or(0.0);
@@ -34,8 +36,10 @@ impl Link {
         maximum(&self.grid(from, points), worst_hop)
     }
 
-    /// Returns the grid of positions from `from_x` to Rx, m. It has evenly spaced points, and further points that get
-    /// denser toward both ends and the interferer.
+    /// Returns the positions from `from_x` to Rx, m, at which the search evaluates a relay.
+    ///
+    /// They are about `points` evenly spaced positions, and further ones that get denser toward `from_x`, Rx and the
+    /// interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);

@@ -218,8 +218,9 @@ impl<'a> Prepared<'a> {
         report::hop_sirs(&mission, &places)
     }
 
-    /// Returns the linear SIR of every hop from Rx to Tx; the arguments are as in [`Prepared::sirs_at`]. Empty if the
-    /// mission is for the direction from Tx to Rx only.
+    /// Returns the linear SIR of every hop from Rx to Tx, for the interferer's position at the time `then`.
+    ///
+    /// The arguments are as in [`Prepared::sirs_at`]. Empty if the mission is for the direction from Tx to Rx only.
     pub fn sirs_back_at(&self, then: Instant, places: &[(u16, Placement)]) -> Vec<f64> {
         let (mission, places) = self.chain_at(then, places);
         if mission.reverse() > 0.0 {
@@ -251,7 +252,9 @@ impl<'a> Prepared<'a> {
         (mission, places)
     }
 
-    /// Returns the picture of the chain at the end of a run. [`report`](Self::report) must be called before.
+    /// Returns the picture of the chain at the end of a run.
+    ///
+    /// [`report`](Self::report) must be called before, because it puts the true interference into the mission.
     pub fn picture(&self, outcome: &Outcome, report: &ChainReport) -> Picture {
         let flown = report::flown(&self.setup, outcome);
         picture_of(&flown, &self.scenario, outcome, report)
@@ -259,6 +262,8 @@ impl<'a> Prepared<'a> {
 }
 
 /// Checks the options against each other and against the scenario.
+///
+/// `method` is the name of the planning method, for error messages.
 fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Failure> {
     options.agree(method)?;
     options.listening.agree()?;

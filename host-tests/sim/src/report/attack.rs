@@ -15,7 +15,7 @@ pub struct AttackCountsReport {
     pub sent: u64,
     /// Number of the attacker's frames that a relay accepted as frames of a neighbour.
     pub taken: u64,
-    /// Numbers of the attacker's frames, by the receive counter of a relay that the frames incremented.
+    /// Number of the attacker's frames for each receive counter that they incremented at a relay.
     ///
     /// `received` counts accepted frames. Each other counter stands for a reason of rejection.
     pub counted: BTreeMap<&'static str, u64>,

@@ -130,8 +130,9 @@ pub struct WorstBack {
 }
 
 impl WorstBack {
-    /// Finds the worst hop of both directions, as [`Self::with`]. `None` if the mission requires no SIR from Rx to
-    /// Tx.
+    /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
+    ///
+    /// `None` if the mission requires no SIR from Rx to Tx, or without hops.
     pub fn of(mission: &Mission, there: &[f64], back: &[f64]) -> Option<Self> {
         let reverse = f64::from(mission.config().reverse);
         if reverse > 0.0 {
@@ -141,7 +142,9 @@ impl WorstBack {
         }
     }
 
-    /// Finds the worst hop from linear SIRs to Rx (`there`) and to Tx (`back`). `None` without hops.
+    /// Finds the worst hop from the linear SIRs of the hops to Rx (`there`) and of the hops to Tx (`back`).
+    ///
+    /// `reverse` is the SIR that hops to Tx need, as a fraction of the SIR that hops to Rx need. `None` without hops.
     pub fn with(reverse: f64, there: &[f64], back: &[f64]) -> Option<Self> {
         let worst = |sirs: &[f64]| sirs.iter().copied().reduce(f64::min);
         let (worst_there, worst_back) = (worst(there)?, worst(back)?);

@@ -532,7 +532,9 @@ fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'
     })
 }
 
-/// Returns the last entry in which a member accepts a position; `None` unless every member does.
+/// Returns the last entry of `later`, a part of the log, in which one of `members` accepts a position.
+///
+/// `None` unless every member accepts one.
 fn convergence<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed = |moment: &&Moment| {
         moment.what == TimelineEvent::Converged && members.contains(&moment.relay)

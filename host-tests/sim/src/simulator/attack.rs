@@ -18,9 +18,10 @@ pub(super) use uav_relay_scenario::deployment::NETWORK;
 
 use super::faults::LinkSpec;
 
-/// Attack on the chain: numbers of frames, and end. The attacker does not know the network key.
+/// Attack on the chain: number of frames of each kind, and time of the last frame.
 ///
-/// Half of the frames are sent back to back from the start of the run, the others at random times.
+/// The attacker does not know the network key. Half of the frames are sent back to back from the start of the run,
+/// the others at random times.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Attack {
     /// Number of forged frames that the attacker sends.

@@ -228,7 +228,9 @@ impl Flight {
         self.steps.is_multiple_of(self.report_steps.max(1))
     }
 
-    /// Returns the position that drone `index` (from 0) reports: the true position, its bias and noise, m.
+    /// Returns the position that drone `index` (from 0) reports, m: the true position plus bias and noise.
+    ///
+    /// `None` if there is no such drone.
     pub(super) fn reported(&mut self, index: usize) -> Option<Point> {
         let drone = self.drones.get(index)?;
         let noise = random_error(&mut self.rng, drone.noise_m);

@@ -503,7 +503,7 @@ const NEXT_MS: u64 = 500;
 
 /// Delay before a pilot hands the drone to its relay, s, after the climb and after a failed attempt.
 const LOOKS_S: u64 = 2;
-/// Delay from a restart of autopilot or relay to the pilot's next hand-over to the relay, s.
+/// Delay from a failsafe, or a restart of autopilot or relay, to the pilot's next hand-over, s.
 const RECOVERS_S: u64 = 10;
 
 /// Flight mode of a drone: who controls it.

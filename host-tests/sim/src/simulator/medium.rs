@@ -33,9 +33,11 @@ pub struct Sent {
     pub from: usize,
     /// Bytes of the frame that was sent.
     pub frame: Vec<u8>,
-    /// Nodes that received the frame intact.
+    /// Indices, from 0, of the nodes that received the frame intact.
     pub heard_by: Vec<usize>,
-    /// Number of nodes in range that did not receive the frame. Frames collided, or their own radio was sending.
+    /// Number of nodes in range that did not receive the frame.
+    ///
+    /// Another frame overlapped with it there, or the node's own radio was sending or turning to sending.
     pub missed: usize,
 }
 
@@ -101,6 +103,8 @@ impl Medium {
     }
 
     /// Queues a frame at the radio of `node` (from 0). Returns false, and drops the frame, if the queue is full.
+    ///
+    /// Appends the radio's next event to `agenda`.
     pub fn offer(&mut self, now: Instant, node: usize, frame: &[u8], agenda: &mut Agenda) -> bool {
         let Some(radio) = self.radios.get_mut(node) else {
             return false;
@@ -118,7 +122,7 @@ impl Medium {
 
     /// Processes an event that is due. If it is the end of a frame, returns that frame.
     ///
-    /// `hearers` returns the nodes in range of a sending node.
+    /// `hearers` returns the nodes in range of a sending node. Events that follow are appended to `agenda`.
     pub fn happen(
         &mut self,
         now: Instant,
@@ -150,6 +154,8 @@ impl Medium {
     }
 
     /// Makes the radio of `node` prepare to send the next frame of its queue, if any.
+    ///
+    /// Appends the radio's next event to `agenda`.
     fn next(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let Some(radio) = self.radios.get_mut(node) else {
             return;
@@ -166,6 +172,8 @@ impl Medium {
     }
 
     /// Starts the random wait of a radio before it senses the channel: fewer than 2^`exponent` slots.
+    ///
+    /// Appends the end of the wait to `agenda`.
     fn back_off(&mut self, now: Instant, node: usize, exponent: u32, agenda: &mut Agenda) {
         let slots = self.rng.random_range(0..1_u32 << exponent);
         let until = now + self.link.line_time(SLOT).times(slots);
@@ -192,7 +200,9 @@ impl Medium {
         }
     }
 
-    /// Starts the turnaround of a radio from receiving to sending. Frames that it was receiving are lost there.
+    /// Starts the turnaround of the radio of `node` from receiving to sending.
+    ///
+    /// Frames that this radio was receiving are lost there. Appends the end of the turnaround to `agenda`.
     fn turn(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let until = now + self.link.line_time(TURNAROUND);
         if let Some(radio) = self.radios.get_mut(node) {

@@ -280,7 +280,7 @@ pub struct Shot {
 /// Transmission of a frame, for the animation of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transmission {
-    /// Time when the frame was sent.
+    /// Time when the relay passed the frame to its port for transmission.
     pub at: Instant,
     /// Number of the sending relay, from 1.
     pub relay: u16,
@@ -329,7 +329,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Adds a frame that ended at `at`, with a description of its faults.
+    /// Adds a frame that ended at `at`. `note` describes the faults of the frame.
     pub fn put(&mut self, at: Instant, link: Link, bytes: &[u8], note: String) {
         self.frames.push(Reverse(OnAir {
             at,

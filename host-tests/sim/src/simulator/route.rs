@@ -58,7 +58,7 @@ pub const fn ps(instant: Instant) -> Ps {
 /// State of a relay that determines the route of the data and its rates.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
-    /// State of the relay, with the true position of its drone as `place`.
+    /// State of the relay, with the position of its drone as `place`. Without simulated drones it is the setpoint.
     ///
     /// The position is `None` while the relay has no setpoint.
     pub observed: ObservedState,
@@ -104,9 +104,10 @@ impl Track {
         }
     }
 
-    /// Returns this record with other positions: each position of relay k becomes `places[k]`, m.
+    /// Returns this record with other positions: relay 1 has the first of `places` in all its states.
     ///
-    /// States in which a relay has no position keep none.
+    /// The other relays follow in order. Positions are x, y and altitude, m. States in which a relay has no position
+    /// keep none.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -168,8 +169,8 @@ impl TrueHops {
 
     /// Returns the linear SIR of each hop from Tx to Rx and, if `back` is true, of each hop from Rx to Tx.
     ///
-    /// `relays` has the index, from 0, and the position of each relay in the chain. The hops of a direction are in
-    /// the order in which a packet passes them.
+    /// The SIRs are those at the time `at`, for the mission `version`. `relays` has the index, from 0, and the
+    /// position of each relay in the chain. The hops of a direction are in the order in which a packet passes them.
     fn sirs(&self, at: Ps, version: u16, relays: &[(usize, Point)], back: bool) -> Vec<Vec<f64>> {
         let Some((scene, [vx, vy])) = &self.scene else {
             let mut missions = self.missions.iter();

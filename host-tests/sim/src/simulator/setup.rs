@@ -101,7 +101,7 @@ pub struct Setup {
     pub flight: Option<FlightSpec>,
     /// Flight of drones with simulated autopilots, in place of `flight`; `None` if it is not simulated.
     pub fleet: Option<FleetSpec>,
-    /// Radio range on a shared channel, in relays: the largest difference of two relays' numbers.
+    /// Radio range on a shared channel, in relays. Relays receive each other if their numbers differ by at most this.
     pub radio_reach: usize,
     /// Access method of the radios on a shared channel.
     pub access: Access,

@@ -302,7 +302,7 @@ impl Queue {
 
 /// End of a transmission, as an event in a queue: time, order, node, and number of the transmission.
 ///
-/// If several end at the same time, `order` puts the one nearest to the end of the chain first.
+/// If several end at the same time, `order` puts the node first that is nearest to the destination of the packets.
 type End = Reverse<(Ps, usize, usize, u32)>;
 
 /// Simulation of the traffic in one direction, while it runs.

@@ -10,7 +10,7 @@ pub use super::outcome::Watched;
 use super::outcome::{Ending, Outcome};
 use super::setup::Setup;
 
-/// Statistics that a run collects: availability of the chain, groups of flying relays, least distance.
+/// Statistics of a run: availability of the chain, groups of flying relays, least distance of relays.
 #[derive(Debug)]
 pub struct Watch {
     pub(super) states: Vec<ObservedState>,
@@ -210,7 +210,10 @@ pub fn has_agreed(seen: &[ObservedState]) -> bool {
     })
 }
 
-/// Largest number of chains that [`longest`] returns. Sparse links allow far more, which would take too long.
+/// Largest number of chains that [`longest`] returns.
+///
+/// If many links are missing, there can be far more chains of the same length, and to examine all would take too
+/// long.
 const MAX_CHAINS: usize = 1_000;
 
 /// Returns the largest number of relays that can form a chain, and the chains of that many relays.
@@ -408,6 +411,8 @@ pub fn places_of(outcome: &Outcome) -> Places {
 }
 
 /// Returns the positions in which a chain of only the relays `nodes` (from 1) settles without faults.
+///
+/// `version` is the version of the mission that they fly.
 pub fn undisturbed(setup: &Setup, nodes: &[u16], version: u16) -> Places {
     places_of(&run(without_other_relays(setup, nodes, version)?).ok()?)
 }

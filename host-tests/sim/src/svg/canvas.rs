@@ -82,7 +82,7 @@ impl Canvas {
         ));
     }
 
-    /// Draws a sample of a hop's line for the legend, from (`x`, `y`) to the right.
+    /// Draws a sample of a hop's line for the legend: from (`x`, `y`) to the right, `length` long.
     pub(super) fn swatch(&mut self, (x, y): Point, length: f64, (colour, width): (&str, f64)) {
         let [x, y, end, width] = [x, y, x + length, width].map(short);
         self.put(format_args!(

@@ -68,7 +68,8 @@ pub(super) fn cross(canvas: &mut Canvas, (x, y): Point, arm: f64) {
 
 /// Writes the numbers of the relays where there is free space.
 ///
-/// In a short chain every relay gets a number. In a long chain only every fifth or tenth does, and each lost relay.
+/// In a chain of at most twelve relays every relay gets a number. In a longer chain only every second, fifth, tenth
+/// and so on does, and each lost relay.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let radius = radius(picture, frame);
     let step = round_step((picture.nodes.len() as f64 / 12.0).max(1.0));
@@ -113,7 +114,7 @@ const SIR_SIZE: f64 = 10.0;
 
 /// Distance of the text with a hop's SIR from the line of the hop, in picture units.
 ///
-/// It is larger than the radius of a relay's circle.
+/// It is larger than the largest radius of a relay's circle, so that the text touches neither relay of the hop.
 const GAP: f64 = 4.6;
 
 /// Positions along a hop at which the text with its SIR may be, as fractions of its length.
@@ -248,9 +249,11 @@ pub(super) fn label_hops(canvas: &mut Canvas, labels: &mut Labels, hops: &[Hop])
     }
 }
 
-/// Returns pairs of a point on the hop and a position for the text with its SIR, the best pair first.
+/// Returns possible positions for the text with a hop's SIR, the best first.
 ///
-/// `width` and `height` are the size of the text.
+/// Each has a point on the hop, to which a line can lead. `width` and `height` are the size of the text. `shares` are
+/// the points as fractions of the hop's length; `sides` are additional distances from the hop, whose sign selects the
+/// side.
 fn places(hop: &Hop, (width, height): Point, shares: &[f64], sides: &[f64]) -> Vec<(Point, Point)> {
     let [(x1, y1), (x2, y2)] = hop.line;
     let (run, rise) = (x2 - x1, y2 - y1);

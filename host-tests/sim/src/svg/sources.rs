@@ -18,6 +18,8 @@ const FAR_LINES: usize = 4;
 type Source = (f64, f64, f64);
 
 /// Splits interferers into two lists: within the plot, and outside. Values that are not finite are left out.
+///
+/// `distance` is the distance from Tx to Rx, m.
 fn sorted(all: &[Source], distance: f64) -> (Vec<Source>, Vec<Source>) {
     let known = |(power, x, y): &Source| [power, x, y].iter().all(|part| part.is_finite());
     all.iter()
@@ -59,7 +61,7 @@ fn arrow((x, y): Point, down: bool) -> [Point; 3] {
     [(x, tip), (x - 4.5, back), (x + 4.5, back)]
 }
 
-/// Returns true if the side view has the symbol of an interferer that is beside the line.
+/// Returns true if the side view shows an interferer that is beside the line. The legend then explains its symbol.
 pub(super) fn has_beside(picture: &Picture) -> bool {
     let (inside, _) = sorted(&picture.interferers, length(picture));
     inside.iter().any(|(_, _, y)| *y != 0.0)
@@ -204,7 +206,7 @@ pub(super) fn from_above(
     seen
 }
 
-/// Writes the labels of the interferers in the view from above, where there is free space.
+/// Writes the labels `seen` of the interferers in the view from above, where there is free space.
 pub(super) fn label_from_above(canvas: &mut Canvas, labels: &mut Labels, seen: &PlacedLabels) {
     for ((x, y), words, class) in seen {
         let wide = width(words, SIZE) + 4.0;

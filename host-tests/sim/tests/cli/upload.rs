@@ -5,9 +5,9 @@ use serde_json::Value;
 
 use super::{chain, example, json, refusals};
 
-/// Returns the report of a run without upload, a reference for runs whose upload moves the interferer.
+/// Returns the report of a run in which the interferer is at x = 800 m, y = -300 m from the start.
 ///
-/// The interferer is at x = 800 m, y = -300 m from the start.
+/// It is a reference for runs whose upload moves the interferer there. `more` has further options of `cargo chain`.
 fn from_the_start(folder: &tempfile::TempDir, more: &str) -> Value {
     let file = folder.path().join("moved.toml");
     let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n[[interferer]]\npower_w = 80\nx_m = 800\ny_m = -300\n";

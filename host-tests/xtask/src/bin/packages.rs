@@ -57,6 +57,8 @@ fn cargo(arguments: &[&str]) -> Result<String, String> {
 }
 
 /// Returns the output of `cargo tree` for the locked packages, with every target and feature.
+///
+/// `arguments` are further options of `cargo tree`.
 fn tree(arguments: &[&str]) -> Result<String, String> {
     let common = [
         "tree",

@@ -23,7 +23,9 @@ const LOOKS: Duration = Duration::from_millis(5_000);
 /// A pilot does not hand a drone over to its relay while another moving drone is nearer.
 const TRAFFIC_M: f64 = 30.0;
 
-/// Time after which a pilot lands a drone whose relay is off, or which the pilot took over for good.
+/// Time until a pilot lands a drone: since its relay was switched off, or since a permanent takeover.
+///
+/// The operator also waits for this time before confirming that lost drones have landed.
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
@@ -160,10 +162,10 @@ impl Chain {
         }
     }
 
-    /// Simulates an operator who confirms to relays that the drones of lost neighbours have landed.
+    /// Simulates an operator who confirms to a relay that the drones of lost neighbours have landed.
     ///
-    /// Relays then no longer keep away from these drones. The operator waits while a pilot controls the next flying
-    /// drone, and for some time after that.
+    /// The relay then no longer keeps away from these drones. The operator waits until two relays have controlled
+    /// their drones for [`LANDS_AFTER`]: this relay, and the next relay with a flying drone behind the lost ones.
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {

@@ -34,8 +34,10 @@ impl ChangedRelays {
 }
 
 impl Chain {
-    /// Starts the statistics of the run. `run` simulates a chain without faults, with whose positions this chain is
-    /// compared.
+    /// Starts the statistics of the run.
+    ///
+    /// `run` simulates a chain without faults. The positions that it reaches are the ones that this chain should
+    /// have.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
@@ -225,7 +227,7 @@ impl Chain {
         parts
     }
 
-    /// Returns true if every living neighbour of a silent relay has reported its loss.
+    /// Returns true if every living neighbour of each silent relay has reported that relay as lost.
     fn all_noticed(&self) -> bool {
         let noticed = |by: usize, side| {
             let Some(member) = self.members.get(by) else {
@@ -276,7 +278,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all of these relays have positions that were agreed on for the same target SIR.
+/// Returns true if all relays of `part` have positions, which were agreed on for the same target SIR.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()

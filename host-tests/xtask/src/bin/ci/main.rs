@@ -81,6 +81,9 @@ fn main() -> ExitCode {
 }
 
 /// Runs the numbered steps of `lane`, one after the other, beside the main lane. Returns the failures.
+///
+/// The output of a step is printed in one piece at its end, so that it does not mix with other steps' output. `all`
+/// is the number of all steps, for the headings.
 fn run_in_one_piece(lane: Vec<(usize, &Step)>, all: usize) -> Vec<(&str, Evidence)> {
     let run = |(number, step)| {
         let mut output = Vec::new();

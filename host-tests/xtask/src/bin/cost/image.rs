@@ -47,7 +47,7 @@ type Image = (
     [u64; 3],
 );
 
-/// Firmware images whose costs are measured, from the smallest to the largest.
+/// Firmware images whose costs are measured, with the largest permitted flash, static RAM and stack.
 ///
 /// The code that relay and ground station share costs an image with `auth` 0.4 KB of flash, and saves it 0.8 KB of
 /// stack.
