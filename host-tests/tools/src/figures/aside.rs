@@ -26,7 +26,7 @@ const ROOM_STEP_M: u16 = 4;
 
 /// Largest distance from the line Tx-Rx permitted to the relay in the figure of the gain, m.
 ///
-/// It equals the highest altitude.
+/// It equals the highest permitted altitude: the figure compares the gain by lateral offset with that by altitude.
 pub const ROOM_M: f64 = 300.0;
 
 /// Largest distance of the interferer from the line in the figure of the gain, m.

@@ -32,7 +32,7 @@ const MOST_LEVELS: usize = 10;
 /// Largest number of relays for which a proof is tried.
 const MOST_RELAYS: usize = 200;
 
-/// Allowance for rounding errors, as a fraction of a squared length.
+/// Allowance for rounding errors in squared lengths, as a fraction of the squared length.
 const ROUNDING: f64 = 1e-9;
 
 /// Target SIRs, linear, that every hop has to meet: in the direction to Rx and in that to Tx.

@@ -105,7 +105,7 @@ pub struct PlanRequest {
     pub tolerance: f64,
 }
 
-/// Largest loss of SIR against the best positions that is accepted, as a fraction of the best SIR.
+/// Largest accepted loss of SIR, in comparison with the best positions, as a fraction of their SIR.
 pub const LOSS: f64 = 0.01;
 
 /// Theorem, and its case, by which the position of a single relay was found.
