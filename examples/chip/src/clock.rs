@@ -161,7 +161,7 @@ const CACHES: u32 = 0b11 << 9;
 const NO_PREFETCH: u32 = 0x1000_0413;
 
 /// Maximum number of reads of a register while a PLL, a voltage or a clock switch settles. They take some 10 ms at 16
-/// MHz; the data sheets allow at most 0.3 ms.
+/// MHz; by the data sheets, the chip needs at most 0.3 ms.
 const POLLS: u32 = 20_000;
 
 /// Sets up the clocks of a board, and returns the frequencies reached. Call it once after a reset, with interrupts

@@ -69,7 +69,9 @@ fn lambda_w(mission: &Mission) -> f64 {
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// Returns the distributions of the interference power at the points of the line that define `kind`.
+/// Returns the distributions of the interference power of this `kind`, at points of the line Tx-Rx.
+///
+/// The relays interpolate between the points. If the interference is the same everywhere, there is one point.
 fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;

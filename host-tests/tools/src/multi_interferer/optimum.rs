@@ -18,8 +18,8 @@ const ROUNDING: f64 = 1e-12;
 pub struct Chain {
     /// Positions (x, altitude) of the relays from Tx to Rx, m.
     ///
-    /// x is between 0 (Tx) and the distance to Rx. It rises by at least the least separation, less 1e-12 of that for
-    /// rounding.
+    /// x is between 0 (Tx) and the distance to Rx. From each relay to the next, x rises by at least the least
+    /// separation, except for rounding (1e-12 of the separation).
     pub places: Vec<(f64, f64)>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
@@ -228,7 +228,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// Receiver's x in `to` for which the sender can be nearest to Tx.
+    /// x in `to` of the receiver that lets the sender be nearest to Tx.
     farthest: f64,
 }
 

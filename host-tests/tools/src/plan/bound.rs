@@ -26,7 +26,8 @@ const PARTS: usize = 4;
 /// Largest number of cells of all relays together. With more, the search ends without a proof.
 const MOST_CELLS: usize = 60_000;
 
-/// Largest number of rounds in which cells are divided. The cells are then 1e-8 of the distance from Tx to Rx.
+/// Largest number of rounds in which cells are divided. The smallest cells are some 1e-8 of the distance from Tx to
+/// Rx.
 const MOST_LEVELS: usize = 10;
 
 /// Largest number of relays for which a proof is tried.
