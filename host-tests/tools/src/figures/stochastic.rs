@@ -56,7 +56,7 @@ struct Row {
 struct PointRow {
     field: Kind,
     x_m: f64,
-    /// First shape parameter of the Beta distribution of I relative to its maximum.
+    /// First shape parameter of the Beta distribution of the interference power relative to its maximum.
     alpha: f64,
     beta: f64,
     /// Largest interference power `I_max`, W.

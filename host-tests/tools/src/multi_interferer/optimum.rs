@@ -77,7 +77,8 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
 
 /// Returns the SIR of the best chain at `altitude_m` that keeps the least separation, linear.
 ///
-/// `tolerance` is relative. `None` as for [`optimum`].
+/// `tolerance` is relative. `None` without relays or interferers, if the relays do not fit on the line, and if no
+/// chain has an SIR above 0.
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)
@@ -228,7 +229,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// x in `to` of the receiver that lets the sender be nearest to Tx.
+    /// x of the receiver, within `to`, that belongs to the smallest feasible x of the sender.
     farthest: f64,
 }
 
@@ -476,7 +477,7 @@ impl<'a> Line<'a> {
         Stride((power_w / (self.scene.mu_los * target)).sqrt())
     }
 
-    /// Returns the x nearest to Tx, m, from which a sender gives a receiver at `x` the target SIR.
+    /// Returns the smallest x of a sender, m, that gives a receiver at `x` the target SIR.
     ///
     /// `stride` is the range factor for the target SIR and the sender's power. The result may lie behind Tx (below
     /// 0).
@@ -484,7 +485,7 @@ impl<'a> Line<'a> {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// Returns the x of a receiver at which its sender can be nearest to Tx.
+    /// Returns the x of a receiver at which its sender can be farthest back, toward Tx.
     ///
     /// These are the minima of [`Line::heard_from`] over the receiver's x.
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {

@@ -162,7 +162,9 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns the smallest interference power, W, that `node` can have at any position in `cell`.
+    /// Returns a lower bound on the interference power, W, that `node` receives at any position in `cell`.
+    ///
+    /// Each interferer is received as from the edge of the cell that is farther from it.
     fn least_w(&self, node: usize, cell: &Range<f64>) -> f64 {
         let altitude_m = self.altitude_m(node);
         let factor = match self.relay(node) {

@@ -338,7 +338,7 @@ impl ProfiledMission {
             .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
     }
 
-    /// Returns the plan with the relays at `places`; its SIRs are those of the crate's own formulas.
+    /// Returns the plan with the relays at `places`. Its SIRs are those that the library computes for the mission.
     fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
         let held: Vec<(Placement, Profile)> = (1..)
             .zip(places)
