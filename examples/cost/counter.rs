@@ -37,7 +37,7 @@ pub(crate) fn next_frame(relay: &mut Relay, now: Instant) -> Option<([u8; MAX_FR
     Some((frame, transmit.len))
 }
 
-/// Sleeps for ever, if the emulator QEMU does not exit.
+/// Ends the program with an endless sleep, for the case that the emulator QEMU does not exit.
 pub(crate) fn stop() -> ! {
     loop {
         cortex_m::asm::wfi();

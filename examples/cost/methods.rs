@@ -6,10 +6,10 @@ use uav_relay::{Adjust, Instant, MAX_FRAME, Method, Mission, Phase, Port, Relay,
 use super::counter::{instructions, relay};
 use super::missions::{HIGH, UNEVEN};
 
-/// Simulated chain of three relays that records the cost of every call.
+/// Simulated chain of three relays that records the highest cost of a call of a relay's functions.
 pub(crate) struct Flight {
     relays: heapless::Vec<Relay, 3>,
-    /// Instructions of the most expensive call so far.
+    /// Number of instructions of the most expensive call of a relay's function so far.
     most: u32,
     /// Length of the longest frame so far, bytes.
     longest: usize,

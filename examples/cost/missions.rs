@@ -56,13 +56,14 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     ..*mission(3).config()
 });
 
-/// Mission of three relays with ranges of altitudes for both directions.
+/// Mission of three relays that carries data in both directions. The relays may choose altitudes of 20 to 300 m.
 pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
     reverse: 1.0,
     ..*HIGH.config()
 });
 
-/// Mission of three relays that may choose altitudes, and of lateral offsets, 280 m to either side.
+/// Mission of three relays that may choose altitudes, and lateral offsets. The offsets from the line Tx-Rx are up to
+/// 280 m to either side.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,

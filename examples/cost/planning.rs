@@ -10,8 +10,8 @@ use uav_relay::planning::single::theorems;
 use super::counter::instructions;
 use super::missions::{BOTH, HIGH, MISSION, WIDE};
 
-/// Measures the instructions for the paper's Theorems 1 to 3, and for finding the number of relays. This is the
-/// minimum number that reaches an SIR.
+/// Measures the instructions for the paper's Theorems 1 to 3, and for the search for the fewest relays. The search
+/// finds the smallest number of relays with which every hop reaches a given SIR.
 #[inline(never)]
 pub(crate) fn planning() {
     let common = HIGH.config().common;

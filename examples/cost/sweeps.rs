@@ -207,8 +207,8 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the instructions of the calls in which relay 1 of 100 computes the target SIR in advance. Prints the
-/// largest cost and the number of calls.
+/// Measures the instructions with which relay 1 of 100 computes the target SIR from the mission. It does so in
+/// several calls, before it sends any message. Prints the cost of the most expensive call, and the number of calls.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);

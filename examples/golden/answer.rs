@@ -5,7 +5,7 @@ use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{Message, MessageError, SweepVerdict};
 
-/// First bytes that the golden firmware sends, once it can receive.
+/// First bytes that the test firmware sends. They tell the test that the firmware is ready to receive frames.
 pub const READY: &[u8] = b"ready\0";
 
 /// Generator of the answers to received frames, by which a test compares the results of target and PC.

@@ -189,8 +189,8 @@ fn value_of(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Returns true if both values are the same text or the same list of numbers. An empty `other` also counts as the
-/// same, because it is that of an option without a value.
+/// Returns true if two values of an option are the same text, or the same list of numbers. An empty `other` also
+/// counts as the same, because an option without a value has an empty one.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());

@@ -23,7 +23,7 @@ use crate::socket::StatusSocket;
 /// Maximum wait at exit for the log to write its last lines.
 const LAST_LINES: Duration = Duration::from_millis(500);
 
-/// Longest sleep after poll(2) has failed.
+/// Longest sleep after poll(2) has failed. Without the sleep, a lasting failure would keep the CPU busy.
 const NAP: Duration = Duration::from_millis(10);
 
 /// Common services of a long-running program: log, clock, signals, status socket and systemd.

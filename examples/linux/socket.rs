@@ -13,7 +13,7 @@ use uav_relay::{Duration, Instant};
 
 use crate::lines::LONGEST;
 
-/// Maximum number of connections that one call accepts.
+/// Maximum number of connections that one call of [`StatusSocket::questions`] accepts.
 const ANSWERS: usize = 4;
 
 /// Maximum number of clients whose request is not complete. If there are more, the oldest of them are answered at

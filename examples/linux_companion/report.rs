@@ -154,8 +154,8 @@ impl Report {
         }
     }
 
-    /// Logs a new setpoint, or the arrival of a drone at the position `drone`, if due. Returns the time of the next
-    /// check.
+    /// Logs a new setpoint, or the drone's arrival at its agreed position, if due. `drone` is the drone's present
+    /// position. Returns the time of the next check.
     pub(crate) fn log_movement(
         &mut self,
         now: Instant,

@@ -69,7 +69,7 @@ impl Chain {
         })
     }
 
-    /// Simulates a millisecond: delivers the frames that were sent in the last one, and collects new ones. Notes the
+    /// Simulates a millisecond: delivers the frames of the millisecond before, and collects new frames. Notes the
     /// relays that have agreed on positions in mission `version`.
     fn turn(&mut self, version: u16) {
         self.now = Instant::from_micros(self.now.as_micros() + TURN_US);

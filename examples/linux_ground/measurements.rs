@@ -35,7 +35,8 @@ enum Source {
     File(Watched),
 }
 
-/// Watched file with measurements. Its state at the last read is inode, length, and modification time, s and ns.
+/// Watched file with measurements. `seen` tells if the file has changed since the last read: its inode, its length,
+/// and its modification time in s and ns.
 #[derive(Debug)]
 struct Watched {
     path: PathBuf,

@@ -65,8 +65,8 @@ pub(crate) struct NewOptions {
 /// companion's default position error.
 const ORDER_M: f32 = 2.0;
 
-/// Maximum distance of a new line Tx to Rx from the present one, m, besides the new line's own length. A line farther
-/// away is rejected.
+/// Largest distance of a new line Tx-Rx from the present one, m, in addition to the new line's length. A new line
+/// farther away is rejected, because the drones' positions could not be converted to it.
 const FAR_M: f64 = 100_000.0;
 
 /// Mission that supplies the values which the `--new-` options do not give.

@@ -148,8 +148,8 @@ impl Autopilot {
     }
 }
 
-/// Opens the autopilot's port, served by its interrupt. A separate function, because the queues pass over the stack
-/// on their way to RAM.
+/// Opens the autopilot's port, served by its interrupt. The function is not inlined, so that its stack is released:
+/// the queues are built on the stack before they are moved to static RAM.
 #[inline(never)]
 fn open(uart: Uart) -> Option<Port> {
     Some(port::open(

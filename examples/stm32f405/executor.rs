@@ -45,8 +45,8 @@ impl uav_relay::asynch::Clock for Time {
     }
 }
 
-/// Runs `task` for ever. Polls it after an interrupt, after a wake-up and at the time for which it asked, then calls
-/// `also`.
+/// Runs `task` for ever. Polls it after each interrupt, after a wake-up, and at the time for which it asked. Calls
+/// `also` after every poll.
 pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {
     let waker = waker();
     let mut cx = Context::from_waker(&waker);

@@ -31,7 +31,8 @@ pub(super) struct Layout {
     /// interference as a distribution along x.
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
-    /// Carrier frequency (Hz), excess losses with and without line of sight, line-of-sight weight (0 to 1).
+    /// Carrier frequency (Hz), excess losses with and without line of sight (factors), and a weight. The weight, 0 to
+    /// 1, is that of the path loss with line of sight between drone and ground.
     pub(super) channel: [F64; 4],
     pub(super) band: [F32; 2],
     pub(super) lateral: [F32; 2],

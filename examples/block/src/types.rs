@@ -157,19 +157,19 @@ pub enum ConfigError {
     /// Settings for estimating an unknown interferer out of range. Or the block has these settings, and gives the
     /// interference as a distribution along x.
     Listen,
-    /// Traffic from receiver to transmitter, which the joint method does not support.
+    /// Error: there is traffic from receiver to transmitter, which the joint method does not support.
     Reverse,
-    /// Interferer in a block that also gives the interference as a distribution along x.
+    /// Error: the block gives an interferer, but also the interference as a distribution along x.
     Interferer,
     /// Number of points of the interference's distribution along x exceeds the capacity of a block.
     Points,
-    /// Non-zero bytes behind the last point of the interference's distribution along x.
+    /// Error: bytes behind the last point of the interference's distribution along x are not 0.
     Unused,
-    /// Signing key without an epoch, epoch without a key, or an epoch of 4294967295.
+    /// Error: a signing key without an epoch, an epoch without a key, or an epoch of 4294967295.
     Secret,
     /// Maximum speed out of range, or given without the positions of transmitter and receiver.
     Speed,
-    /// Signing key of the autopilot, although there is no autopilot: the block has no Tx and Rx positions.
+    /// Error: a signing key for the autopilot, but no autopilot: the block has no Tx and Rx positions.
     AutopilotKey,
     /// Silence of a neighbour after which a heartbeat is requested exceeds the maximum.
     Silence,

@@ -143,9 +143,9 @@ const SCALE_1: u32 = 1 << 14;
 const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
 /// Bit of PWR_CSR that is set once the voltage scale is reached.
 const SCALE_READY: u32 = 1 << 14;
-/// Bit of PWR_CR that enables the over-drive, and of PWR_CSR once it is ready.
+/// Bit of the over-drive, at the same place in two registers. PWR_CR: enable it. PWR_CSR: it is ready.
 const OVER_DRIVE: u32 = 1 << 16;
-/// Bit of PWR_CR that switches to the over-drive, and of PWR_CSR once it is in use.
+/// Bit of the switch to the over-drive, at the same place in two registers. PWR_CR: switch. PWR_CSR: it is in use.
 const OVER_DRIVE_SWITCH: u32 = 1 << 17;
 
 /// Mask of the flash wait states in the register FLASH_ACR.
@@ -161,7 +161,7 @@ const CACHES: u32 = 0b11 << 9;
 const NO_PREFETCH: u32 = 0x1000_0413;
 
 /// Maximum number of reads of a register while a PLL, a voltage or a clock switch settles. They take some 10 ms at 16
-/// MHz; the data sheets allow at most 0.3 ms.
+/// MHz; by the data sheets, the chip needs at most 0.3 ms.
 const POLLS: u32 = 20_000;
 
 /// Sets up the clocks of a board, and returns the frequencies reached. Call it once after a reset, with interrupts
@@ -256,8 +256,8 @@ fn off(chip: &mut impl Registers) -> bool {
     chip.wait(Register::ClockControl, PLL_READY, 0, POLLS)
 }
 
-/// Starts the PLL, which must be off, at the settings of `speed`; returns false if that fails. `divisor` turns the
-/// source into 2 MHz; `scale` are the voltage bits of PWR_CR.
+/// Starts the PLL, which must be off, at the settings of `speed`; returns false if that fails. `divisor` divides the
+/// source's frequency to 2 MHz. `scale` has the bits of PWR_CR that select the core's voltage.
 fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Pll, scale: u32) -> bool {
     chip.modify(Register::PowerControl, scale, scale);
     let from = match source {

@@ -235,8 +235,8 @@ impl Registers for MockRegisters {
         }
     }
 
-    /// Simulates a wait by a single read, since the result of further reads is the same. Only the timer's status
-    /// changes from read to read.
+    /// Simulates a wait by a single read, because further reads return the same value. The exception is the timer's
+    /// status, which changes from read to read.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

@@ -17,8 +17,8 @@ pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
 /// Payload length of a journal record that stores an epoch, words.
 pub const WORDS: usize = 1;
 
-/// Key of the journal of epochs, numbers that rise at every start. It is the same for every configuration block,
-/// because no block may lower the epoch.
+/// Key of the journal that stores the epochs. A journal ignores records with another key. This key does not depend on
+/// the configuration block, so that no change of the block makes the epoch fall, which must rise at every start.
 pub const KEY: u32 = 0;
 
 /// Returns the epoch of this start (a number that rises at every start), and true if it was stored.

@@ -17,7 +17,7 @@ use uav_relay::CRC_32C;
 /// Value of an erased word.
 pub const BLANK: u32 = u32::MAX;
 
-/// Number of words of a record in addition to its payload: its number and its CRC.
+/// Number of words of a record in addition to its payload: its sequence number and its CRC.
 pub const OVERHEAD: usize = 2;
 
 /// Maximum number of attempts to write one record, each at another place. Flash cells may be worn.
@@ -88,7 +88,7 @@ struct Found {
     room: usize,
 }
 
-/// Newest valid record of a sector. Ordered by the record's number, which rises with every record.
+/// Newest valid record of a sector. Ordered by the record's sequence number, which rises with every record.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Newest {
     number: u32,
@@ -125,8 +125,8 @@ impl<F: Flash> Journal<F> {
         Some(())
     }
 
-    /// Erases each used sector without the newest record, at a start. In flight, a full sector of records can then be
-    /// stored before the next erase.
+    /// Erases each used sector that does not have the newest record. Called at a start, so that in flight a whole
+    /// sector of records can be stored before the next erase.
     pub fn tidy(&mut self) {
         let found = self.found();
         let any = found.iter().any(|found| found.newest.is_some());
@@ -182,7 +182,7 @@ impl<F: Flash> Journal<F> {
         })
     }
 
-    /// Returns the number of the record at index `record`; `None` if the record's CRC is wrong.
+    /// Returns the sequence number of the record at index `record`; `None` if the record's CRC is wrong.
     fn number(&mut self, sector: usize, record: usize) -> Option<u32> {
         let first = record * self.words;
         let sum = self.sum(sector, first);

@@ -8,8 +8,8 @@ use crate::journal::{BLANK, Flash};
 
 const WORD: usize = 4;
 
-/// Number of words per read or write of the flash. A driver call costs more than a word, and some flashes write a
-/// whole page each time.
+/// Number of words per read or write of the flash. Larger pieces save time: each call of the driver takes longer than
+/// the transfer of a word, and some flashes write a whole page at each call.
 const PIECE: usize = 16;
 
 /// Two sectors of a NOR flash, given by their offsets; each consists of one or more erase units. The flash must read

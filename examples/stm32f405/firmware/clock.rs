@@ -10,7 +10,7 @@ use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::exception;
 use uav_relay::Instant;
 
-/// Number of `SysTick` cycles in a microsecond. `SysTick` counts a thousand times as many until its interrupt.
+/// Number of `SysTick` cycles in a microsecond. `SysTick` interrupts every 1000 microseconds.
 static MICRO: AtomicU32 = AtomicU32::new(1);
 
 /// Milliseconds since the start, in 64 bits, which do not overflow.

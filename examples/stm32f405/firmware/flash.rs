@@ -162,7 +162,8 @@ fn unlocked() -> FLASH {
     flash
 }
 
-/// Waits until the flash is idle, as each command requires. The hardware delays reads by itself.
+/// Waits until the flash is idle, as each command requires. Reads need no such wait, because the hardware delays
+/// them.
 fn wait(flash: &FLASH) {
     while flash.sr().read().bsy().bit_is_set() {}
 }

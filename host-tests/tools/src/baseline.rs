@@ -67,7 +67,9 @@ pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
 // The outer hops are at least as long as the altitude. If the hops span more than the distance even then, many chains are
 // equally good; the one that shortens every hop in the same proportion is used.
 
-/// Largest number of bisection steps that find the common received power. Any f64 interval needs fewer.
+/// Largest number of bisection steps that find the received power that all hops have in common.
+///
+/// Any f64 interval needs fewer steps.
 const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m from Tx, that maximise the weakest received signal, without interference.
@@ -106,9 +108,9 @@ struct Hops<'a> {
 }
 
 impl Hops<'_> {
-    /// Returns the largest power, W, that both the first and the last hop can receive.
+    /// Returns the largest signal power, W, that is possible on both the first and the last hop.
     ///
-    /// These hops receive most with their relays right above Tx and Rx.
+    /// On these hops, the received power is largest if the relay is right above Tx, or right above Rx.
     fn strongest(&self) -> f64 {
         let height = self.relay.altitude_m;
         self.scene.tx_w.min(self.relay.power_w) / (self.scene.eta * height * height)

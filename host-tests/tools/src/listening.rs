@@ -157,7 +157,7 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
 /// Largest number of agreements, based on measurements, after which the figure shows the SIR.
 pub const LAST: usize = 8;
 
-/// Ratios of the SIR to the best possible SIR, after 0, 1, 2 and more agreements that use measurements.
+/// Ratios of the SIR to the best possible SIR: list k has those after k agreements with measurements.
 ///
 /// Each list has one ratio for each random experiment.
 pub type Shares = [Vec<f64>; LAST + 1];

@@ -50,16 +50,16 @@ impl Default for DroneStorage {
 pub enum Refused {
     /// Invalid configuration block.
     Block(ConfigError),
-    /// Signing key in the configuration block, but no flash that stores the epoch.
+    /// Error: the configuration block has a signing key, but the board has no flash that stores the epoch.
     NoFlash,
-    /// Signing impossible, because the last possible epoch has been used.
+    /// Error: signing is impossible, because the last possible epoch has been used.
     NoEpoch,
-    /// Positions of Tx and Rx in the configuration block, but no port to an autopilot.
+    /// Error: the configuration block has the positions of Tx and Rx, but there is no port to an autopilot.
     NoAutopilot,
-    /// Positions of Tx and Rx that form no valid line, or whose distance differs from the mission's.
+    /// Error: the positions of Tx and Rx form no valid line, or their distance differs from the mission's.
     Course(CourseError),
-    /// Settings that the relay rejects, because they need a feature that this build lacks. The joint method for more
-    /// than 100 relays is rejected, too.
+    /// Error: the relay rejects the settings, because they need a feature that this build lacks. The joint method for
+    /// more than 100 relays is rejected, too.
     Setup(SetupError),
 }
 

@@ -39,7 +39,8 @@ use drone::{Drone, DroneStorage, Refused};
 /// Bit rate of every port, bit/s, 8N1.
 pub use uav_relay_block::BAUD;
 
-/// Size of a UART driver's buffers, bytes. They hold 22 ms of traffic; a call of the relay takes 3 ms.
+/// Size of a UART driver's buffers, bytes: 22 ms of traffic. No byte is lost during a call of the relay's functions,
+/// which takes 3 ms.
 pub const BUFFER: usize = 256;
 
 /// Clock of the relay, based on Embassy's time driver.

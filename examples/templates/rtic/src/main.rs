@@ -39,7 +39,7 @@ mod app {
         end: InterruptEnd<'static>,
     }
 
-    /// Trigger of a UART's hardware task, by its interrupt.
+    /// Starter of the task that serves a UART: it sets the UART's interrupt pending.
     pub struct Request(Interrupt);
 
     impl Pend for Request {

@@ -96,9 +96,10 @@ fn shapes(rounds: &[u16]) -> Result<Vec<ShapeRow>, FigureError> {
     Ok(chains?.concat())
 }
 
-/// Returns the chain's SIR after each round of Algorithm 2, from 0 to `rounds`, by both searches.
+/// Returns the chain's SIR after each round of Algorithm 2, from 0 to `rounds`.
 ///
-/// A search that has ended keeps its last SIR.
+/// Each row has the SIR with the coarse-to-fine search and that with the grid search. A search that has ended keeps
+/// its last SIR.
 fn rounds(rounds: u16) -> Result<Vec<RoundRow>, FigureError> {
     let (fine, grid) = rayon::join(
         || adjusted(RELAYS, START_M, rounds, Local::Fine),

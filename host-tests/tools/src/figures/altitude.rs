@@ -15,7 +15,7 @@ pub const RELAYS: u16 = 50;
 /// Distances of the interferer from the line Tx-Rx, m, one for each curve of the figure.
 pub const OFFSETS_M: [f64; 5] = [100.0, 150.0, 200.0, 300.0, 400.0];
 
-/// Distance of the interferer from the line, m, at which the paper reads a best altitude of 220 m.
+/// Distance of the interferer from the line, m, for which the paper states a best altitude of 220 m.
 pub const PAPERS_OFFSET_M: f64 = 150.0;
 
 /// Table row: SIR of the chain at one common altitude, with the interferer at one offset.
@@ -25,9 +25,10 @@ struct Row {
     altitude_m: f64,
     /// SIR of the worst hop by Algorithm 1, linear.
     sir_linear: f64,
-    /// SIR of the worst hop, linear, if the target falls by the paper's fixed step of 0.1.
+    /// SIR of the worst hop, linear, if the target SIR falls by 0.1 from pass to pass, as in the paper.
     ///
-    /// Only for altitudes near the paper's best altitude, otherwise `None`.
+    /// A pass is a series of messages along the chain. Only for altitudes near the paper's best altitude, otherwise
+    /// `None`.
     sir_by_step_linear: Option<f64>,
 }
 
@@ -41,8 +42,8 @@ fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
 
 /// Returns the points of the figure: pairs of the interferer's distance from the line and an altitude.
 ///
-/// Both are in m. Altitudes are 5 m apart. For the distance of the interferer at which the paper reads its best
-/// altitude, they are 0.5 m apart near that altitude.
+/// Both are in m. Altitudes are 5 m apart. For the distance for which the paper states the best altitude, they are
+/// 0.5 m apart near that altitude.
 fn all_pairs() -> Vec<(f64, f64)> {
     let mut pairs = Vec::new();
     for y in OFFSETS_M {
@@ -81,8 +82,9 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 
 /// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// The interferer is at (500, `y_m`) m. Tries every 5 m. Then refines to 0.1 m by ternary search, if that raises the
-/// SIR by more than the relative tolerance with which a chain finds it.
+/// The interferer is at (500, `y_m`) m. Tries altitudes 5 m apart, then searches around the best one to 0.1 m. The
+/// second result counts only if its SIR is higher by more than twice the tolerance with which a chain's SIR is
+/// computed.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;

@@ -24,12 +24,12 @@ pub const MOST_ROOM_M: u16 = 400;
 
 const ROOM_STEP_M: u16 = 4;
 
-/// Largest distance from the line Tx-Rx permitted to the relay in the figure of the gain, m.
+/// Largest distance from the line Tx-Rx permitted to the relay in the figure of the SIR gain, m.
 ///
-/// It equals the highest altitude.
+/// It equals the highest permitted altitude: the figure compares the gain by lateral offset with that by altitude.
 pub const ROOM_M: f64 = 300.0;
 
-/// Largest distance of the interferer from the line in the figure of the gain, m.
+/// Largest distance of the interferer from the line Tx-Rx in the figure of the SIR gain, m.
 const MOST_OFFSET_M: u16 = 400;
 const OFFSET_STEP_M: u16 = 5;
 

@@ -15,8 +15,8 @@ const FLOWN: f64 = 1e-4;
 
 /// Returns the paper's multi-hop scenario, with the parameters of its fourth and fifth sub-table.
 ///
-/// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no least separation:
-/// Algorithms 1 and 4 as printed have none, and 4 m would not bind at any of the optima.
+/// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no least separation, because
+/// Algorithms 1 and 4 as printed have none. A separation of 4 m would not change any of the optima.
 pub fn multi_hop() -> Scenario {
     Scenario {
         min_separation_m: 0.0,

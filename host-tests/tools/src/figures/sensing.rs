@@ -105,7 +105,8 @@ fn by_speed(scenes: u64) -> Result<Vec<Tracked>, FigureError> {
 
 /// Computes the figure of chains that must locate an unknown interferer.
 ///
-/// The first panel has the SIR lost by the number of agreements, the second the SIR kept by the interferer's speed.
+/// The first panel shows the lost fraction of the best possible SIR against the number of agreements. The second
+/// panel shows the fraction that is reached against the speed of the interferer.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let (found, followed) = (by_agreement(SCENES)?, by_speed(PASSES)?);
     let lines = KINDS.iter().enumerate().map(|(index, (what, ..))| {

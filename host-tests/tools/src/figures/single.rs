@@ -180,9 +180,11 @@ struct GainRow {
     /// `None` if that position's average is not above 0, as an average in dB may be.
     over_blind_percent: Option<f64>,
     over_middle_percent: Option<f64>,
-    /// Largest gain in linear SIR over a random position among all altitudes, percent.
+    /// Largest gain over a random position, percent, in linear SIR: the maximum over all altitudes.
     largest_over_random_percent: f64,
-    /// Largest gain in linear SIR over the position that ignores the interference, percent.
+    /// Largest gain over the position that ignores the interference, percent, in linear SIR.
+    ///
+    /// It is the maximum over all altitudes.
     largest_over_blind_percent: f64,
 }
 

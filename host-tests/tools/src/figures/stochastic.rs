@@ -56,7 +56,7 @@ struct Row {
 struct PointRow {
     field: Kind,
     x_m: f64,
-    /// First shape parameter of the Beta distribution of I relative to its maximum.
+    /// First shape parameter of the Beta distribution of the interference power relative to its maximum.
     alpha: f64,
     beta: f64,
     /// Largest interference power `I_max`, W.
@@ -69,7 +69,9 @@ fn lambda_w(mission: &Mission) -> f64 {
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// Returns the distributions of the interference power at the points of the line that define `kind`.
+/// Returns the distributions of the interference power of this `kind`, at points of the line Tx-Rx.
+///
+/// The relays interpolate between the points. If the interference is the same everywhere, there is one point.
 fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
     let lambda = lambda_w(&paper::mission(&paper::multi_hop(), 1)?);
     let i_max_w = MOST * lambda;
@@ -111,7 +113,9 @@ pub fn mission(kind: Kind, relays: u16) -> Result<Mission, FigureError> {
     paper::mission(&scenario, relays)
 }
 
-/// Returns a table row for each pass of messages, of chains in both fields with each number of relays.
+/// Returns a table row for each pass of messages along each chain.
+///
+/// The chains have the given numbers of relays; the interference varies along the line or is the same everywhere.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let mut rows = Vec::new();
     for field in [Kind::Uneven, Kind::Even] {
@@ -131,9 +135,10 @@ fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the cells of the table in the caption: a chain's final SIR for three choices of target SIRs.
+/// Returns the cells of the caption's table: SIRs of settled chains by three searches of a target SIR.
 ///
-/// The target SIRs fall by the paper's step of 0.1, fall by 0.01, or bracket the optimum.
+/// The first search lowers the target SIR by the paper's step of 0.1 in each pass of messages, the second by 0.01.
+/// The third narrows an interval around the best target SIR.
 fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     let mut rows = vec![
         ["field", "N", "step 0.1", "step 0.01", "bracketed targets"]
@@ -186,7 +191,9 @@ fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {
     Line::new(&format!("N = {relays}"), Look::number(index), points)
 }
 
-/// Computes the figure of the expected SIR by passes of messages of Algorithm 4, in both fields.
+/// Computes the figure of the expected SIR after each pass of messages of Algorithm 4.
+///
+/// It has a panel for interference that varies along the line, and one for interference that is the same everywhere.
 pub fn sheet() -> Result<Sheet, FigureError> {
     let rows = data(&RELAYS)?;
     let panel = |heading: &str, field: Kind| Panel {

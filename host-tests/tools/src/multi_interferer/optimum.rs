@@ -18,8 +18,8 @@ const ROUNDING: f64 = 1e-12;
 pub struct Chain {
     /// Positions (x, altitude) of the relays from Tx to Rx, m.
     ///
-    /// x is between 0 (Tx) and the distance to Rx. It rises by at least the least separation, less 1e-12 of that for
-    /// rounding.
+    /// x is between 0 (Tx) and the distance to Rx. From each relay to the next, x rises by at least the least
+    /// separation, except for rounding (1e-12 of the separation).
     pub places: Vec<(f64, f64)>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
@@ -77,7 +77,8 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
 
 /// Returns the SIR of the best chain at `altitude_m` that keeps the least separation, linear.
 ///
-/// `tolerance` is relative. `None` as for [`optimum`].
+/// `tolerance` is relative. `None` without relays or interferers, if the relays do not fit on the line, and if no
+/// chain has an SIR above 0.
 pub(super) fn best_at_altitude(scene: &Scene, altitude_m: f64, tolerance: f64) -> Option<f64> {
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
     best_target(&Line::new(scene, altitude_m), apart, tolerance)
@@ -228,7 +229,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// Receiver's x in `to` for which the sender can be nearest to Tx.
+    /// x of the receiver, within `to`, that belongs to the smallest feasible x of the sender.
     farthest: f64,
 }
 
@@ -250,7 +251,7 @@ pub(super) struct Stages<'a> {
     first: Vec<Span>,
 }
 
-/// Ranges of hops for one target SIR and one transmit power, kept for relays of equal power.
+/// Data of hops for one target SIR and one transmit power, reused for relays of equal power.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -329,7 +330,7 @@ impl<'a> Stages<'a> {
 
     /// Returns the feasible x of the next relay that is nearest to `wish`; the sender is at `x`.
     ///
-    /// `None` if no feasible hop starts at `x`.
+    /// `stage` has the feasible hops of this sender. `None` if no feasible hop starts at `x`.
     fn next_place(&self, stage: &Stage, x: f64, wish: f64) -> Option<f64> {
         let steps = stage.steps.iter().filter(|step| step.from.contains(x));
         let places = steps.map(|step| {
@@ -343,10 +344,10 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the hops by which a relay can reach its next relay.
+/// Returns the feasible hops from a relay to the next one, whose x is in one of the intervals `spans`.
 ///
-/// This is a step of the search from the last relay back. The next relay may be anywhere in `spans`, intervals of x. For each of its x, `reach` has the hop lengths at which it meets
-/// the target SIR. Each hop is at least `apart` metres long.
+/// Each hop meets the target SIR with the sender's power, for which `reach` is computed, and is at least `apart`
+/// metres long. The search calls this for each relay, from the last one but one back to the first.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -390,17 +391,19 @@ pub(super) struct Line<'a> {
     pub(super) scene: &'a Scene,
     pub(super) altitude_m: f64,
     nodes: Vec<f64>,
-    /// Hop range at the sampled positions, up to a constant factor, W^(-1/2).
+    /// Relative hop range at the sampled positions: (I + N)^(-1/2), in W^(-1/2).
     ///
-    /// It is (I + N)^(-1/2), with the powers I and N of interference and noise at the hop's receiver, W.
+    /// I and N are the powers of interference and noise at the hop's receiver, W. A factor, [`Stride`], turns the
+    /// value into metres.
     quiet: Vec<f64>,
     slope: Vec<f64>,
     tops: Vec<f64>,
 }
 
-/// Ratio of a hop's range, m, to (I + N)^(-1/2), for a target SIR and a sender's power.
+/// Factor that gives the range of a hop, m, for one target SIR and one transmit power.
 ///
-/// I and N are the powers of interference and noise at the hop's receiver, W.
+/// The range is this factor times (I + N)^(-1/2), with the powers I and N of interference and noise at the receiver,
+/// W.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stride(f64);
 
@@ -467,19 +470,24 @@ impl<'a> Line<'a> {
             .max_by(|&a, &b| self.first_sir(a).total_cmp(&self.first_sir(b)))
     }
 
-    /// Returns the range factor of hops from a relay of `power_w` W, for the SIR `target` (linear, > 0).
+    /// Returns the factor for the range of hops from a relay of `power_w` W.
+    ///
+    /// Each hop has to meet the SIR `target` (linear, above 0).
     pub(super) fn stride(&self, power_w: f64, target: f64) -> Stride {
         Stride((power_w / (self.scene.mu_los * target)).sqrt())
     }
 
-    /// Returns the sender position nearest to Tx from which a receiver at `x` gets the target SIR, m.
+    /// Returns the smallest x of a sender, m, that gives a receiver at `x` the target SIR.
     ///
-    /// The result may lie behind Tx (below 0).
+    /// `stride` is the range factor for the target SIR and the sender's power. The result may lie behind Tx (below
+    /// 0).
     pub(super) fn heard_from(&self, stride: Stride, x: f64) -> f64 {
         x - stride.0 * self.quiet_and_slope(x).0
     }
 
-    /// Returns the receiver's x at which the sender can be nearest to Tx: minima of [`Line::heard_from`].
+    /// Returns the x of a receiver at which its sender can be farthest back, toward Tx.
+    ///
+    /// These are the minima of [`Line::heard_from`] over the receiver's x.
     pub(super) fn far_receivers(&self, stride: Stride) -> Vec<f64> {
         // The slope of `heard_from` is 1 - stride x slope of the quiet.
         let level = 1.0 / stride.0;
@@ -520,7 +528,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the positions of those crossings in `turns` at which the function falls below the level.
+/// Returns the positions of those crossings in `turns` at which a function falls through a given level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()
@@ -595,7 +603,7 @@ const HALVINGS: u32 = 200;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     pub(super) at: f64,
-    /// True if the function rises through the level at this point, false if it drops below it.
+    /// True if the function whose level is crossed rises at this point; false if it falls.
     pub(super) rising: bool,
 }
 

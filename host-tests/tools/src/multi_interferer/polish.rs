@@ -90,7 +90,8 @@ pub fn polish(
 
 /// Moves relay `at` (from 0) if that raises the SIR of the worse of its two hops.
 ///
-/// `window` is the fraction of the altitude and lateral ranges that is searched on either side.
+/// The relay's altitude and lateral position are searched on both sides of the present ones, up to the fraction
+/// `window` of the permitted ranges `room`.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
     let relays = &scene.relays;
     let (Some(&own), Some(relay)) = (places.get(at), relays.get(at)) else {
@@ -176,7 +177,9 @@ impl Turn<'_> {
         }
     }
 
-    /// Returns the smallest and largest x, m, that the neighbours leave to the relay at `y` and `h`.
+    /// Returns the smallest and largest x, m, that the order and separation of the relays permit.
+    ///
+    /// The relay stays between its two neighbours, at the least separation from each.
     ///
     /// `h` is the relay's altitude and `y` its lateral position, m. The first result is above the second if no x is
     /// allowed.

@@ -26,13 +26,14 @@ const PARTS: usize = 4;
 /// Largest number of cells of all relays together. With more, the search ends without a proof.
 const MOST_CELLS: usize = 60_000;
 
-/// Largest number of rounds in which cells are divided. The cells are then 1e-8 of the distance from Tx to Rx.
+/// Largest number of rounds in which cells are divided. The smallest cells are some 1e-8 of the distance from Tx to
+/// Rx.
 const MOST_LEVELS: usize = 10;
 
 /// Largest number of relays for which a proof is tried.
 const MOST_RELAYS: usize = 200;
 
-/// Allowance for rounding errors, as a fraction of a squared length.
+/// Allowance for rounding errors in squared lengths, as a fraction of the squared length.
 const ROUNDING: f64 = 1e-9;
 
 /// Target SIRs, linear, that every hop has to meet: in the direction to Rx and in that to Tx.
@@ -161,7 +162,9 @@ impl Bound<'_> {
         }
     }
 
-    /// Returns the smallest interference power, W, that `node` can have at any position in `cell`.
+    /// Returns a lower bound on the interference power, W, that `node` receives at any position in `cell`.
+    ///
+    /// Each interferer is received as from the edge of the cell that is farther from it.
     fn least_w(&self, node: usize, cell: &Range<f64>) -> f64 {
         let altitude_m = self.altitude_m(node);
         let factor = match self.relay(node) {

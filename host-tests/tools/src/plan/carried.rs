@@ -23,10 +23,10 @@ use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
-/// Largest relative excess of time per bit for which a number of relays gets a precise search.
+/// Largest excess of time per bit, relative, for which a number of relays gets a precise search.
 ///
-/// The excess is that on the coarse grid, over the number of relays with the least time per bit. A precise search for
-/// positions cannot make up for a larger excess.
+/// The time per bit is that of the best positions on a coarse grid; the excess is over the number of relays for which
+/// it is least. A precise search for positions cannot make up for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
@@ -160,7 +160,8 @@ impl<'a> Carried<'a> {
     }
 
     /// Returns the positions of the largest rate that Algorithm 1 finds, by bisection on the rate. For each rate it
-    /// uses the ratio of the SIRs that the two directions need. `least` is a rate that is met, bit/s/Hz.
+    /// uses the ratio of the SIRs that the two directions need. `least` is a rate that is known to be possible,
+    /// bit/s/Hz.
     fn by_ratio(&self, briefed: &ProfiledMission, least: f64) -> Option<Vec<Placement>> {
         let reverse = self.scenario.reverse;
         let model = &self.radio.link.model;

@@ -133,7 +133,9 @@ pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned 
     }
 }
 
-/// Returns `value` as the f64 with the shortest decimal form that rounds to it in f32.
+/// Returns `value` as an f64 with few decimals, so that the file has short numbers.
+///
+/// The result is the f64 with the shortest decimal form that rounds to `value` in f32.
 fn shortest(value: f32) -> f64 {
     format!("{value}").parse().unwrap_or_else(|_| value.into())
 }

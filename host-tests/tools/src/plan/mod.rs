@@ -105,7 +105,7 @@ pub struct PlanRequest {
     pub tolerance: f64,
 }
 
-/// Largest loss of SIR against the best positions that is accepted, as a fraction of the best SIR.
+/// Largest accepted loss of SIR, in comparison with the best positions, as a fraction of their SIR.
 pub const LOSS: f64 = 0.01;
 
 /// Theorem, and its case, by which the position of a single relay was found.
@@ -338,7 +338,7 @@ impl ProfiledMission {
             .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
     }
 
-    /// Returns the plan with the relays at `places`; its SIRs are those of the crate's own formulas.
+    /// Returns the plan with the relays at `places`. Its SIRs are those that the library computes for the mission.
     fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
         let held: Vec<(Placement, Profile)> = (1..)
             .zip(places)

@@ -287,9 +287,10 @@ impl Best {
     }
 }
 
-/// Returns the best chain for both directions that a shortest path along the line finds.
+/// Returns the best chain found for data in both directions, with the relays at their own altitudes.
 ///
-/// `None` if every SIR is 0. `start` are other positions to start from.
+/// The search refines two chains, and returns the better result: the best chain on a grid of x, and the chain
+/// `start`. `None` if every SIR is 0.
 fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best> {
     // With so large a gap Shannon's rate is proportional to the SIR, and the best rate is that of the best SIR.
     let link = Link {

@@ -20,10 +20,13 @@ use uav_relay_scenario::link::{Access, Radio, RateModel};
 use uav_relay_scenario::number::{factor, narrow};
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Number of equal intervals of the first grid, unless the least separation sets the spacing.
+/// Number of equal intervals of the grid of x on which the search begins.
+///
+/// If the least separation of the relays exceeds half of this spacing, the spacing is the separation or a fraction of
+/// it.
 const EVEN: f64 = 700.0;
 
-/// Largest number of equally spaced points in the first grid.
+/// Largest number of equally spaced points in the grid of x on which the search begins.
 const MOST_EVEN: u32 = 1_402;
 
 /// Number of dense grid points on each side of Tx, Rx and every interferer.
@@ -220,7 +223,7 @@ impl<'a> Times<'a> {
         self.add(total, self.time(&last, from, self.rx(), guide))
     }
 
-    /// Returns the x of the first grid's points, m, ascending. They are denser near Tx, Rx and the interferers.
+    /// Returns the grid of x, m, on which the search begins, ascending. It is denser near Tx, Rx and the interferers.
     fn grid(&self) -> Vec<f64> {
         let d = self.scene.distance_m;
         // Relays that gather keep exactly their least separation: it is a whole number of steps.

@@ -15,13 +15,13 @@ use uav_relay_scenario::{Interference, Scenario};
 use super::carried::{Carried, carries_no};
 use super::{NoPlan, Number, Plan, PlanRequest, source};
 
-/// Largest number of relays whose rate is computed, where one plan takes milliseconds.
+/// Largest number of relays for which the rate is computed, if planning a chain takes milliseconds.
 const MOST_FAST: u16 = 200;
 
-/// Largest number of relays whose rate is computed, where one plan takes seconds.
+/// Largest number of relays for which the rate is computed, if planning a chain takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Largest number of relays whose rate is computed, where positions are chosen for the largest rate.
+/// Largest number of relays for which the rate is computed, if positions are optimised for the rate.
 const MOST_SEARCHED: u16 = 60;
 
 /// Number of relays up to which data rates are always computed if time slots fit the hops' needs.

@@ -32,10 +32,11 @@ pub struct HypotheticalReport {
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
     /// against all interferers.
     pub kept: bool,
-    /// SIR that the hypothetical interferer's positions lose, as a fraction of the plan's SIR; 0 if kept.
+    /// SIR lost by the positions for the hypothetical interferer, as a fraction of the plan's SIR. It is 0 if the
+    /// plan has these positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// SIR that the plan gains over the hypothetical interferer's positions, as a fraction of their SIR.
+    /// Relative gain of the plan in SIR, in comparison with the positions for the hypothetical interferer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
 }

@@ -28,8 +28,8 @@ const CELLS: u16 = 800;
 /// Least relative decrease of a chain's time for one bit that the search looks for.
 const GAIN: f64 = 2e-5;
 
-/// Relative difference of two chains' times for one bit that the search neglects. It then keeps the chain that ends
-/// farther.
+/// Relative difference of two chains' times for one bit that the search neglects. Of two such chains it keeps the one
+/// whose last relay is farther from Tx.
 const SAME: f64 = 1e-4;
 
 /// Loss of reach in the return direction (to Tx) that the search neglects. It is a fraction of the line Tx-Rx.
@@ -49,12 +49,13 @@ struct Label {
     before: usize,
 }
 
-/// Tables of one hop over the cells of the line: reach at each rate step, and least time for one bit. A rate step is
-/// a least SINR of the radio, and the data rate from there on.
+/// Tables of one hop for the search of positions. They have the sender's smallest x for each rate step of the radio
+/// (a least SINR, and the data rate from there on), and lower bounds on the time for one bit.
 struct Reaches {
     hop: Hop,
-    /// Least x, m, of a sender whose signal has the SINR of a rate step at a grid point; infinite for none. There is
-    /// a row for each rate step of the radio, with a value for each grid point.
+    /// Smallest x of a sender, m, with which the receiver still has the SINR of a rate step. There is a row for each
+    /// rate step of the radio, with a value for each x of the receiver on the grid. Infinite if the sender would have
+    /// to be closer than the least separation.
     nearest: Vec<Vec<f64>>,
     /// Lower bounds on the hop's time for one bit, s Hz (time in s for a bandwidth of 1 Hz). There is a row for each
     /// cell of the sender, with a value for each cell of the receiver.
@@ -136,7 +137,8 @@ impl Search<'_> {
         Some(x)
     }
 
-    /// Computes the tables of `hop`, which ends at relay `node`: reach at each rate step, and least times.
+    /// Computes the tables of `hop`, whose receiver in the direction to Rx is relay `node`. They have the sender's
+    /// smallest x for each rate step of the radio, and lower bounds on the time for one bit.
     fn reaches(&self, hop: Hop, node: usize) -> Reaches {
         let points: Vec<Point> = self
             .grid
@@ -313,8 +315,8 @@ impl Search<'_> {
         }
     }
 
-    /// Returns those of `labels` (first hops of chains) that may lead to the best chain. Each of the others is no
-    /// better than a label that ends farther, takes no more time, and receives the next node at as large an x in the
+    /// Returns those of `labels` (first hops of chains) that may lead to the best chain. A label is left out if
+    /// another one ends farther from Tx, takes no more time, and can receive from a next node at as large an x in the
     /// return direction.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
@@ -339,10 +341,11 @@ impl Search<'_> {
     }
 }
 
-/// Reach of the hop after a relay in the return direction (to Tx), by rate step and the relay's x. A rate step is a
-/// least SINR of the radio, and the data rate from there on.
+/// Table of the largest x of the next node from which a relay can receive. It is for the return direction (to Tx).
+/// The largest x depends on the relay's x and on the rate step: a least SINR of the radio, and the data rate from
+/// there on.
 ///
-/// The table decides if a relay at a smaller x is worse than one at a larger x with no more time.
+/// The search uses the table to decide if a relay at a smaller x is worse than one at a larger x with no more time.
 struct Backward {
     hop: Hop,
     /// Largest x of the next node, m, from which a relay at a grid point receives a rate step. There is a row for
@@ -350,8 +353,8 @@ struct Backward {
     ///
     /// The x is at most that of Rx.
     farthest: Vec<Vec<f64>>,
-    /// x of the grid points, m, that may be better for a relay than some grid point farther from Tx. In the return
-    /// direction the relay then receives a next node at a larger x than from that farther point.
+    /// x of the grid points, m, at which a relay may be better than at some grid point farther from Tx. The reason is
+    /// the return direction: there, the relay can receive from a next node at a larger x.
     useful: Vec<f64>,
 }
 
@@ -394,7 +397,7 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the start, m, of the interval up to `point` in which no x is better for a relay.
+    /// Returns the start, m, of the interval of x that ends at `point` and has no better position than it.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;

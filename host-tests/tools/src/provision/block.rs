@@ -27,7 +27,7 @@ pub enum BlockError {
     Config(ConfigError),
     /// Error: the drone would reject the surveyed positions of Tx and Rx, for this reason.
     Course(CourseError),
-    /// Error: the drone would read a different configuration from the block.
+    /// Error: the drone would read from the block another configuration than the intended one.
     Changed,
 }
 

@@ -35,7 +35,9 @@ fn chains_at_one_altitude_agree_with_the_reference() {
     }
 }
 
-/// Checks the figure's SIRs with the paper's step of 0.1 against the reference, at 195 m to 230 m.
+/// Checks the figure's SIRs with the paper's step of 0.1 against the reference.
+///
+/// The altitudes are 195 m to 230 m.
 #[test]
 fn the_step_ends_where_the_reference_does() {
     let table = Table::read("altitude");

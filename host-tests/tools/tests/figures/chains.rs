@@ -408,7 +408,9 @@ fn algorithm_4_ends_where_the_reference_program_does() {
     }
 }
 
-/// Checks that target steps of 0.1 miss the optimum SIR of eight relays, 0.0912, and end near 0.
+/// Checks that lowering the target SIR in steps of 0.1 misses the optimum SIR of eight relays.
+///
+/// The optimum is 0.0912; the steps end near 0.
 ///
 /// The page of the figures says so.
 #[test]

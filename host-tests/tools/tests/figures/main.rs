@@ -110,7 +110,7 @@ fn off(got: f64, want: f64) -> f64 {
     (got / want - 1.0).abs()
 }
 
-/// Checks that `got` is at most the fractions `least` below and `most` above `want`.
+/// Checks that `got` lies between `want` x (1 - `least`) and `want` x (1 + `most`).
 #[track_caller]
 fn within(got: f64, want: f64, least: f64, most: f64) {
     assert!(

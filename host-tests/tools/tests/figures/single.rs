@@ -23,7 +23,7 @@ fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     }
 }
 
-/// Returns a reference link with a relay at `altitude_m`, Tx power and interferer of a table row.
+/// Returns a reference link with one relay at `altitude_m`. Tx power and interferer are those of the table row `row`.
 fn locus_link(row: &super::Row<'_>, altitude_m: f64) -> Link {
     Link {
         distance_m: 35.0,
@@ -94,7 +94,8 @@ fn the_locus_agrees_with_the_reference() {
     }
 }
 
-/// Checks that the locus of equal SIR moves to Rx with more Tx power and down with a nearer interferer.
+/// Checks two statements about the curve of positions at which both hops of a relay have the same SIR. More Tx power
+/// moves the curve toward Rx, and an interferer nearer to the line moves it down.
 #[test]
 fn the_locus_moves_as_the_text_says() {
     let table = Table::read("locus");

@@ -418,7 +418,7 @@ fn the_ranges_are_those_of_a_relay() {
     }
 }
 
-/// Checks that a scenario of known interference along the line is refused if relays are to locate it.
+/// Checks that locating an interferer is refused if the scenario gives the interference along the line.
 #[test]
 fn a_field_is_refused_with_listening() {
     let mut scenario = super::in_a_field(3);

@@ -201,7 +201,7 @@ fn what_has_no_way_back_is_refused_by_name() {
     assert!(line.contains("link.reverse"), "{line}");
 }
 
-/// Checks that plans in both directions have the SIRs of the sum of all interferers, and of a field.
+/// Checks plans for both directions, with several interferers and with interference given along x.
 #[test]
 fn several_interferers_and_fields_are_planned_both_ways() {
     let several = scenario(

@@ -38,8 +38,8 @@ pub(crate) struct Chain {
 /// Number of grid points along the whole line. There are more, dense ones near Tx, Rx and the interferer.
 const EVEN: usize = 171;
 
-/// Number of equal cells of the line in the search for a radio with rate steps. Their edges are added to those of the
-/// first grid.
+/// Number of equal cells of the line in the search for a radio with rate steps. This search tries the edges of the
+/// cells in addition to the points of the ordinary grid.
 const CELLS: usize = 400;
 
 /// Maximum number of chains that each cell keeps in the search for a radio with rate steps.

@@ -138,7 +138,8 @@ fn the_numbers_are_those_of_the_command_to_the_bit() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks that the page's percentage of the optimum SIR ignores relays that are switched off.
+/// Checks the percentage of the best possible SIR that the page states for the chain. The best possible SIR has to be
+/// that of the relays that are switched on.
 #[test]
 fn a_relay_that_is_off_does_not_count_in_the_share_of_the_optimum() {
     let mut browser = opened(1280, 900);
