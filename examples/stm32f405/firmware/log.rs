@@ -307,10 +307,10 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
 /// Logs that votes on the chain's membership were found after a reboot. `accepted` is true if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
-        info!("votes on the chain's membership restored from flash");
+        info!("votes on the chain's members from before this start were read from flash");
     } else {
         error!(
-            "votes on the chain's membership in flash are in another firmware's format, and ignored"
+            "votes on the chain's members in flash have the format of another firmware, and are ignored: before a flight nothing has to be done"
         );
     }
 }
@@ -318,9 +318,11 @@ pub(crate) fn votes_restored(accepted: bool) {
 /// Logs that storing the relay's votes works again (`is_stored` is true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
-        info!("votes on the chain's membership can be stored again");
+        info!("votes on the chain's members can be stored in flash again");
     } else {
-        error!("votes on the chain's membership cannot be stored: a reboot in flight loses them");
+        error!(
+            "votes on the chain's members cannot be stored in flash, and a restart in flight would lose them: land this drone, and check its flash"
+        );
     }
 }
 

@@ -71,14 +71,14 @@ const PHRASES = {
   "lost": "lost relay",
   "found": "became a neighbour of relay",
   "no quorum": "too few relays receive each other (no quorum), position held",
-  "view accepted": "new members of the chain agreed",
-  "lease expired": "last agreement expired, setpoint kept until a new one",
+  "view accepted": "agreed which relays form the chain",
+  "lease expired": "last agreement on positions expired, setpoint kept until the next one",
   "not received by": "is not received by relay",
-  "sensor off": "ignores the measurements, which do not fit the others, of relay",
+  "sensor off": "ignores the interference measurements, which do not fit the others, of relay",
   "converged": "agreed on a position",
-  "infeasible": "no positions meet any target SIR, positions kept",
+  "infeasible": "no positions meet any target SIR, position kept",
   "new estimate": "new interference estimate",
-  "interferer unclear": "the measurements fit no single interferer",
+  "interferer unclear": "the interference measurements fit no single interferer",
 };
 
 /** Fills the list of events. */

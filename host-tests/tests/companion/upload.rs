@@ -310,7 +310,7 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         let line = ground(&chain.files, "5", &format!("{more} --no-fence")).refused(1);
         let by = "relay 1, or a relay behind it, rejects the upload";
         assert_eq!(line, format!("--version 5: {by}: {why}"));
-        let own = "upload refused: the altitudes must be within the relay's own geofence, ";
+        let own = "upload refused: the mission's altitudes must be within this relay's geofence, ";
         relays[0].line(&format!("{own}{range}"));
         assert!(
             relays

@@ -304,7 +304,7 @@ impl Group {
                 "mission version {version} adopted: {}",
                 count(self.relays.len())
             ),
-            _ => "no positions meet any target SIR, so the relays keep theirs".to_owned(),
+            _ => "no positions meet any target SIR, so the relays keep their positions".to_owned(),
         }
     }
 }
@@ -618,7 +618,7 @@ impl RecoveryReport {
             _ = write!(text, "adopted {after:.3} s after the upload began, ");
         }
         let Some(converged) = self.converged_s else {
-            return text + "new members agreed before the relays agreed on positions";
+            return text + "the membership changed before the relays agreed on positions";
         };
         _ = write!(
             text,
