@@ -197,7 +197,9 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Hold => {
-            error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1");
+            error!(
+                "configuration refused: byte 15 of the block, which is 1 if the relay keeps its altitude, must be 0 or 1"
+            );
         }
         ConfigError::Method => {
             error!(
