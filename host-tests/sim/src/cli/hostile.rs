@@ -260,7 +260,7 @@ fn partition(text: &str) -> Result<Partition, String> {
     let after = after.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be K@S-T with T above S".to_owned());
+        return Err("must be K@S-T with the end T after the start S".to_owned());
     }
     Ok(Partition { after, from, until })
 }
@@ -402,7 +402,7 @@ fn deaf(text: &str) -> Result<OneWayFailure, String> {
     let of: u16 = of.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be J:I@S-E with E above S".to_owned());
+        return Err("must be J:I@S-E with the end E after the start S".to_owned());
     }
     if by == of {
         return Err("must be J:I@S-E with two different relays J and I".to_owned());
@@ -533,7 +533,7 @@ fn takeover(text: &str) -> Result<Takeover, String> {
     let relay = relay.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be I@S-E with E above S".to_owned());
+        return Err("must be I@S-E with the end E after the start S".to_owned());
     }
     Ok(Takeover {
         relay,
