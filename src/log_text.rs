@@ -102,7 +102,7 @@ fn text(event: Event) -> defmt::Str {
         ),
         Event::Uploaded => defmt::intern!("a newer mission has been received by an upload"),
         Event::NewEstimate => {
-            defmt::intern!("the interference estimate has changed: new positions follow")
+            defmt::intern!("the estimate of the interferer has changed: new positions follow")
         }
         Event::InterfererUnclear => defmt::intern!(
             "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"

@@ -128,7 +128,7 @@ impl Companion {
             ),
         );
         if self.plan.key.is_some() {
-            let what = "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored";
+            let what = "frames to the autopilot are signed; frames from the autopilot that are not signed with the same key are ignored";
             log.line(Instant::ZERO, EVENT, what);
         }
     }
@@ -137,7 +137,7 @@ impl Companion {
         let refused = self.link.refused();
         if refused > 0 {
             let what = format_args!(
-                "{refused} frames from the autopilot were rejected because of their signatures: compare its key with --autopilot-key-file"
+                "{refused} frames from the autopilot were rejected because of their signatures: check that --autopilot-key-file has the autopilot's key"
             );
             log.line(now, EVENT, what);
         }

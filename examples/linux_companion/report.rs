@@ -99,7 +99,7 @@ impl Report {
             Instant::ZERO,
             "resumed",
             json!({ "version": version }),
-            format_args!("this relay flies version {version} of the mission, which it received by an upload before this start"),
+            format_args!("this relay flies version {version} of the mission, which was uploaded to it before this start"),
         );
     }
 

@@ -132,14 +132,14 @@ pub(crate) fn off_course(error: CourseError) {
 #[allow(dead_code, reason = "for an image that tells no autopilot")]
 pub(crate) fn no_flight() {
     error!(
-        "configuration refused: it has sites, but this image was built without the cargo feature flight"
+        "configuration refused: it has sites (positions of Tx and Rx), but this image was built without the cargo feature flight"
     );
 }
 
 #[cfg(feature = "mavlink-signing")]
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
+        "frames to the autopilot are signed; frames from the autopilot that are not signed with the same key are ignored"
     );
 }
 
@@ -174,7 +174,9 @@ pub(crate) fn refused(error: ConfigError) {
             "no configuration: the configuration block in flash is blank, so this relay does nothing: provision the drone"
         ),
         ConfigError::Magic => {
-            error!("configuration refused: the configuration block does not begin with UAVR");
+            error!(
+                "configuration refused: the configuration block does not begin with UAVR: provision the drone again"
+            );
         }
         ConfigError::Version => {
             error!(
@@ -300,7 +302,7 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
         info!("mission version {=u16} stored", version);
     } else {
         warn!(
-            "mission version {=u16} cannot be stored: after a reboot it has to be uploaded again",
+            "mission version {=u16} cannot be stored in flash: after a reboot it has to be uploaded again",
             version
         );
     }

@@ -63,7 +63,7 @@ pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
 
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
+        "frames to the autopilot are signed; frames from the autopilot that are not signed with the same key are ignored"
     );
 }
 
@@ -91,7 +91,10 @@ pub(crate) fn votes(is_stored: bool) {
 
 pub(crate) fn refused(why: Refused) {
     match why {
-        Refused::Block(why) => error!("configuration refused: {}", Debug2Format(&why)),
+        Refused::Block(why) => error!(
+            "configuration refused: invalid configuration block ({}): provision the drone again",
+            Debug2Format(&why)
+        ),
         Refused::NoFlash => {
             error!(
                 "configuration refused: it has a key, but this board cannot store the epoch (start counter) that signing needs"
@@ -104,7 +107,7 @@ pub(crate) fn refused(why: Refused) {
         }
         Refused::NoAutopilot => {
             error!(
-                "configuration refused: it has sites, but this image has no port to an autopilot"
+                "configuration refused: it has sites (positions of Tx and Rx), but this image has no port to an autopilot"
             );
         }
         Refused::Course(why) => error!("configuration refused: sites: {}", why),
