@@ -74,10 +74,10 @@ const PHRASES = {
   "view accepted": "agreed which relays form the chain",
   "lease expired": "last agreement on positions expired, setpoint kept until the next one",
   "not received by": "is not received by relay",
-  "sensor off": "ignores the interference measurements, which do not fit the others, of relay",
+  "sensor off": "ignores faulty interference measurements of relay",
   "converged": "agreed on a position",
-  "infeasible": "no positions meet any target SIR, position kept",
-  "new estimate": "new interference estimate",
+  "infeasible": "found no positions with a usable SIR at every hop, keeps its position",
+  "new estimate": "has a new estimate of the interferer",
   "interferer unclear": "the interference measurements fit no single interferer",
 };
 
