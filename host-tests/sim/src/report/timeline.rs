@@ -594,7 +594,7 @@ pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
     if same > 0 {
         _ = writeln!(
             text,
-            "agreed memberships (views) with unchanged relays: {same}"
+            "views agreed without a change of the chain's members: {same}"
         );
     }
     text
