@@ -122,11 +122,11 @@ pub enum LineError {
 }
 
 error_texts!(LineError {
-    Distance => "the mission's distance must be the distance between its sites (Tx and Rx on earth), or between the sites loaded before flight if it has none",
+    Distance => "the mission's distance must be equal to the distance between its sites (positions of Tx and Rx on earth); without sites of its own it uses those loaded before flight",
     Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
-    Altitude => "the altitudes must be within the relay's own geofence",
-    Lateral => "the lateral range must be within the relay's own geofence",
-    Length => "the distance must be within the relay's own geofence",
+    Altitude => "the mission's altitudes must be within this relay's geofence",
+    Lateral => "the mission's lateral range must be within this relay's geofence",
+    Length => "the mission's distance must be within this relay's geofence",
 });
 
 #[cfg(test)]

@@ -57,7 +57,7 @@ fn text(event: Event) -> defmt::Str {
         Event::SetpointChanged => defmt::intern!("the setpoint has changed"),
         Event::Converged => defmt::intern!("the relays have agreed on positions"),
         Event::Infeasible => defmt::intern!(
-            "no positions of the relays meet any target SIR: all relays keep their positions"
+            "no positions give every hop one of the tried target SIRs, so all relays keep their positions: check the mission's interferer, distance and minimum separation"
         ),
         Event::NeighbourLost {
             side: Side::Upstream,
@@ -89,20 +89,20 @@ fn text(event: Event) -> defmt::Str {
             "shares its number with another node: land one of the two, and give it its own number"
         ),
         Event::SensorOff { .. } => defmt::intern!(
-            "measures interference that does not fit the other measurements, and is ignored: check its receiver"
+            "measures interference that does not fit the other measurements: its measurements are ignored, check its receiver"
         ),
         Event::ViewAccepted => defmt::intern!(
-            "the relays have agreed on new members of the chain (view): new positions follow"
+            "the relays have agreed which of them form the chain (a new view): they agree on new positions next"
         ),
         Event::LeaseLapsed => defmt::intern!(
-            "not all relays are reachable, so the last agreement is no longer used: this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)"
+            "not all relays are reachable, so the last agreement on positions has expired: this relay keeps its setpoint, and asks the others to agree which relays form the chain (a new view)"
         ),
         Event::NoQuorum => defmt::intern!(
             "no quorum: too few relays receive each other to agree on the chain's members: bring the missing relays into range, or land this part of the chain"
         ),
         Event::Uploaded => defmt::intern!("a newer mission has been received by an upload"),
         Event::NewEstimate => {
-            defmt::intern!("the interference estimate has changed: new positions follow")
+            defmt::intern!("the estimate of the interferer has changed: new positions follow")
         }
         Event::InterfererUnclear => defmt::intern!(
             "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
@@ -129,7 +129,7 @@ mod autopilot {
         State::Grounded => "on the ground, or not armed",
         State::Standby => "in the air, and not controlled by the relay",
         State::Engaged => "setpoint control engaged",
-        State::Blind => "no recent position from the autopilot, so its last target is kept",
+        State::Blind => "no recent position from the autopilot, so the drone keeps its last target",
     });
 
     texts!(ReleaseCause {
@@ -157,10 +157,10 @@ mod autopilot {
 
     texts!(WaitReason {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
-        WaitReason::Link => "messages from the autopilot arrive late",
+        WaitReason::Link => "messages from the autopilot arrive late: check the link to it",
         WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
-        WaitReason::Unseen => "no other mode than OFFBOARD or GUIDED was reported without a failsafe since the relay started: end the failsafe, or choose another mode",
-        WaitReason::Position => "the drone's position is unknown, or not near the line between transmitter and receiver",
+        WaitReason::Unseen => "since the relay started, the autopilot has only been in OFFBOARD or GUIDED, or in a failsafe: end the failsafe, or choose another mode, then OFFBOARD or GUIDED again",
+        WaitReason::Position => "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line",
         WaitReason::NotReady => "this drone is on the wrong side of a neighbour along the line; fly it to its own side first",
     });
 
@@ -202,7 +202,7 @@ mod autopilot {
                 ),
                 Self::ClearRefused { relays, from } => defmt::write!(
                     f,
-                    "denied MAVLink system {=u8}, component {=u8} to clear the lost relays {}: the command must name every lost relay on that side of this relay, and no other",
+                    "denied MAVLink system {=u8}, component {=u8} to clear the lost relays {}: the command must name every lost relay on one side of this relay (toward Tx or toward Rx), and no other",
                     from.system,
                     from.component,
                     named(relays)

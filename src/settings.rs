@@ -296,10 +296,10 @@ pub enum SetupError {
 }
 
 error_texts!(SetupError {
-    Index => "index must be within 1 to the mission's number of relays",
+    Index => "the relay's index must be within 1 to the mission's number of relays",
     Profile => "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6",
     Step => "the fixed target step (linear SIR) must be above 0",
-    Method => "the method must be Align if the mission has an interference field; otherwise Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust needs the cargo feature `adjust`",
+    Method => "the method must be Align in a mission with an interference field; in other missions Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust the cargo feature `adjust`",
     Reverse => "Joint needs a known interferer if the mission's reverse is above 0: listen must be None, or the method Align or Adjust",
     Adjust => "Adjust::explore_m must be within 0 to 1e5, and the grid of Adjust::local at least 2 by 2",
     Measure => "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000; measure needs the cargo feature `field`",

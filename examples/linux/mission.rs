@@ -165,11 +165,11 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
     let gaps = relays.saturating_sub(1).max(1);
     Mission::try_new(config).map_err(|error| match error {
         MissionError::TooManyForDistance => format!(
-            "{prefix}min-separation {min_separation_m}: must be at most {} m: {prefix}distance {distance_m} divided by {gaps}, the gaps between {relays} relays",
+            "{prefix}min-separation {min_separation_m}: must be at most {} m, so that {relays} relays fit into {prefix}distance {distance_m} ({gaps} times that separation)",
             distance_m / f32::from(gaps)
         ),
         MissionError::Band => format!(
-            "{prefix}band {},{}: must be LEAST,MOST with LEAST at most {prefix}altitude {} and MOST at least that",
+            "{prefix}band {},{}: must contain {prefix}altitude {}: LEAST must be at most that altitude, MOST at least that altitude",
             band.least_m, band.most_m, common.altitude_m
         ),
         other => other.to_string(),
@@ -193,7 +193,7 @@ pub fn guess(text: &str) -> Result<Interference, String> {
 /// The expected form or range.
 pub fn interferer(text: &str) -> Result<Interferer, String> {
     let [power, x, y] = text.split(',').collect::<Vec<_>>()[..] else {
-        return Err("must be three numbers: P,X,Y".to_owned());
+        return Err("must be three numbers P,X,Y: the interferer's power P in W, and its position X along the line and Y beside it in m".to_owned());
     };
     Ok(Interferer {
         power_w: named("P", power, [1e-6, 1e9])?,
@@ -207,9 +207,9 @@ pub fn interferer(text: &str) -> Result<Interferer, String> {
 /// # Errors
 /// The expected form or range.
 pub fn band(text: &str) -> Result<Band, String> {
-    let (least, most) = text
-        .split_once(',')
-        .ok_or("must be two numbers: LEAST,MOST")?;
+    let (least, most) = text.split_once(',').ok_or(
+        "must be two numbers LEAST,MOST: the lowest and the highest permitted altitude in m",
+    )?;
     Ok(Band {
         least_m: named("LEAST", least, ALTITUDE_M)?,
         most_m: named("MOST", most, ALTITUDE_M)?,

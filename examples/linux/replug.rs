@@ -70,8 +70,9 @@ impl Replug {
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
-            let what =
-                format_args!("{failure}; opened again as soon as it is back: check its cable");
+            let what = format_args!(
+                "{failure}; check its cable: the program opens the port again as soon as the device is back"
+            );
             log.event(now, "port lost", self.fields(), what);
             self.tty = None;
             self.counts.times_gone = self.counts.times_gone.saturating_add(1);
@@ -82,7 +83,7 @@ impl Replug {
         {
             let fields = json!({ "fault": fault, "left_out": tap.left_out() });
             let what = format_args!(
-                "--capture cannot be written: {fault}; the capture ends here, and the program continues without it; its next start begins a new capture"
+                "--capture cannot be written: {fault}; the capture ends here, and the program continues without it; the next start of the program begins a new capture"
             );
             log.event(now, "capture ended", fields, what);
         }

@@ -56,7 +56,7 @@ impl StatusSocket {
         if let Ok(there) = path.symlink_metadata() {
             if !there.file_type().is_socket() {
                 return Err(named(
-                    &"another file has this name: choose another one, or remove it",
+                    &"a file that is not a socket has this name: give another name, or remove that file",
                 ));
             }
             if UnixStream::connect(path).is_ok() {

@@ -128,7 +128,7 @@ impl Companion {
             ),
         );
         if self.plan.key.is_some() {
-            let what = "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored";
+            let what = "frames to the autopilot are signed; frames from the autopilot that are not signed with the same key are ignored";
             log.line(Instant::ZERO, EVENT, what);
         }
     }
@@ -137,7 +137,7 @@ impl Companion {
         let refused = self.link.refused();
         if refused > 0 {
             let what = format_args!(
-                "{refused} frames from the autopilot were rejected because of their signatures: compare its key with --autopilot-key-file"
+                "{refused} frames from the autopilot were rejected because of their signatures: check that --autopilot-key-file has the autopilot's key"
             );
             log.line(now, EVENT, what);
         }
@@ -356,7 +356,7 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
                 State::Grounded => "on the ground, or not armed",
                 State::Standby => "in the air, and not controlled by the relay",
                 State::Engaged => "setpoint control engaged",
-                State::Blind => "no recent position from the autopilot, so its last target is kept",
+                State::Blind => "no recent position from the autopilot, so the drone keeps its last target",
             };
             return log.event(now, EVENT, json!({ "state": word(state) }), what);
         }
@@ -371,7 +371,7 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
             return log_command(now, log, Ok(text), relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
-            let text = "the command must name every lost relay on one side of this relay, and no other";
+            let text = "the command must name every lost relay on one side of this relay (toward Tx or toward Rx), and no other";
             return log_command(now, log, Err(text.to_owned()), relays, from);
         }
         AutopilotEvent::FenceBreached => "the drone is outside the autopilot's fence".to_owned(),
@@ -425,15 +425,15 @@ const fn mode(mode: FlightMode) -> &'static str {
 const fn wait_reason(reason: WaitReason) -> &'static str {
     match reason {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
-        WaitReason::Link => "messages from the autopilot arrive late",
+        WaitReason::Link => "messages from the autopilot arrive late: check the link to it",
         WaitReason::Found => {
             "it was in OFFBOARD or GUIDED before this program started: choose another mode, then OFFBOARD or GUIDED again"
         }
         WaitReason::Unseen => {
-            "no other mode than OFFBOARD or GUIDED was reported without a failsafe since this program started: end the failsafe, or choose another mode"
+            "since this program started, the autopilot has only been in OFFBOARD or GUIDED, or in a failsafe: end the failsafe, or choose another mode, then OFFBOARD or GUIDED again"
         }
         WaitReason::Position => {
-            "the drone's position is unknown, or not near the line between transmitter and receiver"
+            "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line"
         }
         WaitReason::NotReady => {
             "this drone is on the wrong side of a neighbour along the line; fly it to its own side first"

@@ -94,7 +94,7 @@ fn describe(reason: HoldReason, whom: &str) -> String {
         }
         HoldReason::Lost => {
             format!(
-                "a lost relay may still hover between this drone and {whom}: once it has landed, send clear-lost"
+                "a lost relay may still hover between this drone and {whom}: once it has landed, send `clear-lost` with its number"
             )
         }
         HoldReason::NotFlown => {

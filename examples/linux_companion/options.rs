@@ -332,7 +332,7 @@ fn wiring(options: &Options) -> Result<Wiring, String> {
     }
     let missing = |name: &str, neighbour: u16| {
         Err(format!(
-            "--{name}: is missing, a tty toward relay {neighbour} (or give --shared)"
+            "--{name}: is missing: give the tty that leads to relay {neighbour}, or --shared for a radio that all relays share"
         ))
     };
     if index > 1 && upstream.is_none() {
@@ -349,12 +349,12 @@ fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, S
     let field = options.field.map(Interference::Field).or(file_only.field);
     let interference = given.interference(field);
     if interference == Interference::Unknown && !options.listen.listen {
-        return Err("--interferer unknown: must be P,X,Y without --listen".to_owned());
+        return Err("--interferer unknown: needs --listen, with which the relays measure the interferer; without --listen give its power and position, P,X,Y".to_owned());
     }
     if matches!(interference, Interference::Field(_)) && options.method != Method::Align {
         let method = options.method.to_possible_value();
         return Err(format!(
-            "--method {}: must be align with --field",
+            "--method {}: cannot be used with --field: give --method align",
             method.as_ref().map_or("", |method| method.get_name())
         ));
     }
@@ -368,7 +368,7 @@ fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text
             .split_once(':')
-            .ok_or("must be points: X:UPSILON,X:UPSILON,..")?;
+            .ok_or("must be one or more points X:UPSILON, separated by commas")?;
         Ok(FieldPoint {
             x_m: named("X", x, [-1e7, 1e7])?,
             upsilon_per_w: named("UPSILON", upsilon, [1e-9, 1e32])?,

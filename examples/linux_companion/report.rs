@@ -99,7 +99,7 @@ impl Report {
             Instant::ZERO,
             "resumed",
             json!({ "version": version }),
-            format_args!("this relay flies version {version} of the mission, which it received by an upload before this start"),
+            format_args!("this relay flies version {version} of the mission, which was uploaded to it before this start"),
         );
     }
 
@@ -123,14 +123,14 @@ impl Report {
             Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
             Event::Infeasible => tell(
                 "infeasible",
-                "no positions of the relays meet any target SIR; all relays keep their positions",
+                "no positions give every hop one of the tried target SIRs, so all relays keep their positions; check the mission's interferer, distance and minimum separation",
             ),
             Event::Adopted => self.adopted(now, relay),
             Event::ViewAccepted => self.view_accepted(now, relay),
             Event::NewEstimate => self.log_estimate(now, relay.interference_estimate()),
             Event::LeaseLapsed => tell(
                 "lease expired",
-                "not all relays are reachable, so the last agreement is no longer used; this relay keeps its setpoint, and asks the others to agree on new members of the chain (view)",
+                "not all relays are reachable, so the last agreement on positions has expired; this relay keeps its setpoint, and asks the others to agree which relays form the chain (a new view)",
             ),
             Event::NoQuorum => tell(
                 "no quorum",
@@ -242,12 +242,14 @@ impl Report {
             _ if relay.is_passive() => say(
                 "duplicate index",
                 format_args!(
-                    "another relay uses number {node}, and this one is passive, without a setpoint; land one and give it its own --index"
+                    "another relay uses number {node}, too, so this relay is passive and has no setpoint; land one of the two, and give it its own --index"
                 ),
             ),
             _ => say(
                 "duplicate index",
-                format_args!("two relays use number {node}; land one and give it its own --index"),
+                format_args!(
+                    "two relays use number {node}; land one of the two, and give it its own --index"
+                ),
             ),
         }
     }

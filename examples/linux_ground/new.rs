@@ -123,7 +123,7 @@ impl NewOptions {
         let keeps = along_m.is_none() && (sited.is_some() || own.is_some());
         if keeps && config.distance_m.to_bits() != kept_m.to_bits() {
             return Err(format!(
-                "--new-distance {}: must be {kept_m}, because Tx and Rx stay at their sites; to change the distance, give --new-site-tx or --new-site-rx",
+                "--new-distance {}: must be {kept_m} m, because Tx and Rx stay at their sites; to change the distance, give --new-site-tx or --new-site-rx",
                 config.distance_m
             ));
         }

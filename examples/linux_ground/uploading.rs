@@ -152,7 +152,7 @@ impl Uploading {
                     return self.decide(now, log, plan, ground, flown);
                 }
                 return failed(format!(
-                    "--version {version}: relay {} has version {} and does not send the values of that mission, because its firmware is older; give --from-loaded, and state every value that must not return to that of the loaded mission",
+                    "--version {version}: relay {} flies version {}, and its older firmware cannot report the values of that mission: give --from-loaded, and every value of that version that the new mission has to keep",
                     flown.by, flown.version
                 ));
             }

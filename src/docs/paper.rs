@@ -11,7 +11,7 @@ pub const MISSION: uav_relay::Mission = uav_relay::Mission::new(uav_relay::Missi
     },
     channel: match uav_relay::Channel::new(2e9, 1.02, 126.0, uav_relay::channel::AirGround::Los) {
         Ok(channel) => channel,
-        Err(_) => panic!("a channel that is out of range"),
+        Err(_) => panic!("a parameter of the channel is out of its range"),
     },
     band: uav_relay::Band::at(20.0),
     lateral: uav_relay::Band::NONE,
@@ -32,5 +32,5 @@ pub fn relay(settings: uav_relay::Settings) -> uav_relay::Relay {
         index: 1,
     };
     uav_relay::Relay::new(MISSION, identity, settings, 1, uav_relay::Instant::ZERO)
-        .expect("it is in range")
+        .expect("the mission and its index fit")
 }

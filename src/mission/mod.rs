@@ -141,7 +141,7 @@ error_texts!(MissionError {
     Lateral => "lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
     InterfererPower => "interferer.power_w must be within 1e-6 to 1e9",
     InterfererPlace => "interferer.x_m and y_m must be within -1e7 to 1e7",
-    Noise => "noise_w must be within 0 to 1, and at most 1e12 times the interferer's power received at 1 m",
+    Noise => "noise_w must be within 0 to 1, and at most 1e12 times the power received from the interferer at a distance of 1 m",
     NoiseFeature => "a noise_w above 0 needs the cargo feature `noise`",
     Field => "an interference field needs the cargo feature `field`",
     Reverse => "reverse (SIR required from Rx to Tx, as a share of the SIR from Tx to Rx) must be within 0 to 1",

@@ -132,14 +132,14 @@ pub(crate) fn off_course(error: CourseError) {
 #[allow(dead_code, reason = "for an image that tells no autopilot")]
 pub(crate) fn no_flight() {
     error!(
-        "configuration refused: it has sites, but this image was built without the cargo feature flight"
+        "configuration refused: it has sites (positions of Tx and Rx), but this image was built without the cargo feature flight"
     );
 }
 
 #[cfg(feature = "mavlink-signing")]
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
+        "frames to the autopilot are signed; frames from the autopilot that are not signed with the same key are ignored"
     );
 }
 
@@ -174,7 +174,9 @@ pub(crate) fn refused(error: ConfigError) {
             "no configuration: the configuration block in flash is blank, so this relay does nothing: provision the drone"
         ),
         ConfigError::Magic => {
-            error!("configuration refused: the configuration block does not begin with UAVR");
+            error!(
+                "configuration refused: the configuration block does not begin with UAVR: provision the drone again"
+            );
         }
         ConfigError::Version => {
             error!(
@@ -197,7 +199,9 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Hold => {
-            error!("configuration refused: byte 15 (keep the altitude) must be 0 or 1");
+            error!(
+                "configuration refused: byte 15 of the block, which is 1 if the relay keeps its altitude, must be 0 or 1"
+            );
         }
         ConfigError::Method => {
             error!(
@@ -298,7 +302,7 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
         info!("mission version {=u16} stored", version);
     } else {
         warn!(
-            "mission version {=u16} cannot be stored: after a reboot it has to be uploaded again",
+            "mission version {=u16} cannot be stored in flash: after a reboot it has to be uploaded again",
             version
         );
     }
@@ -307,10 +311,10 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
 /// Logs that votes on the chain's membership were found after a reboot. `accepted` is true if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
-        info!("votes on the chain's membership restored from flash");
+        info!("votes on the chain's members from before this start were read from flash");
     } else {
         error!(
-            "votes on the chain's membership in flash are in another firmware's format, and ignored"
+            "votes on the chain's members in flash have the format of another firmware, and are ignored: before a flight nothing has to be done"
         );
     }
 }
@@ -318,9 +322,11 @@ pub(crate) fn votes_restored(accepted: bool) {
 /// Logs that storing the relay's votes works again (`is_stored` is true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
-        info!("votes on the chain's membership can be stored again");
+        info!("votes on the chain's members can be stored in flash again");
     } else {
-        error!("votes on the chain's membership cannot be stored: a reboot in flight loses them");
+        error!(
+            "votes on the chain's members cannot be stored in flash, and a restart in flight would lose them: land this drone, and check its flash"
+        );
     }
 }
 

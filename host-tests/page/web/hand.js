@@ -92,7 +92,7 @@ function read() {
     const good = field.value !== "" && field.checkValidity();
     field.setAttribute("aria-invalid", String(!good));
     if (good) want[key] = Number(field.value);
-    else lines.push(`${field.parentElement.textContent.trim()} ${field.value || "(empty)"}: must be within ${field.min} to ${field.max}`);
+    else lines.push(`${field.parentElement.textContent.trim()} = ${field.value || "(empty)"}: must be within ${field.min} to ${field.max}`);
   }
   want.method = byId("method").value;
   want.listen = byId("listen").checked;

@@ -71,14 +71,14 @@ const PHRASES = {
   "lost": "lost relay",
   "found": "became a neighbour of relay",
   "no quorum": "too few relays receive each other (no quorum), position held",
-  "view accepted": "new members of the chain agreed",
-  "lease expired": "last agreement expired, setpoint kept until a new one",
+  "view accepted": "agreed which relays form the chain",
+  "lease expired": "last agreement on positions expired, setpoint kept until the next one",
   "not received by": "is not received by relay",
-  "sensor off": "ignores the measurements, which do not fit the others, of relay",
+  "sensor off": "ignores faulty interference measurements of relay",
   "converged": "agreed on a position",
-  "infeasible": "no positions meet any target SIR, positions kept",
-  "new estimate": "new interference estimate",
-  "interferer unclear": "the measurements fit no single interferer",
+  "infeasible": "found no positions with a usable SIR at every hop, keeps its position",
+  "new estimate": "has a new estimate of the interferer",
+  "interferer unclear": "the interference measurements fit no single interferer",
 };
 
 /** Fills the list of events. */

@@ -256,7 +256,7 @@ fn data_link(file: &str, raw: RawDataLink, noise_hz: Option<f64>) -> Result<Link
             Some(number(own)),
             Problem::OtherBandwidth,
             format!(
-                "{} Hz (noise.bandwidth_hz), or one of the two keys",
+                "{} Hz (noise.bandwidth_hz), or only one of the two keys",
                 number(noise)
             ),
         ));

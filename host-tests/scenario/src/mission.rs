@@ -39,7 +39,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoHypothetical => {
-                f.write_str("no single interferer has the same effect as all [[interferer]] together, but relays can compute with a single one only: change their positions or powers, or leave some out")
+                f.write_str("no single interferer has the same effect as all [[interferer]] together, but relays can compute with a single one only: change the interferers' positions or powers, or leave some interferers out")
             }
             Self::NoRoom {
                 relays,

@@ -152,7 +152,7 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     drone.order("clear 1");
     answer(&drone, 2);
     relay.line(
-        "command refused: the command must name every lost relay on one side of this relay, and no other (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
+        "command refused: the command must name every lost relay on one side of this relay (toward Tx or toward Rx), and no other (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
     );
     drone.order("clear 2");
     answer(&drone, 0);

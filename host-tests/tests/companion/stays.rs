@@ -31,7 +31,7 @@ fn a_vanished_port_returns_and_the_other_one_goes_on() {
     for time in 1..=2_u64 {
         hub.pull(0);
         let line = relay.line(
-            "the device was disconnected; opened again as soon as it is back: check its cable",
+            "the device was disconnected; check its cable: the program opens the port again as soon as the device is back",
         );
         assert!(line.contains("port lost: --upstream "), "{line}");
         let sent = |said: &Value| said["links"]["ports"][1]["bytes_out"].as_u64().unwrap();
@@ -144,7 +144,10 @@ fn the_socket_answers_despite_stuck_clients() {
     std::fs::remove_file(&socket).unwrap();
     files.write("status", "");
     let line = Relay::start(&options).refused(1);
-    assert!(line.contains("another file has this name"), "{line}");
+    assert!(
+        line.contains("a file that is not a socket has this name"),
+        "{line}"
+    );
 }
 
 #[test]

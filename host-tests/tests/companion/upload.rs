@@ -163,7 +163,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
         rx.tty(1)
     ));
     let line = station.line("adopted: ");
-    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; the station asks it until the others do, too";
+    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; the station asks relay 3 until all others fly it, too";
     assert!(line.ends_with(first), "{line}");
     assert_eq!(*state.lock().unwrap(), Wire::Cut);
     // Several polls later the others still do not fly it.
@@ -310,7 +310,7 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         let line = ground(&chain.files, "5", &format!("{more} --no-fence")).refused(1);
         let by = "relay 1, or a relay behind it, rejects the upload";
         assert_eq!(line, format!("--version 5: {by}: {why}"));
-        let own = "upload refused: the altitudes must be within the relay's own geofence, ";
+        let own = "upload refused: the mission's altitudes must be within this relay's geofence, ";
         relays[0].line(&format!("{own}{range}"));
         assert!(
             relays

@@ -148,7 +148,7 @@ fn the_smallest_image_refuses_unsupported_methods() {
         [1, 2].iter().all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == *drone);
             lines.any(|line| {
-                line.text == "configuration refused: not supported by this image: the method must be Align if the mission has an interference field; otherwise Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust needs the cargo feature `adjust`"
+                line.text == "configuration refused: not supported by this image: the method must be Align in a mission with an interference field; in other missions Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust the cargo feature `adjust`"
             })
         })
     });

@@ -178,6 +178,6 @@ fn the_smallest_image_refuses_sites() {
     let mut fleet = Fleet::of(Image::Smallest, &flight(), Faults::default(), 1);
     wait_for_line(
         &mut fleet,
-        "configuration refused: it has sites, but this image was built without the cargo feature flight",
+        "configuration refused: it has sites (positions of Tx and Rx), but this image was built without the cargo feature flight",
     );
 }

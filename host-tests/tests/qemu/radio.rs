@@ -37,7 +37,7 @@ fn four_of_five_on_one_radio_recover_from_a_loss() {
         let mut new = lines[before..].iter().filter(|line| line.drone == drone);
         let counted = new.find(|line| {
             line.text
-                == "the relays have agreed on new members of the chain (view): new positions follow"
+                == "the relays have agreed which of them form the chain (a new view): they agree on new positions next"
         })?;
         new.find(|line| line.setpoint() == Some(*place))?;
         let agreed = new.find(|line| line.text == "the relays have agreed on positions")?;

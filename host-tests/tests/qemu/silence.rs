@@ -120,7 +120,7 @@ fn a_drone_with_a_bad_configuration_stays_out_and_logs_why() {
         "configuration refused: mission: the altitude band, band.least_m to band.most_m, must be within 0.1 to 1e5 and include common.altitude_m",
         "configuration refused: mission: lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
         "configuration refused: the method must be align with an interference field, and otherwise align, joint or adjust",
-        "configuration refused: byte 15 (keep the altitude) must be 0 or 1",
+        "configuration refused: byte 15 of the block, which is 1 if the relay keeps its altitude, must be 0 or 1",
         "configuration refused: with the method adjust rounds must be within 1 to 65535 and explore_m within 0 to 1e5, with any other method both 0",
         "configuration refused: samples must be within 100 to 1000000 and i_max_w within 1e-30 to 1e6 W, or both 0",
         "configuration refused: the interference field has more points than the block can hold",

@@ -128,7 +128,7 @@ fn three_drones_fly_the_transmitters_upload() {
             );
             // The emulator's flash is read-only; the drone flies the mission nevertheless.
             assert!(said(
-                "mission version 3 cannot be stored: after a reboot it has to be uploaded again"
+                "mission version 3 cannot be stored in flash: after a reboot it has to be uploaded again"
             ));
         }
     }

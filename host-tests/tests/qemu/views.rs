@@ -36,7 +36,7 @@ fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
     vec![(SECTORS[0], flash.bytes())]
 }
 
-const HOLDS: &str = "votes on the chain's membership restored from flash";
+const HOLDS: &str = "votes on the chain's members from before this start were read from flash";
 
 /// Checks that drones with stored votes up to membership view 40 get setpoints in a later view.
 #[test]

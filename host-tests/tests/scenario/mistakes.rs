@@ -11,7 +11,9 @@ fn refusals(files: &[String]) -> String {
     for text in files {
         let error = parse(text).expect_err(text);
         one_line(&error, "flight.toml", &[]);
-        writeln!(all, "{:?}\n    {error}", error.problem).unwrap();
+        let problem = format!("{:?}", error.problem);
+        let kind = problem.split('(').next().unwrap_or_default();
+        writeln!(all, "{kind}\n    {error}").unwrap();
     }
     all
 }

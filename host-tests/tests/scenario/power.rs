@@ -42,7 +42,7 @@ fn a_power_is_given_once() {
     ] {
         let text = small("").replace(key, &format!("{key}\n{other}"));
         let name = |pair: &str| pair.split(' ').next().unwrap().to_owned();
-        let both = format!("{table}.{key} together with {other} is given twice");
+        let both = format!("{table}.{key} together with {other} is not allowed");
         let allowed = format!("{} or {}, not both", name(key), name(other));
         refused(&text, Problem::SaidTwice, &[&both, &allowed]);
     }

@@ -48,7 +48,10 @@ impl Payload<'_> {
     }
 }
 
-const _: () = assert!(MAX_PAYLOAD <= u8::MAX as usize, "what a length says");
+const _: () = assert!(
+    MAX_PAYLOAD <= u8::MAX as usize,
+    "the length field of a MAVLink message is one byte"
+);
 
 /// Received MAVLink message, in the units and coordinate frames of the wire. Enum values are unchecked numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -322,7 +322,7 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
     feature = "altitude",
     expect(
         clippy::large_enum_variant,
-        reason = "there is one of it, and nothing allocates"
+        reason = "a relay has a single value of this type, and this crate does not allocate"
     )
 )]
 #[derive(Clone, Debug)]

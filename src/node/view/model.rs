@@ -17,7 +17,10 @@
 //! that follow each other one by one are never in force together. The check is therefore that all agreed views form one sequence,
 //! starting with the initial view.
 
-#![allow(clippy::cast_possible_truncation, reason = "chains of a few relays")]
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "the modelled chains have at most 8 relays"
+)]
 
 extern crate std;
 
@@ -649,7 +652,7 @@ impl Check {
 }
 
 /// Name of the safety property that the model check verifies: agreed views form one sequence.
-pub(super) const ONE_CHAIN: &str = "agreed views follow each other one by one";
+pub(super) const ONE_CHAIN: &str = "all agreed views form a single sequence";
 
 impl Model for Check {
     type State = Chain;
@@ -726,14 +729,18 @@ impl Model for Check {
     fn properties(&self) -> Vec<Property<Self>> {
         vec![
             Property::always(ONE_CHAIN, |_, chain| Self::is_one_chain(chain)),
-            Property::always("a view has one size", |_, chain| Self::has_one_size(chain)),
             Property::always(
-                "what is known is so, and members are counted once",
+                "no view is decided or agreed on with two different sizes",
+                |_, chain| Self::has_one_size(chain),
+            ),
+            Property::always(
+                "every relay knows only agreed views, and no view has more members than its size",
                 |check: &Self, chain| check.is_known_and_counted(chain),
             ),
-            Property::always("once healed it settles", |check: &Self, chain| {
-                !check.heals || check.is_alive(chain)
-            }),
+            Property::always(
+                "after all links are restored, the relays agree on a view",
+                |check: &Self, chain| !check.heals || check.is_alive(chain),
+            ),
         ]
     }
 }
@@ -761,8 +768,8 @@ impl Check {
             ..
         } = self;
         println!(
-            "{} relays, {rule:?}: {cuts} cuts, {proposals} proposals, {reboots} reboots, {losses} without memory, heals: {heals}: \
-             {} states, depth {}, {:.1} s",
+            "view model: {} relays, quorum rule {rule:?}, at most {cuts} partitions, {proposals} proposals, {reboots} reboots and {losses} losses of the votes, \
+             links are restored: {heals}; searched {} states to depth {} in {:.1} s",
             self.members.len(),
             checker.unique_state_count(),
             checker.max_depth(),
@@ -777,7 +784,7 @@ impl Check {
             })
             .collect();
         let how = steps.concat();
-        println!("it does not hold that {what}:\n{how}");
+        println!("violated property: {what}; events that violate it:\n{how}");
         Some(Counterexample { what, how })
     }
 

@@ -63,17 +63,17 @@ pub(crate) fn flies(along_m: f64, speed_m_s: f32) {
 
 pub(crate) fn signs_to_autopilot() {
     info!(
-        "frames to the autopilot are signed; frames from it that are not signed with the same key are ignored"
+        "frames to the autopilot are signed; frames from the autopilot that are not signed with the same key are ignored"
     );
 }
 
 /// Logs that votes on the chain's membership were found after a reboot. `accepted` is true if the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
-        info!("votes on the chain's membership restored from flash");
+        info!("votes on the chain's members from before this start were read from flash");
     } else {
         error!(
-            "votes on the chain's membership in flash are in another firmware's format, and ignored"
+            "votes on the chain's members in flash have the format of another firmware, and are ignored: before a flight nothing has to be done"
         );
     }
 }
@@ -81,15 +81,20 @@ pub(crate) fn votes_restored(accepted: bool) {
 /// Logs that storing the relay's votes works again (`is_stored` is true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
-        info!("votes on the chain's membership can be stored again");
+        info!("votes on the chain's members can be stored in flash again");
     } else {
-        error!("votes on the chain's membership cannot be stored: a reboot in flight loses them");
+        error!(
+            "votes on the chain's members cannot be stored in flash, and a restart in flight would lose them: land this drone, and check its flash"
+        );
     }
 }
 
 pub(crate) fn refused(why: Refused) {
     match why {
-        Refused::Block(why) => error!("configuration refused: {}", Debug2Format(&why)),
+        Refused::Block(why) => error!(
+            "configuration refused: invalid configuration block ({}): provision the drone again",
+            Debug2Format(&why)
+        ),
         Refused::NoFlash => {
             error!(
                 "configuration refused: it has a key, but this board cannot store the epoch (start counter) that signing needs"
@@ -102,7 +107,7 @@ pub(crate) fn refused(why: Refused) {
         }
         Refused::NoAutopilot => {
             error!(
-                "configuration refused: it has sites, but this image has no port to an autopilot"
+                "configuration refused: it has sites (positions of Tx and Rx), but this image has no port to an autopilot"
             );
         }
         Refused::Course(why) => error!("configuration refused: sites: {}", why),

@@ -109,7 +109,10 @@ impl Hostile {
     pub fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {
-                let line = format!("{name} {}@..: relay must be within 1 to {uavs}", one.index);
+                let line = format!(
+                    "{name} {}@..: the relay's number must be within 1 to {uavs}",
+                    one.index
+                );
                 return Err(Failure::input(line));
             }
         }
@@ -124,7 +127,7 @@ impl Hostile {
             let line = match uavs {
                 1 => format!("--partition {after}@..: one relay alone cannot be partitioned"),
                 _ => format!(
-                    "--partition {after}@..: relay must be within 1 to {}",
+                    "--partition {after}@..: the relay's number must be within 1 to {}",
                     uavs - 1
                 ),
             };
@@ -257,7 +260,7 @@ fn partition(text: &str) -> Result<Partition, String> {
     let after = after.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be K@S-T with T above S".to_owned());
+        return Err("must be K@S-T with the end T after the start S".to_owned());
     }
     Ok(Partition { after, from, until })
 }
@@ -337,7 +340,9 @@ impl Air {
             !(1..=uavs).contains(&deaf.by.min(deaf.of)) || deaf.by.max(deaf.of) > uavs
         });
         if let Some(OneWayFailure { by, of, .. }) = wrong {
-            let line = format!("--deaf {by}:{of}@..: relays must be within 1 to {uavs}");
+            let line = format!(
+                "--deaf {by}:{of}@..: the numbers of both relays must be within 1 to {uavs}"
+            );
             return Err(Failure::input(line));
         }
         Ok(())
@@ -397,7 +402,7 @@ fn deaf(text: &str) -> Result<OneWayFailure, String> {
     let of: u16 = of.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be J:I@S-E with E above S".to_owned());
+        return Err("must be J:I@S-E with the end E after the start S".to_owned());
     }
     if by == of {
         return Err("must be J:I@S-E with two different relays J and I".to_owned());
@@ -474,7 +479,7 @@ impl Flight {
         let wrong = |takeover: &&Takeover| !(1..=uavs).contains(&takeover.relay);
         match self.takeover.iter().find(wrong) {
             Some(takeover) => Err(Failure::input(format!(
-                "--takeover {}@..: relay must be within 1 to {uavs}",
+                "--takeover {}@..: the relay's number must be within 1 to {uavs}",
                 takeover.relay
             ))),
             None => Ok(()),
@@ -528,7 +533,7 @@ fn takeover(text: &str) -> Result<Takeover, String> {
     let relay = relay.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
     if until.is_some_and(|until| until <= from) {
-        return Err("must be I@S-E with E above S".to_owned());
+        return Err("must be I@S-E with the end E after the start S".to_owned());
     }
     Ok(Takeover {
         relay,

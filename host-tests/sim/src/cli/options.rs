@@ -107,10 +107,13 @@ impl Options {
     pub(super) fn agree(&self, method: &str) -> Result<(), Failure> {
         let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);
         let is_adjust = self.method == Method::Adjust;
-        let step = "has no fixed step: leave it out, or use align-step or stochastic-step";
-        let rounds = "has no rounds of adjustment: leave it out, or use adjust";
-        let bracket = "tries the target SIRs in the fixed step of --epsilon: leave it out";
-        let ignored: [(Option<String>, &str); 6] = [
+        let step = (
+            "has no fixed step",
+            ", or use --method align-step or stochastic-step",
+        );
+        let rounds = ("has no rounds of adjustment", ", or use --method adjust");
+        let bracket = ("tries the target SIRs in fixed steps", "");
+        let ignored: [(Option<String>, (&str, &str)); 6] = [
             (
                 given_option("--epsilon", self.epsilon.filter(|_| !is_step)),
                 step,
@@ -133,15 +136,18 @@ impl Options {
                 bracket,
             ),
         ];
-        for (option, why) in ignored {
+        for (option, (why, instead)) in ignored {
             if let Some(option) = option {
-                let line = format!("{option}: has no effect with --method {method}, which {why}");
+                let name = option.split(' ').next().unwrap_or_default();
+                let line = format!(
+                    "{option}: has no effect with --method {method}, which {why}; leave {name} out{instead}"
+                );
                 return Err(Failure::input(line));
             }
         }
         if self.closed_loop.is_some() && !self.method.is_for_fields() {
             let line = format!(
-                "--closed-loop: has no effect with --method {method}, because relays measure interference only with stochastic and stochastic-step: leave it out, or use one of these"
+                "--closed-loop: has no effect with --method {method}, because relays measure interference only with stochastic and stochastic-step; leave --closed-loop out, or use one of these methods"
             );
             return Err(Failure::input(line));
         }

@@ -134,7 +134,7 @@ impl AttackReport {
         if self.formed != self.formed_without {
             _ = writeln!(
                 text,
-                "agreed memberships (views) of the chain: {}, without the attack {}",
+                "views (agreements on the chain's members): {}, without the attack {}",
                 self.formed, self.formed_without
             );
         }

@@ -572,11 +572,11 @@ impl AvailabilityReport {
         if let Some(most) = self.most_flying {
             _ = writeln!(
                 text,
-                "most groups with separate agreements at the same time: {most}"
+                "largest number of groups of relays with separate agreements at the same time: {most}"
             );
         }
         if let Some(least) = self.least_separation_m {
-            _ = writeln!(text, "least separation of two relays: {least:.3} m");
+            _ = writeln!(text, "smallest distance of two relays: {least:.3} m");
         }
         text
     }

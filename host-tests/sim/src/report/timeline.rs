@@ -304,7 +304,7 @@ impl Group {
                 "mission version {version} adopted: {}",
                 count(self.relays.len())
             ),
-            _ => "no positions meet any target SIR, so the relays keep theirs".to_owned(),
+            _ => "no positions meet any target SIR, so the relays keep their positions".to_owned(),
         }
     }
 }
@@ -596,7 +596,7 @@ pub(super) fn recovery_text(recoveries: &[RecoveryReport]) -> String {
     if same > 0 {
         _ = writeln!(
             text,
-            "agreed memberships (views) with unchanged relays: {same}"
+            "views agreed without a change of the chain's members: {same}"
         );
     }
     text
@@ -620,7 +620,7 @@ impl RecoveryReport {
             _ = write!(text, "adopted {after:.3} s after the upload began, ");
         }
         let Some(converged) = self.converged_s else {
-            return text + "new members agreed before the relays agreed on positions";
+            return text + "the membership changed before the relays agreed on positions";
         };
         _ = write!(
             text,

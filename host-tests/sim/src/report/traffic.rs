@@ -287,7 +287,11 @@ impl FlowReport {
             ("queues", SHOWN)
         };
         let queues: Vec<String> = queues.into_iter().take(shown).map(queue).collect();
-        _ = writeln!(text, "    {which}, mean (most): {}", queues.join(", "));
+        _ = writeln!(
+            text,
+            "    {which} in packets, mean (largest): {}",
+            queues.join(", ")
+        );
         text
     }
 }

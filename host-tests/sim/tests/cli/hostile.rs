@@ -270,7 +270,7 @@ fn a_soak_runs_to_its_end_and_reports_the_availability() {
         "radio channel (csma, 115200 bit/s): load 0.",
         "availability: 0.",
         "at the same time: 1",
-        "least separation of two relays: ",
+        "smallest distance of two relays: ",
     ] {
         assert!(text.contains(line), "{line} in {text}");
     }

@@ -370,13 +370,13 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let refuse = |line: String| Err(Failure::input(line));
     if let Some(x_m) = options.x_m {
         return refuse(format!(
-            "--x-m {x_m:?}: cannot be used with --out, because relays compute their positions along the line themselves: leave it out"
+            "--x-m {x_m:?}: cannot be used with --out, because relays compute their positions along the line themselves: leave --x-m out"
         ));
     }
     let is_field = matches!(scenario.interference, Interference::Field(_));
     if is_field && options.altitude == Altitude::Free {
         return refuse(
-            "--altitude free: cannot be used with --out if the mission has a [field], because its relays stay at geometry.altitude_m: leave it out, and set geometry.altitude_m to geometry.altitude_min_m, the best altitude"
+            "--altitude free: cannot be used with --out if the mission has a [field], because its relays stay at geometry.altitude_m: leave --altitude out, and set geometry.altitude_m to geometry.altitude_min_m, the best altitude"
                 .to_owned(),
         );
     }

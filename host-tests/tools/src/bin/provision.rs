@@ -110,7 +110,9 @@ impl<'a> Asked<'a> {
         );
         let plan = scenario.plan.as_ref();
         let other = |option: &str, has: &str| {
-            format!("{option}: {name} has a [plan] with {has}; leave the option out, or plan again")
+            format!(
+                "{option}: {name} has a [plan] with {has}; leave the option out, or run `cargo plan --out` again"
+            )
         };
         let uavs = match (options.uavs, plan) {
             (Some(uavs), Some(plan)) if uavs != plan.uavs => {
@@ -510,7 +512,7 @@ fn chosen_method(
             let said = format!("{method:?}").to_lowercase();
             if is_planned {
                 return Err(format!(
-                    "{name}: network.method = \"{text}\": must be \"{said}\", the method of its [plan]; or compute the plan again"
+                    "{name}: network.method = \"{text}\": must be \"{said}\", the method of its [plan]; or run `cargo plan --out` again"
                 ));
             }
             command::print_line(&format!(

@@ -38,8 +38,8 @@ impl Flown {
         let (why, remedy) = if self.stand_in {
             (
                 "because the relays compute with one hypothetical interferer in place of all",
-                "let the relays estimate the interferer, and simulate that (`cargo chain --listen`, [listen]), or plan other altitudes or more \
-                 relays against the true sum (`cargo plan`)",
+                "let the relays estimate the interferer ([listen]; `cargo chain --listen` simulates it), or plan other altitudes or more \
+                 relays for the sum of all interferers (`cargo plan`)",
             )
         } else {
             (
@@ -48,7 +48,7 @@ impl Flown {
             )
         };
         format!(
-            "the relays would reach an SIR of {reach:.2} dB instead of {best:.2} dB, {:.1} % less than the best positions, {why}; {remedy}",
+            "the relays would reach an SIR of {reach:.2} dB instead of the {best:.2} dB of the best positions, {:.1} % less, {why}; {remedy}",
             100.0 * self.loss()
         )
     }

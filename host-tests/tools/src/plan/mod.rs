@@ -64,7 +64,7 @@ fn check(scenario: &Scenario, ask: &PlanRequest) -> Result<(), NoPlan> {
     } else if ask.number != Number::Of(1) {
         "--x-m is for one relay: it needs --uavs 1".to_owned()
     } else if matches!(scenario.interference, Interference::Field(_)) {
-        "--x-m needs an [[interferer]]: in a [field] the interference does not depend on the altitude"
+        "--x-m finds the best altitude at that place, so it needs an [[interferer]]: the interference of a [field] is the same at every altitude"
             .to_owned()
     } else {
         return Ok(());

@@ -521,7 +521,7 @@ fn a_poor_hypothetical_interferer_is_refused() {
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     let loss = report["hypothetical"]["loss"].as_f64().unwrap();
     assert!(loss > 0.15, "{report}");
-    let words = format!("{:.1} % less than the best positions", 100.0 * loss);
+    let words = format!("{:.1} % less, because", 100.0 * loss);
     let one = format!("--scenario {several} --uavs 8 --index 2 --out {out}");
     let line = refusal(&one);
     assert!(

@@ -242,7 +242,7 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
     feature = "altitude",
     expect(
         clippy::large_enum_variant,
-        reason = "there is one of it, and nothing allocates"
+        reason = "a relay has a single value of this type, and this crate does not allocate"
     )
 )]
 #[repr(u8)]
@@ -476,7 +476,7 @@ mod tests {
             fewer += u32::from(portions < more);
         }
         std::println!(
-            "{kept} portions, {again} with the best start done once more; fewer in {fewer} of {count}"
+            "{kept} portions of work with the stored best chain, {again} if it is computed again; fewer in {fewer} of {count} missions"
         );
         assert!(fewer * 2 > count);
     }

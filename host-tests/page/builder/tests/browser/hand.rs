@@ -137,14 +137,14 @@ fn complaint(browser: &mut Browser) -> String {
 fn a_field_that_is_out_of_its_range_is_said_until_it_is_mended_and_holds_back_no_other() {
     let mut browser = opened(1280, 900);
     choose(&mut browser, "uavs", "0");
-    let wrong = "Relays 0: must be within 1 to 100";
+    let wrong = "Number of relays = 0: must be within 1 to 100";
     assert_eq!(complaint(&mut browser), wrong);
     choose(&mut browser, "power", "8");
     assert_eq!(complaint(&mut browser), wrong, "it is still there");
     let toml = browser.text("window.last.toml");
     assert!(toml.contains("power_w = 8.0"), "{toml}");
     choose(&mut browser, "loss", "95");
-    let both = format!("{wrong}\nFrames lost, % 95: must be within 0 to 90");
+    let both = format!("{wrong}\nFrames lost, % = 95: must be within 0 to 90");
     assert_eq!(complaint(&mut browser), both);
     choose(&mut browser, "uavs", "9");
     choose(&mut browser, "loss", "5");
