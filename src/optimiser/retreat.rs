@@ -165,8 +165,10 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x in [`place`, `most_m`) at which this hop's sender receives the backward hop, m. The
-    /// backward hop is sent by this hop's receiver, at x = `from_m`. `None` if there is no such x.
+    /// Returns the smallest x of this hop's sender at which it receives the backward hop, m.
+    ///
+    /// The x is at least `place` and below `most_m`. The backward hop is sent by this hop's receiver, at x = `from_m`.
+    /// `None` if there is no such x.
     ///
     /// `c` is the gain over the target for the field's largest Upsilon. Work: at most one root for each field point
     /// from `place` to `from_m`.
@@ -318,10 +320,10 @@ impl<'a> Retreat<'a> {
         best
     }
 
-    /// Returns the receiver's x within `to`, m, of the hops that just meet the target both on the way there and back.
-    /// There are at most two.
+    /// Returns the receiver's x, m, of the hops that just meet the target in both directions; at most two.
     ///
-    /// The sender is within `from`. `gains` are those of both hops over the target.
+    /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` are the forward and the
+    /// backward gain over the target.
     fn equal_limits(&self, gains: [f32; 2], from: Piece, to: Piece) -> [Option<f32>; 2] {
         let [c, back] = gains;
         let (rise, back_rise) = (c * to.slope, back * from.slope);
@@ -343,8 +345,7 @@ impl<'a> Retreat<'a> {
         })
     }
 
-    /// Returns the squared distances of [`least`]: the squared difference in altitude, and the squared minimum length
-    /// of the hop, m^2.
+    /// Returns the squared difference in altitude and the squared minimum length of the hop, m^2.
     fn squares(&self) -> [f32; 2] {
         let apart = self.climb_squared;
         [apart, apart + square(self.least_step)]
@@ -410,7 +411,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the parts of [`low`, `high`], m, in each of which Upsilon is linear in x, in ascending order.
+    /// Returns the parts of the line from `low` to `high`, m, in ascending order. In each Upsilon is linear in x.
     fn pieces(self, low: f32, high: f32) -> impl Iterator<Item = Piece> {
         let points = match self {
             Self::In(field) => field.points(),

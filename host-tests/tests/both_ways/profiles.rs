@@ -157,8 +157,10 @@ fn best_places_of_own_relays_with_a_separation_that_binds() {
     });
 }
 
-/// Checks a chain in which relays 7 and 8 need an x far from the interferer, because 65 m of altitude are between
-/// them. Relay 8 then stays short of the farthest x of relay 7, from which no hop leads backward.
+/// Checks a chain in which relay 8 stays short of the farthest x of relay 7.
+///
+/// Between the two are 65 m of altitude, so that they must be far from the interferer. A search that allows a hop
+/// from a sender beyond its receiver finds a wrong x for relay 8.
 #[test]
 fn a_relay_that_stays_short_of_the_previous_ones_reach() {
     let chain = Chain {
