@@ -32,18 +32,21 @@
 //! ```
 //!
 //! Between two points of the field the right side is linear in x, so the margin is concave there, and the first x from which both
-//! directions work is a root of a quadratic. With x between two points of the field and y between two, each direction allows a convex
-//! set of (x, y). So the smallest x is at an end of the y, at the y that is best on the way there, or where both directions just meet
-//! the target, which with y = x + z is
+//! directions work is a root of a quadratic.
+//!
+//! If x stays between two points of the field, and y too, each direction allows a convex set of pairs (x, y). So the smallest x has one
+//! of three kinds of y: the smallest or largest y of that part of the field, the y that is best on the way there, or one with which the
+//! hop just meets the target in both directions. With y = x + z, c = p / (`mu_los` gamma) and c' = p' / (`mu_los` r gamma) the last is
 //!
 //! ```text
-//! z^2 = c Upsilon(y) - q = c' Upsilon(x) - q,    c = A / (gamma Upsilon(x0)),    c' = A' / (gamma Upsilon(x)).
+//! z^2 = c Upsilon(y) - q,    c Upsilon(y) = c' Upsilon(x).
 //! ```
 //!
-//! The right equation is linear in x and z, and leaves a quadratic for z. `longest` tries all these y. For a given x the set of y that
-//! both directions allow is exact: the y up to x + sqrt(A' / gamma - q). A range may have holes near the interferer, which are refused.
+//! The second equation is linear in x and z, and leaves a quadratic for z. `longest` compares all these y. For a given x the set of y
+//! that both directions allow is exact: the y up to x + sqrt(A' / gamma - q). The y of a range that lie in a hole are refused.
 //!
-//! Accuracy: asserted by `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` against f64.
+//! Accuracy: `retreats_agree_with_the_reference` in `host-tests/tests/stochastic.rs` compares with f64, and
+//! `the_best_places_in_a_field_are_found` in `host-tests/tests/both_ways/field.rs` compares chains with a grid search.
 
 use core::cell::Cell;
 

@@ -206,12 +206,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    /// Returns true if the best chain so far meets the highest target that the search tries. No other chain can be
-    /// better then. That target is the upper bound `ceiling` plus its tolerance, in ln(SIR).
-    pub(super) fn is_complete(&self, ceiling: f32) -> bool {
-        self.best.is_some_and(|(best, _)| best >= ceiling + CEILING)
-    }
-
     pub(super) fn next(
         &mut self,
         turn: AscentStep,
@@ -328,9 +322,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
     ) -> Poll<Result<f32, Infeasible>> {
         let next = Start::number(self.number, Room::of(chain.mission));
-        let complete = !self.again && self.is_complete(chain.ceiling());
-        let Some(start) = next.filter(|_| !complete) else {
-            // All starts are done, or the others cannot be better.
+        let Some(start) = next else {
+            // All starts are done.
             let Some((_, number)) = self.best else {
                 return Poll::Ready(Err(Infeasible));
             };
