@@ -388,3 +388,42 @@ impl Average {
         self.last = now;
     }
 }
+
+#[cfg(all(test, feature = "sensing"))]
+mod tests {
+    use super::{UNIT_W, coefficients, strength, terms, value};
+    use crate::mission::tests::paper;
+    use crate::mission::{Interferer, Mission};
+    use crate::place::Placement;
+
+    /// Checks that a source's coefficients give the inverse interference of the channel model at any position. The
+    /// interference is P / (eta l^2) for a source of P watts at the distance l.
+    #[test]
+    fn coefficients_are_those_of_the_channel_model() {
+        let mission = Mission::try_new(paper(3)).unwrap();
+        let source = Interferer {
+            power_w: 7.0,
+            x_m: 640.0,
+            y_m: -90.0,
+        };
+        let known = coefficients(&mission, &source);
+        let eta = mission.config().channel.eta();
+        for (x_m, y_m, altitude_m) in [(0.0, 0.0, 20.0), (600.0, -80.0, 35.0), (990.0, 300.0, 5.0)]
+        {
+            let at = Placement {
+                x_m,
+                y_m,
+                altitude_m,
+            };
+            let squared = f64::from(x_m - source.x_m).powi(2)
+                + f64::from(y_m - source.y_m).powi(2)
+                + f64::from(altitude_m).powi(2);
+            let interference_w = f64::from(source.power_w) / (eta * squared);
+            let expected = f64::from(UNIT_W) / interference_w;
+            let v = value(&known, &terms(mission.config().distance_m, at));
+            assert!((v / expected - 1.0).abs() < 1e-4, "{v} {expected}");
+        }
+        let k = strength(&mission, 7.0);
+        assert!((strength(&mission, k) / 7.0 - 1.0).abs() < 1e-12);
+    }
+}
