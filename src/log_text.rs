@@ -159,7 +159,7 @@ mod autopilot {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
         WaitReason::Link => "messages from the autopilot arrive late: check the link to it",
         WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
-        WaitReason::Unseen => "since the relay started, the autopilot has only been in OFFBOARD or GUIDED, or in a failsafe: end the failsafe, or choose another mode, then OFFBOARD or GUIDED again",
+        WaitReason::Unseen => "the relay has not received the pilot's choice of a mode yet: end the failsafe if there is one, choose a mode other than OFFBOARD and GUIDED, then OFFBOARD or GUIDED",
         WaitReason::Position => "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line",
         WaitReason::NotReady => "this drone is on the wrong side of a neighbour along the line; fly it to its own side first",
     });

@@ -430,7 +430,7 @@ const fn wait_reason(reason: WaitReason) -> &'static str {
             "it was in OFFBOARD or GUIDED before this program started: choose another mode, then OFFBOARD or GUIDED again"
         }
         WaitReason::Unseen => {
-            "since this program started, the autopilot has only been in OFFBOARD or GUIDED, or in a failsafe: end the failsafe, or choose another mode, then OFFBOARD or GUIDED again"
+            "this program has not received the pilot's choice of a mode yet: end the failsafe if there is one, choose a mode other than OFFBOARD and GUIDED, then OFFBOARD or GUIDED"
         }
         WaitReason::Position => {
             "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line"

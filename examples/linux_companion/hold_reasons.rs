@@ -58,7 +58,7 @@ impl HoldReasonLog {
             let fields = json!({ "node": node, "reason": reason.map(word) });
             let text = match reason {
                 Some(reason) => format!("holds its position: {}", describe(reason, &whom)),
-                None => format!("no longer waits for {whom}"),
+                None => format!("no longer holds its position because of {whom}"),
             };
             log.event(now, "waits", fields, text);
         }

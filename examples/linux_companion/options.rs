@@ -368,7 +368,7 @@ fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text
             .split_once(':')
-            .ok_or("must be one or more points X:UPSILON, separated by commas")?;
+            .ok_or("must be one or more points X:UPSILON, separated by commas: X is the position along the line in m, UPSILON the mean of 1 / interference power there in 1/W")?;
         Ok(FieldPoint {
             x_m: named("X", x, [-1e7, 1e7])?,
             upsilon_per_w: named("UPSILON", upsilon, [1e-9, 1e32])?,

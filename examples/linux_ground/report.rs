@@ -49,14 +49,14 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
         Progress::Stored { by } => log.line(
             now,
             "stored",
-            format_args!("relay {by} has stored version {version}; the station asks relay {by} until the chain flies that version"),
+            format_args!("relay {by} has stored version {version}; the station asks relay {by} which version the chain flies, until it is this one"),
         ),
         Progress::Adopted { by } => log.event(
             now,
             "adopted",
             json!({ "version": version, "flown_by": 1, "relays": all }),
             format_args!(
-                "relay {by} flies version {version}, as the first of {all} relays; the station asks relay {by} until all others fly it, too"
+                "relay {by} flies version {version}, as the first of {all} relays; the station asks relay {by} how many relays fly it, until all do"
             ),
         ),
         Progress::Flown { by, view, relays } => log.event(

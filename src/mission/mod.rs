@@ -577,7 +577,8 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which positions are computed: toward Rx, or toward Tx in an interference field.
+    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to relay N), or in an
+    /// interference field toward Tx (relay N to relay 1).
     pub const fn heading(&self) -> Heading {
         match self.field() {
             None => Heading::TowardRx,

@@ -133,7 +133,8 @@ pub(crate) struct IndexClaims {
     /// Number of claims still to send because another active node uses this relay's node number. They are
     /// [`least_interval`] apart.
     defences: u8,
-    /// Earliest time at which this relay may send its next claim.
+    /// Earliest time at which a further claim to this relay's node number may be scheduled. This limits the rate of
+    /// Claim messages.
     quiet_until: Instant,
     claim_due: bool,
     /// True if all authentication sessions must be restarted under the new claim number.

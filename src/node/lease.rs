@@ -395,8 +395,8 @@ mod tests {
     use crate::view::ViewId;
 
     /// Returns the lease duration that the leader announces after a view change, in tenths of a second. Before the
-    /// change, the leader was in view 1, where a renewal had been unfinished for 40 s. The new view follows view
-    /// `base` and loses no relay.
+    /// change the leader is in view 1, and a renewal of its lease has been unfinished for 40 s. The new view has the
+    /// number `base` + 1; it follows view `base` and loses no relay.
     fn span_after(base: u32) -> u16 {
         let settings = Settings::default();
         let view = |number: u32| ViewId::from_bits(number << 10 | 1);

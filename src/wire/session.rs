@@ -383,8 +383,8 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns the owner of `nonce` among the nodes with this relay's number: this relay or another node. Unknown if
-    /// the epoch of the nonce is older than this relay's.
+    /// Returns the node that made `nonce`: this relay, or another node that uses its node number. `Unknown` if the
+    /// nonce's epoch (start counter) is older than this relay's.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {

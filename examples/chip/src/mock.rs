@@ -164,7 +164,10 @@ impl MockRegisters {
         if self.faults.hsi_hidden || !self.is_on_pll() {
             return;
         }
-        assert!(self.is_pll_ready(), "the core's clock has stopped");
+        assert!(
+            self.is_pll_ready(),
+            "the CPU core has no clock: the PLL drives it, but does not run"
+        );
         let [core, apb1, apb2] = self.clocks();
         let wait_states = self.value(Register::FlashAccess) & 0xF;
         assert!(

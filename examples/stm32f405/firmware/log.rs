@@ -4,7 +4,7 @@
 #![allow(
     clippy::match_same_arms,
     clippy::if_same_then_else,
-    reason = "it does not compare the texts of lines"
+    reason = "the arms have different log texts, which the lints do not see"
 )]
 
 use uav_relay::SetupError;
@@ -91,11 +91,11 @@ pub(crate) fn started(begun: &Begun) {
     match begun.clocks.pll {
         Some(Source::Crystal) => info!("clock {=u32} MHz, from the 8 MHz crystal", mhz),
         Some(Source::Internal) => warn!(
-            "clock {=u32} MHz, from the internal oscillator: no 8 MHz crystal found",
+            "clock {=u32} MHz, from the internal oscillator: no 8 MHz crystal found; do not fly, baud rates may be off by 8 %",
             mhz
         ),
         None => warn!(
-            "clock {=u32} MHz, from the internal oscillator: the PLL did not start",
+            "clock {=u32} MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be off by 8 %",
             mhz
         ),
     }
@@ -314,7 +314,7 @@ pub(crate) fn votes_restored(accepted: bool) {
         info!("votes on the chain's members from before this start were read from flash");
     } else {
         error!(
-            "votes on the chain's members in flash have the format of another firmware, and are ignored: before a flight nothing has to be done"
+            "votes on the chain's members in flash were written by another firmware, and are ignored: harmless before a flight; in flight land this drone, because it might vote twice"
         );
     }
 }
@@ -372,7 +372,7 @@ pub(crate) fn event(event: Event, relay: &Relay) {
     {
         let target = relay.target().unwrap_or_default();
         info!(
-            "setpoint x {=f32} m ({=u32:#010x}) y {=f32} m ({=u32:#010x}) altitude {=f32} m ({=u32:#010x}) target {=f32} ({=u32:#010x})",
+            "setpoint x {=f32} m ({=u32:#010x}) y {=f32} m ({=u32:#010x}) altitude {=f32} m ({=u32:#010x}) target SIR {=f32} ({=u32:#010x})",
             place.x_m,
             place.x_m.to_bits(),
             place.y_m,

@@ -16,7 +16,7 @@ const PX4_SENDS_TO: u16 = 14_540;
 const APART: u16 = 1_000;
 
 /// Description of a valid UDP address and its ports, for error messages.
-pub const FORM: &str = "udp:HOST:PORT with PORT within 1 to 64535, or udp:HOST:PORT@LOCAL with PORT and LOCAL within 1 to 65535";
+pub const FORM: &str = "udp:HOST:PORT with PORT within 1 to 64535 (the local port is then up to PORT + 1000), or udp:HOST:PORT@LOCAL with PORT and the local port LOCAL within 1 to 65535";
 
 /// UDP address of an autopilot, with the local port that the companion uses to reach it.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -123,7 +123,7 @@ impl fmt::Display for EndpointError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoHost => f.write_str("has no HOST"),
-            Self::NoPort => f.write_str("has no PORT within 1 to 65535"),
+            Self::NoPort => f.write_str("has no valid PORT"),
             Self::NoLocal => f.write_str("has a LOCAL that is not within 1 to 65535"),
             Self::NoDefault { port } => write!(
                 f,

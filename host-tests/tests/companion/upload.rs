@@ -163,7 +163,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
         rx.tty(1)
     ));
     let line = station.line("adopted: ");
-    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; the station asks relay 3 until all others fly it, too";
+    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; the station asks relay 3 how many relays fly it, until all do";
     assert!(line.ends_with(first), "{line}");
     assert_eq!(*state.lock().unwrap(), Wire::Cut);
     // Several polls later the others still do not fly it.

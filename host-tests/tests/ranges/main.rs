@@ -10,7 +10,8 @@ mod measured;
 mod missions;
 mod positions;
 
-/// Returns the random seeds of a test: `COUNT` or else `usual` of them, from `SEED` on.
+/// Returns the random seeds of a test. The environment variables `SEED` and `COUNT` set the first seed and the number
+/// of seeds; the defaults are 0 and `usual`.
 fn seeds(usual: u64) -> std::ops::Range<u64> {
     let of = |name: &str| std::env::var(name).ok()?.parse().ok();
     let (first, count) = (of("SEED").unwrap_or(0), of("COUNT").unwrap_or(usual));

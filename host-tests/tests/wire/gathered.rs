@@ -166,10 +166,11 @@ fn a_collection_with_its_receivers_profile_is_stale() {
     }
 }
 
-/// Checks that a relay treats a wrong result of a collection of profiles as stale, and changes nothing.
+/// Checks that a relay counts a wrong `Gathered` message as stale and keeps its state.
 ///
-/// A profile is a relay's altitude and power. A result is wrong if it has another number or begins behind another
-/// relay, lacks profiles, has some of relays beyond the chain, or arrives twice.
+/// `Gathered` carries the result of a collection: the profiles (altitude and power) of the relays. It is wrong if it
+/// has another collection number or another start of the collection, lacks profiles, has the profile of a relay
+/// beyond the chain's end, or arrives a second time.
 #[test]
 fn a_roster_that_does_not_fit_is_stale_and_changes_nothing() {
     let mut bench = fourth(false);

@@ -101,7 +101,8 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true while the last command is not answered, or its effect not passed to the relay.
+    /// Returns true while an operator's command that reports landed relays is being processed. That ends when the
+    /// command is answered and its effect is passed to the relay.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }

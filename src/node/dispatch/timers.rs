@@ -128,7 +128,8 @@ impl Node {
         }
     }
 
-    /// Returns true if, since its start, this relay has received no pass and requested no view.
+    /// Returns true until this relay has taken part in a pass along the chain, or requested a view. A pass is a
+    /// series of messages, each from one relay to the next.
     fn awaits_first(&self) -> bool {
         self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }

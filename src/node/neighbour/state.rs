@@ -71,8 +71,8 @@ pub(crate) struct Neighbour {
     pub(super) distance: u16,
     /// Nodes on this side that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
-    /// Node that each of the four nearest nodes on this side has selected on its side toward this relay. 0 for none;
-    /// the nearest node is first.
+    /// Neighbours that the four nearest nodes on this side have selected in the direction of this relay. One entry
+    /// for each of the four, the nearest first: the number of its neighbour; 0 for none.
     pub(super) selection: [u16; CANDIDATES as usize],
     /// Time of the last frame from a node on this side that is not selected; `None` before any.
     unselected_at: Option<Instant>,
@@ -651,7 +651,8 @@ impl Neighbour {
         }
     }
 
-    /// Returns the node that the node `distance` relays away has selected on its side toward this relay. 0 for none.
+    /// Returns the neighbour that a node on this side has selected in the direction of this relay. 0 for none; the
+    /// node is `distance` relays away.
     pub(crate) fn selected_by(&self, distance: u16) -> u16 {
         let known = self.selection.get(usize::from(distance).wrapping_sub(1));
         known.copied().unwrap_or(0)

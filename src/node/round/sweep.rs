@@ -303,7 +303,8 @@ impl SweepPass {
         }
     }
 
-    /// Returns the committed target SIR, and this relay's farthest x for it, m. `None` if no target is committed.
+    /// Returns the committed target SIR, and the farthest x, m, at which this relay meets it. `None` if no target is
+    /// committed.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((
@@ -312,7 +313,8 @@ impl SweepPass {
         ))
     }
 
-    /// Returns the previous node's farthest x for the committed target, m. `None` if no target is committed.
+    /// Returns the farthest x, m, at which the previous node meets the committed target SIR. `None` if no target is
+    /// committed.
     fn committed_before(&self) -> Option<f32> {
         self.from.get(usize::from(self.verdict.commit?)).copied()
     }

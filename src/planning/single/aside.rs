@@ -87,9 +87,10 @@ pub enum AsideCase {
     /// Optimum where the circles of constant SIR_1 (first hop) and SIR_2 (second hop) touch. It is at the lowest
     /// altitude.
     Touching,
-    /// Optimum at the lowest altitude and the maximum of the first hop's SIR. That hop is the worse one even there.
+    /// Optimum at the lowest altitude and the maximum of the first hop's SIR. This maximum is still below the second
+    /// hop's SIR there.
     Hilltop,
-    /// Optimum above Rx, at the lowest altitude: the first hop is the better one even there.
+    /// Optimum above Rx, at the lowest altitude: the first hop's SIR is the higher one there.
     AboveRx,
     /// Optimum on an edge of the box of allowed positions, along this coordinate. The optimum without limits is
     /// outside the box.

@@ -85,26 +85,29 @@ use crate::sir::{Extremum, first_hop_turn, square};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum PlaceCase {
-    /// Optimum at x = 0: the first hop is the worse one even right above Tx. The ratio of the powers of Tx and relay
-    /// is below C_1 ([`Guide::c1`]).
+    /// Optimum at x = 0: even right above Tx the first hop's SIR is lower than the second hop's. The ratio of the
+    /// powers of Tx and relay is below C_1 ([`Guide::c1`]).
     AboveTx = 1,
     /// Optimum at the only x where both hops have the same SIR. The first hop's SIR falls all the way to Rx, and
     /// crosses the second's once.
     Crossing = 2,
-    /// Optimum above Rx: the first hop's SIR falls all the way to Rx, and is the higher one even there.
+    /// Optimum above Rx: the first hop's SIR falls all the way to Rx. Above Rx it is still higher than the second
+    /// hop's.
     AboveRx = 3,
     /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is above Rx
     /// instead if the worse hop's SIR is higher there, because the first hop's SIR has risen again beyond its
     /// minimum.
     BeforeValley = 4,
-    /// Optimum above Rx: the first hop's SIR has a minimum before Rx, and is the higher one even there.
+    /// Optimum above Rx: the first hop's SIR has a minimum before Rx. At that minimum it is still higher than the
+    /// second hop's.
     OverValley = 5,
-    /// Optimum at the maximum of the first hop's SIR, which is the lower one even there. The interferer is behind Tx.
+    /// Optimum at the maximum of the first hop's SIR, where it is still the lower of the two hops' SIRs. The
+    /// interferer is behind Tx.
     Hilltop = 6,
     /// Optimum where both hops have the same SIR, beyond the maximum of the first hop's. The interferer is behind Tx.
     BeyondHill = 7,
-    /// Optimum above Rx, with the interferer behind Tx. The first hop's SIR rises all the way to Rx, or is the higher
-    /// one even there.
+    /// Optimum above Rx, with the interferer behind Tx. The first hop's SIR rises all the way to Rx, or above Rx it
+    /// is still higher than the second hop's.
     HillAboveRx = 8,
     /// Optimum above Rx: the interferer is at Tx, so the first hop's SIR is the same at every x.
     Level = 9,

@@ -73,7 +73,7 @@ pub(crate) fn votes_restored(accepted: bool) {
         info!("votes on the chain's members from before this start were read from flash");
     } else {
         error!(
-            "votes on the chain's members in flash have the format of another firmware, and are ignored: before a flight nothing has to be done"
+            "votes on the chain's members in flash were written by another firmware, and are ignored: harmless before a flight; in flight land this drone, because it might vote twice"
         );
     }
 }

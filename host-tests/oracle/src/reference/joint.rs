@@ -70,7 +70,8 @@ impl FixedCrossSection {
 pub struct Place {
     /// Coordinate along the line from Tx to Rx, m: 0 to the distance D.
     pub x_m: f64,
-    /// Offset from the vertical plane through Tx and Rx, m, with the sign of the interferer's `y_i`.
+    /// Lateral offset from the vertical plane through Tx and Rx, m. Positive on the side on which an interferer with
+    /// a positive `y_i` is.
     pub y_m: f64,
     /// Altitude, m.
     pub altitude_m: f64,

@@ -255,7 +255,7 @@ fn relay_event(text: &str) -> Result<RelayEvent, String> {
 }
 
 fn partition(text: &str) -> Result<Partition, String> {
-    let form = "must be K@S or K@S-T: behind relay K (1 to N - 1) from S to T seconds after the start (0 to 1e6)";
+    let form = "must be K@S or K@S-T: relays 1 to K (K from 1 to N - 1) and the others do not receive each other from S until T seconds after the start (0 to 1e6), or without T to the end";
     let (after, times) = text.split_once('@').ok_or(form)?;
     let after = after.parse().map_err(|_| form)?;
     let (from, until) = span(times).ok_or(form)?;
@@ -395,7 +395,7 @@ impl Air {
 }
 
 fn deaf(text: &str) -> Result<OneWayFailure, String> {
-    let form = "must be J:I@S or J:I@S-E: relay J does not receive relay I (each 1 to N) from S to E seconds after the start (0 to 1e6)";
+    let form = "must be J:I@S or J:I@S-E: relay J does not receive relay I (each 1 to N) from S until E seconds after the start (0 to 1e6), or without E to the end";
     let (relays, times) = text.split_once('@').ok_or(form)?;
     let (by, of) = relays.split_once(':').ok_or(form)?;
     let by: u16 = by.parse().map_err(|_| form)?;
@@ -405,7 +405,7 @@ fn deaf(text: &str) -> Result<OneWayFailure, String> {
         return Err("must be J:I@S-E with the end E after the start S".to_owned());
     }
     if by == of {
-        return Err("must be J:I@S-E with two different relays J and I".to_owned());
+        return Err("J and I must be two different relays".to_owned());
     }
     Ok(OneWayFailure {
         by,

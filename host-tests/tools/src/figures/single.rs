@@ -106,13 +106,15 @@ fn row(tx_w: f64, relay_w: f64, altitude_m: u32, draws: u32) -> Option<Row> {
 // The paper prints an average gain in SIR of 30.14 % over a random position and of 25.73 % over the interference-blind method,
 // and up to 65 %, without the powers. This file computes many powers and several ways of averaging.
 
-/// Powers of Tx, W, for which the average gain of one relay is computed.
+/// Transmit powers of Tx, W, for the table of average gains. A gain is the increase in SIR by the optimal position of
+/// one relay.
 pub const TX_W: [f64; 17] = [
     5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 31.5, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0,
     200.0,
 ];
 
-/// Powers of the relay, W, for which its average gain is computed.
+/// Transmit powers of the relay, W, for the table of average gains. A gain is the increase in SIR by the optimal
+/// position of the relay.
 pub const RELAY_W: [f64; 17] = [
     0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0,
 ];

@@ -49,13 +49,13 @@ struct Label {
     before: usize,
 }
 
-/// Tables of one hop for the search of positions. They have the sender's smallest x for each rate step of the radio
-/// (a least SINR, and the data rate from there on), and lower bounds on the time for one bit.
+/// Tables of one hop for the search of positions: limits of its sender's x and its time for a bit. The radio
+/// has rate steps: each is a least SINR with the data rate from there on.
 struct Reaches {
     hop: Hop,
-    /// Smallest x of a sender, m, with which the receiver still has the SINR of a rate step. There is a row for each
-    /// rate step of the radio, with a value for each x of the receiver on the grid. Infinite if the sender would have
-    /// to be closer than the least separation.
+    /// Smallest x of the sender, m, at which the receiver has the SINR of a rate step. There is a row for each rate
+    /// step of the radio, with a value for each x of the receiver on the grid. Infinite if the sender would have to
+    /// be closer to the receiver than the least separation.
     nearest: Vec<Vec<f64>>,
     /// Lower bounds on the hop's time for one bit, s Hz (time in s for a bandwidth of 1 Hz). There is a row for each
     /// cell of the sender, with a value for each cell of the receiver.

@@ -50,7 +50,7 @@ const PAGES: [&str; 13] = [
     "src/docs/uploads.md",
 ];
 
-/// Runs the commands of the pages, and compares their output with the pages.
+/// Runs the commands printed in the documentation pages, and compares the outputs.
 #[derive(Parser)]
 #[command(name = "pages")]
 struct Options {
