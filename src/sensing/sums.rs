@@ -396,7 +396,7 @@ mod tests {
     use crate::mission::{Interferer, Mission};
     use crate::place::Placement;
 
-    /// Checks that a source's coefficients give the inverse interference of the channel model at any position. The
+    /// Checks that a source's coefficients give the inverse interference of the channel model. The
     /// interference is P / (eta l^2) for a source of P watts at the distance l.
     #[test]
     fn coefficients_are_those_of_the_channel_model() {
