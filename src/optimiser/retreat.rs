@@ -193,7 +193,9 @@ impl<'a> Retreat<'a> {
             is_hop.then_some(x)
         };
         let end = last.min(most_m);
-        for piece in heard.pieces(place, end) {
+        let mut start_m = place;
+        loop {
+            let piece = heard.piece(start_m, end);
             if is_met(piece.start_m, piece.level) {
                 return hop(piece.start_m);
             }
@@ -216,6 +218,10 @@ impl<'a> Retreat<'a> {
                     z = z.next_down();
                     x = x.next_up().max(from_m - z);
                 }
+            }
+            start_m = piece.end_m;
+            if start_m >= end {
+                break;
             }
         }
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
@@ -290,37 +296,72 @@ impl<'a> Retreat<'a> {
         there: Step,
     ) -> Option<Step> {
         let (gain, heard) = self.back()?;
-        let (c, back) = (self.gain / target, gain / target);
+        let gains = [self.gain, gain].map(|gain| gain / target);
         // Smallest x of the sender so far.
         let best_m = Cell::new(f32::INFINITY);
-        let value = |y, quiet| {
-            let place = self.onward(target, y, quiet)?;
-            let from_m = self.first(back, heard, place, y, best_m.get())?;
-            best_m.set(from_m.min(best_m.get()));
-            Some(from_m)
-        };
-        let first = value(there.to_m, interference.quiet(there.to_m)).map(|from_m| Step {
+        let value = |y| self.sender(target, y, interference.quiet(y), Some(&best_m));
+        let first = value(there.to_m).map(|from_m| Step {
             to_m: there.to_m,
             from_m,
         });
         if first == Some(there) {
             return first;
         }
-        let low = low.max(self.nearest());
-        let mut best = least(interference, c, self.squares(), low, high, value).or(first);
+        let mut best = self
+            .searched(interference, target, low, high, Some(&best_m))
+            .or(first);
         let HopInterference::In(_) = interference else {
             return best;
         };
-        for to in interference.pieces(low, high) {
-            for from in heard.pieces(there.from_m, best_m.get().min(to.end_m)) {
-                for y in self.equal_limits([c, back], from, to).into_iter().flatten() {
-                    if let Some(from_m) = value(y, interference.quiet(y)) {
+        let mut to_m = low.max(self.nearest());
+        while to_m < high {
+            let to = interference.piece(to_m, high);
+            let mut from_m = there.from_m;
+            while from_m < best_m.get().min(to.end_m) {
+                let from = heard.piece(from_m, to.end_m);
+                for y in self.equal_limits(gains, from, to).into_iter().flatten() {
+                    if let Some(from_m) = value(y) {
                         best = Some(Step { to_m: y, from_m });
                     }
                 }
+                from_m = from.end_m;
             }
+            to_m = to.end_m;
         }
         best
+    }
+
+    /// Returns the smallest x of the sender for a receiver at `y_m`, m. `quiet` is the ratio of the receiver's Upsilon
+    /// to the field's largest.
+    ///
+    /// Without `best_m` only the traffic toward Rx counts. With it both directions count, the x has to be smaller than
+    /// `best_m`, and is stored there.
+    #[inline]
+    fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
+        let place = self.onward(target, y_m, quiet)?;
+        let Some((best_m, (gain, heard))) = best_m.zip(self.back()) else {
+            return Some(place);
+        };
+        let from_m = self.first(gain / target, heard, place, y_m, best_m.get())?;
+        best_m.set(from_m);
+        Some(from_m)
+    }
+
+    /// Returns the hop with the smallest [`sender`](Self::sender) among the receivers of [`least`].
+    #[inline(never)] // one copy for both directions and for one
+    fn searched(
+        &self,
+        interference: HopInterference<'_>,
+        target: f32,
+        low: f32,
+        high: f32,
+        best_m: Option<&Cell<f32>>,
+    ) -> Option<Step> {
+        let apart = self.climb_squared;
+        let squares = [apart, apart + square(self.least_step)];
+        let low = low.max(self.nearest());
+        let value = |y, quiet| self.sender(target, y, quiet, best_m);
+        least(interference, self.gain / target, squares, low, high, value)
     }
 
     /// Returns the receiver's x, m, of the hops that just meet the target in both directions; at most two.
@@ -348,12 +389,6 @@ impl<'a> Retreat<'a> {
         })
     }
 
-    /// Returns the squared difference in altitude and the squared minimum length of the hop, m^2.
-    fn squares(&self) -> [f32; 2] {
-        let apart = self.climb_squared;
-        [apart, apart + square(self.least_step)]
-    }
-
     /// Returns the hop of [`Retreat::longest`] for the traffic toward Rx only.
     pub(super) fn longest_there(
         &self,
@@ -362,16 +397,7 @@ impl<'a> Retreat<'a> {
         low: f32,
         high: f32,
     ) -> Option<Step> {
-        let low = low.max(self.nearest());
-        let value = |y, quiet| self.onward(target, y, quiet);
-        least(
-            interference,
-            self.gain / target,
-            self.squares(),
-            low,
-            high,
-            value,
-        )
+        self.searched(interference, target, low, high, None)
     }
 }
 
@@ -414,33 +440,27 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the parts of the line from `low` to `high`, m, in ascending order. In each Upsilon is linear in x.
-    fn pieces(self, low: f32, high: f32) -> impl Iterator<Item = Piece> {
+    /// Returns the part of the line from `start_m` to the next point of the field, but at most to `end_m`, m.
+    #[inline(never)] // one copy for all loops
+    fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {
             Self::In(field) => field.points(),
             Self::Evenly(_) => &[],
         };
-        let first = points.partition_point(|point| point.x_m <= low);
-        let inner = points.get(first..).unwrap_or_default().iter();
-        let ends = inner
-            .map(|point| point.x_m)
-            .take_while(move |x_m| *x_m < high);
-        let mut start_m = low;
-        ends.chain([high]).map(move |end_m| {
-            let level = self.quiet(start_m);
-            let piece = Piece {
-                start_m,
-                end_m,
-                level,
-                slope: if end_m > start_m {
-                    (self.quiet(end_m) - level) / (end_m - start_m)
-                } else {
-                    0.0
-                },
-            };
-            start_m = end_m;
-            piece
-        })
+        let next = points.partition_point(|point| point.x_m <= start_m);
+        let end_m = points.get(next).map_or(end_m, |point| point.x_m.min(end_m));
+        let level = self.quiet(start_m);
+        let slope = if end_m > start_m {
+            (self.quiet(end_m) - level) / (end_m - start_m)
+        } else {
+            0.0
+        };
+        Piece {
+            start_m,
+            end_m,
+            level,
+            slope,
+        }
     }
 }
 

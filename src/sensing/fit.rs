@@ -460,3 +460,52 @@ impl Best<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Factor;
+
+    /// Symmetric matrix of the fit for four positions that differ in all terms. Its rows are linearly independent.
+    const MATRIX: [[f64; 4]; 4] = [
+        [4.0, 0.6, 1.1, -0.7],
+        [0.6, 3.0, -0.4, 0.9],
+        [1.1, -0.4, 2.0, 0.5],
+        [-0.7, 0.9, 0.5, 1.5],
+    ];
+
+    fn factor(least: f64) -> Factor {
+        let [a, b, c, d] = MATRIX;
+        let products = [a[0], a[1], a[2], a[3], b[1], b[2], b[3], c[2], c[3], d[3]];
+        Factor::new(products, least).unwrap()
+    }
+
+    fn times(x: [f64; 4]) -> [f64; 4] {
+        MATRIX.map(|row| row.iter().zip(x).map(|(a, b)| a * b).sum())
+    }
+
+    /// Checks that the factorisation solves the fit's equations, and that the variance is r^T G^-1 r.
+    #[test]
+    fn the_equations_of_the_fit_are_solved() {
+        let factor = factor(0.0);
+        for unknown in [[1.0, -2.0, 0.5, 3.0], [0.3, 0.2, -1.5, -0.8]] {
+            let right = times(unknown);
+            let solved = factor.solve(right);
+            for (ours, expected) in solved.iter().zip(unknown) {
+                assert!((ours - expected).abs() < 1e-12, "{solved:?} {unknown:?}");
+            }
+            let variance: f64 = right.iter().zip(unknown).map(|(r, x)| r * x).sum();
+            assert!((factor.variance(right) - variance).abs() < 1e-12);
+        }
+    }
+
+    /// Checks that the last unknown is 0 if its pivot is too small, and that the other three solve their equations.
+    #[test]
+    fn an_unknown_that_is_not_seen_is_left_out() {
+        let factor = factor(10.0);
+        let unknown = [1.0, -2.0, 0.5, 0.0];
+        let solved = factor.solve(times(unknown));
+        for (ours, expected) in solved.iter().zip(unknown) {
+            assert!((ours - expected).abs() < 1e-12, "{solved:?}");
+        }
+    }
+}
