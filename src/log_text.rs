@@ -176,7 +176,10 @@ mod autopilot {
         fn format(&self, f: defmt::Formatter<'_>) {
             match self {
                 Self::Found(kind) => defmt::write!(f, "found: {}", kind),
-                Self::Restarted => defmt::write!(f, "restarted"),
+                Self::Restarted => defmt::write!(
+                    f,
+                    "rebooted; setpoint control begins when the pilot chooses OFFBOARD or GUIDED again in the air"
+                ),
                 Self::State(state) => defmt::write!(f, "{}", state),
                 Self::Released(release) => defmt::write!(f, "released: {}", release),
                 Self::Waits(reason) => defmt::write!(f, "cannot be engaged: {}", reason),

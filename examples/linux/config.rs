@@ -67,6 +67,9 @@ impl Override {
     }
 }
 
+/// Section of a scenario file that `--interferer` and `--field` override.
+const FIELD_SECTION: &str = "[field]";
+
 /// Logs a line for each override, so that an ignored value of the file is noticed.
 pub fn log_overrides(overrides: &[Override], log: &Log) {
     for one in overrides {
@@ -75,11 +78,16 @@ pub fn log_overrides(overrides: &[Override], log: &Log) {
             file_value: instead,
             file,
         } = one;
+        let kind = match instead.as_str() {
+            FIELD_SECTION => "the section ",
+            other if other.starts_with("--") => "",
+            _ => "the value ",
+        };
         log.event(
             Instant::ZERO,
             "override",
             json!({ "option": option, "instead_of": instead, "file": file }),
-            format_args!("{option} replaces {instead} of {file}"),
+            format_args!("{option} is used instead of {kind}{instead} in {file}"),
         );
     }
 }
@@ -264,7 +272,7 @@ pub fn read<T: Parser>(
         for option in ["--interferer", "--field"] {
             overrides.extend(value_of(&line, option).map(|value| Override {
                 option: format!("{option} {value}"),
-                file_value: "[field]".to_owned(),
+                file_value: FIELD_SECTION.to_owned(),
                 file: name.clone(),
             }));
         }

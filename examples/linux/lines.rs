@@ -15,12 +15,17 @@ use crate::log::Log;
 pub const LONGEST: usize = 200;
 
 /// Description of the permitted powers, for error messages.
-pub const POWER: &str = "a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm";
+const POWER: &str = "a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm";
 
-/// Parses a power from the words of a line: a number in W, or a number in dBm followed by that unit. Returns it in W;
-/// `None` outside 1e-30 to 1e6 W.
-#[must_use]
-pub fn power_w(words: &[&str]) -> Option<f32> {
+/// Parses a power from the words of a line: a number in W, or a number in dBm followed by that unit. Returns it in W.
+///
+/// # Errors
+/// A text that names the words and the permitted range.
+pub fn power_w(words: &[&str]) -> Result<f32, String> {
+    parsed_w(words).ok_or_else(|| format!("{:?} is not {POWER}", words.join(" ")))
+}
+
+fn parsed_w(words: &[&str]) -> Option<f32> {
     let number = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
     let power_w = match words {
         [power, "dBm"] => watts(number(power)?),
@@ -34,11 +39,16 @@ pub fn power_w(words: &[&str]) -> Option<f32> {
     (1e-30..=1e6).contains(&power_w).then_some(power_w)
 }
 
-/// Splits a line into words; `None` if the line is too long or not UTF-8.
-#[must_use]
-pub fn words(line: &[u8]) -> Option<Vec<&str>> {
-    let text = std::str::from_utf8(line).ok()?;
-    (text.len() <= LONGEST).then(|| text.split_whitespace().collect())
+/// Splits a line into words.
+///
+/// # Errors
+/// A text that says that the line is too long or not UTF-8.
+pub fn words(line: &[u8]) -> Result<Vec<&str>, String> {
+    if line.len() > LONGEST {
+        return Err(format!("it has more than {LONGEST} bytes"));
+    }
+    let text = std::str::from_utf8(line).map_err(|_| "it is not UTF-8")?;
+    Ok(text.split_whitespace().collect())
 }
 
 /// Counter of invalid input lines. The first one is logged.
@@ -46,14 +56,21 @@ pub fn words(line: &[u8]) -> Option<Vec<&str>> {
 pub struct InvalidLines(u64);
 
 impl InvalidLines {
-    /// Counts an invalid line. The first one is logged as the event `event`, with a description of the `expected`
-    /// content.
-    pub fn refuse(&mut self, now: Instant, log: &Log, event: &str, line: &[u8], expected: &str) {
+    /// Counts an invalid line. The first one is logged as the event `event`, with the reason `why` and a description
+    /// of valid lines.
+    pub fn refuse(
+        &mut self,
+        now: Instant,
+        log: &Log,
+        event: &str,
+        line: &[u8],
+        [why, expected]: [&str; 2],
+    ) {
         self.0 += 1;
         if self.0 == 1 {
             let text = String::from_utf8_lossy(line);
             let what = format_args!(
-                "{text:?} is not {expected}; further invalid lines are counted, but not logged"
+                "the line {text:?} is ignored: {why}; a valid line is {expected}; further invalid lines are counted, but not logged"
             );
             log.line(now, event, what);
         }

@@ -127,7 +127,9 @@ impl Log {
 
     /// Logs that frames are signed, and the epoch, a number that rises at every start.
     pub fn signed(&self, epoch: u32) {
-        let what = format_args!("frames are signed; epoch (start counter) {epoch}");
+        let what = format_args!(
+            "frames are signed; epoch {epoch}, a number that is larger at every start"
+        );
         self.event(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
     }
 

@@ -343,7 +343,10 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
     let text = match event {
         AutopilotEvent::Found(Kind::Px4) => "found a PX4".to_owned(),
         AutopilotEvent::Found(Kind::ArduCopter) => "found an ArduCopter".to_owned(),
-        AutopilotEvent::Restarted => "restarted".to_owned(),
+        AutopilotEvent::Restarted => {
+            "rebooted; setpoint control begins when the pilot chooses OFFBOARD or GUIDED again in the air"
+                .to_owned()
+        }
         AutopilotEvent::Refused => {
             "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
                 .to_owned()

@@ -148,8 +148,14 @@ pub(crate) fn log_command(
 
 /// Returns the log text about the lost relays `named` on one side that the operator reports as landed.
 pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
+    let named: Vec<u16> = named.into_iter().collect();
+    let they_have = if named.len() == 1 {
+        "it has"
+    } else {
+        "they have"
+    };
     format!(
-        "{} cleared: this relay no longer keeps clear of lost relays {}",
+        "{} cleared: the operator reported that {they_have} landed, so this relay no longer keeps clear of lost relays {}",
         listed(named),
         direction(side)
     )

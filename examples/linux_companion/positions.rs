@@ -5,7 +5,7 @@ use std::os::fd::BorrowedFd;
 use std::path::Path;
 
 use uav_relay::{Duration, Instant, Placement, Sample};
-use uav_relay_linux::lines::{self, Fifo, InvalidLines, POWER};
+use uav_relay_linux::lines::{self, Fifo, InvalidLines};
 use uav_relay_linux::log::Log;
 
 const STALE: Duration = Duration::from_millis(3_000);
@@ -45,16 +45,18 @@ impl Positions {
         let Self {
             fifo, listens, bad, ..
         } = self;
-        fifo.read(|line| match parse_line(line) {
-            Some((place, sample)) if *listens || sample.is_none() => {
+        fifo.read(|line| match parse_line(line, *listens) {
+            Ok((place, sample)) => {
                 newest = place.or(newest);
                 sample.into_iter().for_each(&mut *on_sample);
             }
-            _ => {
-                let power = format!(" [POWER] or receiver POWER, {POWER}");
-                let power = if *listens { &power } else { "" };
-                let expected = format!("x_m y_m altitude_m{power}");
-                bad.refuse(now, log, "position", line, &expected);
+            Err(why) => {
+                let expected = if *listens {
+                    "x_m y_m altitude_m [POWER] or receiver POWER"
+                } else {
+                    "x_m y_m altitude_m"
+                };
+                bad.refuse(now, log, "position", line, [why.as_str(), expected]);
             }
         });
         self.newest = newest.map(|place| (now, place)).or(self.newest);
@@ -98,16 +100,28 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
 }
 
 /// Parses a line: a position with or without a measured power, or the word `receiver` and a power. Returns the
-/// position and the measurement, if any; `None` for an invalid line.
-fn parse_line(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
+/// position and the measurement, if any. Returns the reason as an error if the line is invalid, or if it has a power
+/// without `listens`.
+fn parse_line(text: &[u8], listens: bool) -> Result<(Option<Placement>, Option<Sample>), String> {
     let words = lines::words(text)?;
-    let number = |word: &str| word.parse::<f32>().ok().filter(|number| number.is_finite());
+    let number = |word: &str| {
+        let number = word.parse::<f32>().ok().filter(|it| it.is_finite());
+        number.ok_or_else(|| format!("{word:?} is not a number"))
+    };
+    let measured_w = |power: &[&str]| {
+        if listens {
+            lines::power_w(power)
+        } else {
+            let power = power.join(" ");
+            Err(format!("the power {power:?} needs the option --listen"))
+        }
+    };
     if let ["receiver", power @ ..] = words.as_slice() {
-        let power_w = lines::power_w(power)?;
-        return Some((None, Some(Sample::Receiver { power_w })));
+        let power_w = measured_w(power)?;
+        return Ok((None, Some(Sample::Receiver { power_w })));
     }
     let [x, y, altitude, rest @ ..] = &words[..] else {
-        return None;
+        return Err("it has fewer than three numbers".to_owned());
     };
     let at = Placement {
         x_m: number(x)?,
@@ -118,8 +132,8 @@ fn parse_line(text: &[u8]) -> Option<(Option<Placement>, Option<Sample>)> {
         [] => None,
         power => Some(Sample::Heard {
             at,
-            power_w: lines::power_w(power)?,
+            power_w: measured_w(power)?,
         }),
     };
-    Some((Some(at), sample))
+    Ok((Some(at), sample))
 }

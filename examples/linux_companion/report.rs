@@ -62,10 +62,10 @@ impl Report {
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
-        let names = if ttys.is_empty() {
-            "no tty".to_owned()
+        let ports = if ttys.is_empty() {
+            "no serial port".to_owned()
         } else {
-            ttys.join(", ")
+            format!("{}, {baud} bit/s", ttys.join(", "))
         };
         self.log.event(
             Instant::ZERO,
@@ -75,7 +75,7 @@ impl Report {
                 "version": env!("CARGO_PKG_VERSION"),
             }),
             format_args!(
-                "relay {index} of {relays}, network {network}, mission digest 0x{digest:04x}, {names}, {baud} bit/s"
+                "relay {index} of {relays}, network {network}, mission digest 0x{digest:04x}, {ports}"
             ),
         );
     }

@@ -14,7 +14,7 @@ pub(crate) fn log_changes(log: &Log, now: Instant, before: &Basis, after: &Basis
     for ((name, old), (_, new)) in pairs.filter(|((_, old), (_, new))| old != new) {
         is_same = false;
         let fields = json!({ "value": name, "old": old, "new": new });
-        let what = format_args!("{name}: {old} -> {new}");
+        let what = format_args!("new mission, {name}: {old} -> {new}");
         log.event(now, "change", fields, what);
     }
     if is_same {
@@ -40,7 +40,10 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     vec![
         ("transmitter", site(basis.line.map(|line| line.tx))),
         ("receiver", site(basis.line.map(|line| line.rx))),
-        ("distance", format!("{distance_m} m")),
+        (
+            "distance from transmitter to receiver",
+            format!("{distance_m} m"),
+        ),
         ("altitude", format!("{} m", common.altitude_m)),
         ("range of altitudes", range(band)),
         ("lateral range", range(lateral)),

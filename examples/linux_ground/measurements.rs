@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use uav_relay::{Duration, Instant, Side};
-use uav_relay_linux::lines::{self, Fifo, InvalidLines, POWER, PartialLine};
+use uav_relay_linux::lines::{self, Fifo, InvalidLines, PartialLine};
 use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--measurements";
@@ -142,9 +142,13 @@ impl Measurements {
     }
 
     fn take(&mut self, now: Instant, log: &Log, text: &[u8]) {
-        let Some(power_w) = level(text, self.end) else {
-            let expected = format!("POWER or {} POWER, {POWER}", name(self.end));
-            return self.bad.refuse(now, log, "measurement", text, &expected);
+        let power_w = match level(text, self.end) {
+            Ok(power_w) => power_w,
+            Err(why) => {
+                let expected = format!("POWER or {} POWER", name(self.end));
+                let texts = [why.as_str(), expected.as_str()];
+                return self.bad.refuse(now, log, "measurement", text, texts);
+            }
         };
         self.newest_w = Some(power_w);
         let is_first = self.last_at.replace(now).is_none();
@@ -243,8 +247,8 @@ pub(crate) const fn name(end: Side) -> &'static str {
 }
 
 /// Parses a measured power in W or dBm, and returns it in W. The word `transmitter` or `receiver` for this `end` may
-/// precede it.
-fn level(text: &[u8], end: Side) -> Option<f32> {
+/// precede it. Returns the reason as an error if the line is invalid.
+fn level(text: &[u8], end: Side) -> Result<f32, String> {
     let words = lines::words(text)?;
     match words.as_slice() {
         [whose, power @ ..] if *whose == name(end) => lines::power_w(power),

@@ -43,20 +43,20 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             let digest = upload.id().digest;
             let sites = upload.sites();
             let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
-            let what = format_args!("version {version}, mission digest 0x{digest:04x}{sites}");
+            let what = format_args!("version {version} of the mission, digest 0x{digest:04x}{sites}");
             log.line(now, "offering", what);
         }
         Progress::Stored { by } => log.line(
             now,
             "stored",
-            format_args!("relay {by} has stored version {version}; the station asks relay {by} which version the chain flies, until it is this one"),
+            format_args!("relay {by} has stored version {version} of the mission; the station asks relay {by} which version the chain flies, until it is version {version}"),
         ),
         Progress::Adopted { by } => log.event(
             now,
             "adopted",
             json!({ "version": version, "flown_by": 1, "relays": all }),
             format_args!(
-                "relay {by} flies version {version}, as the first of {all} relays; the station asks relay {by} how many relays fly it, until all do"
+                "relay {by} flies version {version} of the mission, as the first of {all} relays; the station asks relay {by} how many relays fly it, until all do"
             ),
         ),
         Progress::Flown { by, view, relays } => log.event(
@@ -64,7 +64,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             "flown",
             json!({ "version": version, "flown_by": relays, "relays": all }),
             format_args!(
-                "{relays} of {all} relays fly version {version}, as relay {by} reports for the present members of the chain (view {})",
+                "{relays} of {all} relays fly version {version} of the mission, as relay {by} reports for the present members of the chain (view {})",
                 view.number()
             ),
         ),
@@ -97,8 +97,12 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     let fields = json!({ "relay": by, "version": version, "flies": flies });
     let what = match (version, flies) {
         (0, _) => format!("relay {by} flies the mission loaded before flight"),
-        (_, true) => format!("relay {by} flies version {version}"),
-        (_, false) => format!("relay {by} has stored version {version}, but does not fly it yet"),
+        (_, true) => format!("relay {by} flies version {version} of the mission"),
+        (_, false) => {
+            format!(
+                "relay {by} has stored version {version} of the mission, but does not fly it yet"
+            )
+        }
     };
     log.event(now, "current", fields, what);
 }
@@ -209,10 +213,12 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
     let seconds = plan.options.timeout;
     let state = match progress {
         Progress::Stored { by } => {
-            format!("relay {by} has stored version {version}, but the chain does not fly it yet")
+            format!(
+                "relay {by} has stored version {version} of the mission, but the chain does not fly it yet"
+            )
         }
         Progress::Adopted { by } => format!(
-            "relay {by} flies version {version}, but has not reported that all other relays do, too"
+            "relay {by} flies version {version} of the mission, but has not reported that all other relays do, too"
         ),
         // The ground has only asked so far.
         Progress::Idle => format!(
@@ -220,7 +226,7 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
             likely_reason(plan, ground.stats())
         ),
         _ => format!(
-            "no relay is known to have stored version {version}: {}",
+            "no relay is known to have stored version {version} of the mission: {}",
             likely_reason(plan, ground.stats())
         ),
     };

@@ -265,10 +265,13 @@ pub(crate) fn refused(error: ConfigError) {
 #[cfg(feature = "auth")]
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
-        info!("frames are signed; epoch (start counter) {=u32}", epoch);
+        info!(
+            "frames are signed; epoch {=u32}, a number that is larger at every start",
+            epoch
+        );
     } else {
         error!(
-            "frames are signed; epoch (start counter) {=u32}, which cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch {=u32}, a number that must be larger at every start, but cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }

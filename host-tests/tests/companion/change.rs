@@ -73,10 +73,11 @@ fn a_later_upload_is_based_on_the_flown_mission() {
     let changes = lines_of_event(&ended, "change");
     assert_eq!(
         changes[0],
-        "receiver: 47.4100000,8.5500000,431.000 -> 47.4120000,8.5520000,433.000"
+        "new mission, receiver: 47.4100000,8.5500000,431.000 -> 47.4120000,8.5520000,433.000"
     );
     assert!(
-        changes[1].starts_with("distance: 1343.795 m -> 16"),
+        changes[1]
+            .starts_with("new mission, distance from transmitter to receiver: 1343.795 m -> 16"),
         "{changes:?}"
     );
     assert_eq!(changes.len(), 2, "{changes:?}");
@@ -90,9 +91,9 @@ fn a_later_upload_is_based_on_the_flown_mission() {
     let ended = bench.uploads("2", &format!("{new} --dry-run")).succeeds();
     assert_eq!(
         lines_of_event(&ended, "current"),
-        ["relay 1 flies version 1"]
+        ["relay 1 flies version 1 of the mission"]
     );
-    let change = "interferer: 80 W at x 500 m, y 400 m -> 80 W at x 700 m, y -300 m";
+    let change = "new mission, interferer: 80 W at x 500 m, y 400 m -> 80 W at x 700 m, y -300 m";
     assert_eq!(lines_of_event(&ended, "change"), [change]);
     let moves = lines_of_event(&ended, "move");
     assert_eq!(
@@ -136,7 +137,7 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     assert_eq!(error, line);
     assert_eq!(
         lines_of_event(&ended, "change")[0],
-        "altitude: 20 m -> 50 m"
+        "new mission, altitude: 20 m -> 50 m"
     );
     let moves = lines_of_event(&ended, "move");
     assert!(
@@ -167,7 +168,7 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
         assert!(error.starts_with(why), "{error}");
         assert_eq!(
             lines_of_event(&lines, "change")[0],
-            "altitude: 20 m -> 50 m"
+            "new mission, altitude: 20 m -> 50 m"
         );
         assert!(lines_of_event(&lines, "dry run").is_empty(), "{lines:?}");
     }
@@ -184,14 +185,14 @@ fn an_upload_based_on_loaded_values_shows_reverted_keys() {
     let moved = "--new-interferer 80,700,-300 --yes";
     bench.uploads("1", moved).succeeds();
     bench.0.lines("adopted: the chain flies version 1");
-    let altitude = "altitude: 20 m -> 30 m";
+    let altitude = "new mission, altitude: 20 m -> 30 m";
     for (from, expected) in [
         ("", &[altitude][..]),
         (
             "--from-loaded",
             &[
                 altitude,
-                "interferer: 80 W at x 700 m, y -300 m -> 80 W at x 500 m, y 400 m",
+                "new mission, interferer: 80 W at x 700 m, y -300 m -> 80 W at x 500 m, y 400 m",
             ],
         ),
     ] {
@@ -199,7 +200,7 @@ fn an_upload_based_on_loaded_values_shows_reverted_keys() {
         let lines = bench.uploads("2", &more).succeeds();
         assert_eq!(
             lines_of_event(&lines, "current"),
-            ["relay 1 flies version 1"]
+            ["relay 1 flies version 1 of the mission"]
         );
         assert_eq!(lines_of_event(&lines, "change"), expected);
     }
@@ -207,7 +208,7 @@ fn an_upload_based_on_loaded_values_shows_reverted_keys() {
     let lines = bench.uploads("2", "--from-loaded --yes").succeeds();
     assert_eq!(
         lines_of_event(&lines, "change"),
-        ["interferer: 80 W at x 700 m, y -300 m -> 80 W at x 500 m, y 400 m"]
+        ["new mission, interferer: 80 W at x 700 m, y -300 m -> 80 W at x 500 m, y 400 m"]
     );
     bench.0.lines("adopted: the chain flies version 2");
 }

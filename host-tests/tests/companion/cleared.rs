@@ -96,7 +96,7 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     let still = Instant::now();
     drones.fly_until(|_| still.elapsed() > Duration::from_secs(2));
     assert!(drones.at[1][0] <= 46.0, "{:?}", drones.at);
-    let said = "relay 3 is cleared: this relay no longer keeps clear of lost relays downstream (toward Rx)";
+    let said = "relay 3 is cleared: the operator reported that it has landed, so this relay no longer keeps clear of lost relays downstream (toward Rx)";
     assert_eq!(
         commanded(&socket, "clear-lost 3\n"),
         (true, said.to_owned())
@@ -157,7 +157,7 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     drone.order("clear 2");
     answer(&drone, 0);
     relay.line(
-        "cleared: relay 2 is cleared: this relay no longer keeps clear of lost relays downstream (toward Rx) (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
+        "cleared: relay 2 is cleared: the operator reported that it has landed, so this relay no longer keeps clear of lost relays downstream (toward Rx) (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
     );
     assert_eq!(status_of(&socket)["relay"]["lost"], json!([]));
 }

@@ -142,7 +142,7 @@ fn overrides_by_the_command_line_are_logged_once() {
         let mut said = overrides(start(&file, &format!("--index 1 {shared} {more}")));
         let last = said.pop().unwrap();
         assert!(
-            last.starts_with(&format!("{shared} replaces --upstream ")),
+            last.starts_with(&format!("{shared} is used instead of --upstream ")),
             "{last}"
         );
         said.sort();
@@ -151,9 +151,9 @@ fn overrides_by_the_command_line_are_logged_once() {
     assert_eq!(
         said("--altitude 23 --network=12 --interferer 80,1,2"),
         [
-            format!("--altitude 23 replaces 33.3 of {file}"),
-            format!("--interferer 80,1,2 replaces 55.5,987.6,-321 of {file}"),
-            format!("--network 12 replaces 4711 of {file}"),
+            format!("--altitude 23 is used instead of the value 33.3 in {file}"),
+            format!("--interferer 80,1,2 is used instead of the value 55.5,987.6,-321 in {file}"),
+            format!("--network 12 is used instead of the value 4711 in {file}"),
         ]
     );
     // The same number in another notation is no difference, and neither is a value that the file lacks.
@@ -170,8 +170,8 @@ fn overrides_by_the_command_line_are_logged_once() {
     assert_eq!(
         said,
         [
-            format!("--altitude 25 replaces 20 of {field}"),
-            format!("--interferer 80,500,400 replaces [field] of {field}"),
+            format!("--altitude 25 is used instead of the value 20 in {field}"),
+            format!("--interferer 80,500,400 is used instead of the section [field] in {field}"),
         ]
     );
 

@@ -171,7 +171,9 @@ fn led_to_its_place(kind: &str, key: Option<&str>) -> (Flight, Site) {
 fn is_switched_off_and_on(flight: &mut Flight) {
     flight.drone.order("reboot");
     flight.relay.line("autopilot: on the ground, or not armed");
-    flight.relay.line("autopilot: restarted");
+    flight.relay.line(
+        "autopilot: rebooted; setpoint control begins when the pilot chooses OFFBOARD or GUIDED again in the air",
+    );
     flight.drone.forget();
     assert!(flight.targets_for(MOMENT).is_empty(), "it is on the ground");
 }

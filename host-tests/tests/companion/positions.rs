@@ -72,14 +72,16 @@ fn invalid_position_lines_are_counted_and_logged_once() {
         &fifo,
         &format!("x y z\n\n1 2\n1 2 3 4\n1 2 NaN\n1 2 inf\n{long}\n"),
     );
-    relay.line("position: \"x y z\" is not x_m y_m altitude_m");
+    relay.line(
+        "position: the line \"x y z\" is ignored: \"x\" is not a number; a valid line is x_m y_m altitude_m; ",
+    );
     // A line that arrives in pieces: each piece alone would be counted as an invalid line.
     write(&fifo, "900 0");
     write(&fifo, " 20\nnonsense\n");
     relay.line("setpoint: ");
     let said = relay.stopped();
     let times = |part: &str| said.iter().filter(|line| line.contains(part)).count();
-    assert_eq!(times("is not x_m"), 1, "{said:?}");
+    assert_eq!(times("a valid line is x_m"), 1, "{said:?}");
     assert!(
         times("position: 8 lines of --positions were invalid") > 0,
         "{said:?}"

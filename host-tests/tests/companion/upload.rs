@@ -54,7 +54,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
         assert!(!chain.files.path("upload1").exists());
         let ends = format!("--end tx --tty {}", chain.tx.as_ref().unwrap().tty(0));
         let last = ground(&chain.files, "3", &ends).succeeds().pop().unwrap();
-        let flown = "flown: 2 of 2 relays fly version 3, as relay ";
+        let flown = "flown: 2 of 2 relays fly version 3 of the mission, as relay ";
         assert!(last.contains(flown), "{last}");
         // Both log lines come before the ground station's.
         chain.lines("uploaded: version 3 of the mission was received and stored");
@@ -87,7 +87,7 @@ fn a_relay_without_its_upload_is_offered_it_again() {
     chain.lines("converged: ");
     let ends = format!("--shared --end rx --tty {station}");
     let last = ground(&chain.files, "1", &ends).succeeds().pop().unwrap();
-    let flown = "flown: 2 of 2 relays fly version 1, as relay ";
+    let flown = "flown: 2 of 2 relays fly version 1 of the mission, as relay ";
     assert!(last.contains(flown), "{last}");
     chain.settles_at(&uploaded);
     let kept = chain.files.path("upload2");
@@ -163,7 +163,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
         rx.tty(1)
     ));
     let line = station.line("adopted: ");
-    let first = "adopted: relay 3 flies version 5, as the first of 3 relays; the station asks relay 3 how many relays fly it, until all do";
+    let first = "adopted: relay 3 flies version 5 of the mission, as the first of 3 relays; the station asks relay 3 how many relays fly it, until all do";
     assert!(line.ends_with(first), "{line}");
     assert_eq!(*state.lock().unwrap(), Wire::Cut);
     // Several polls later the others still do not fly it.
@@ -176,7 +176,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
     *state.lock().unwrap() = Wire::Open;
     let line = station.line("flown: ");
     assert!(
-        line.contains("flown: 3 of 3 relays fly version 5, as relay "),
+        line.contains("flown: 3 of 3 relays fly version 5 of the mission, as relay "),
         "{line}"
     );
     station.succeeds();

@@ -38,10 +38,13 @@ pub(crate) fn unsigned() {
 /// Logs the signing epoch, a number that rises at every start. `is_stored` is true if the flash has stored it.
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
-        info!("frames are signed; epoch (start counter) {}", epoch);
+        info!(
+            "frames are signed; epoch {}, a number that is larger at every start",
+            epoch
+        );
     } else {
         error!(
-            "frames are signed; epoch (start counter) {}, which cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch {}, a number that must be larger at every start, but cannot be stored: raise it in the configuration block before the next start",
             epoch
         );
     }

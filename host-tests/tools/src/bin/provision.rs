@@ -464,7 +464,9 @@ fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
 /// Users must not rely on a value of the file that is not used.
 fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
     let say = |option: &str, key: &str| {
-        command::print_line(&format!("{option} replaces network.{key} of {name}"));
+        command::print_line(&format!(
+            "{option} is used instead of network.{key} in {name}"
+        ));
     };
     if let (Some(given), Some(own)) = (options.probe_after_ms, section.probe_after_ms)
         && given != own
@@ -516,7 +518,7 @@ fn chosen_method(
                 ));
             }
             command::print_line(&format!(
-                "--method {said} replaces network.method = \"{text}\" of {name}"
+                "--method {said} is used instead of network.method = \"{text}\" in {name}"
             ));
             Ok(method)
         }

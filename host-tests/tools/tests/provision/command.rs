@@ -190,17 +190,17 @@ fn the_block_has_the_networks_method_and_baud() {
     assert!(!said.contains("--method"), "{said}");
     let (method, said) = written(&joint, "--method align");
     assert_eq!(method, Method::Align);
-    let line = "--method align replaces network.method = \"joint\" of ";
+    let line = "--method align is used instead of network.method = \"joint\" in ";
     assert!(said.starts_with(line), "{said}");
     let others = network("id = 9\nrelays = 7\nprobe_after_ms = 5000\ndead_after_ms = 15000");
     let (_, said) = written(&others, "--network 3");
     let lines: Vec<&str> = said.lines().collect();
     assert!(
-        lines[0].starts_with("--network 3 replaces network.id = 9 of "),
+        lines[0].starts_with("--network 3 is used instead of network.id = 9 in "),
         "{said}"
     );
     assert!(
-        lines[1].starts_with("--uavs 5 replaces network.relays = 7 of "),
+        lines[1].starts_with("--uavs 5 is used instead of network.relays = 7 in "),
         "{said}"
     );
     let (_, said) = written(&network("id = 9\nrelays = 5"), "--network 9");
