@@ -440,7 +440,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the part of the line from `start_m` to the next point of the field, but at most to `end_m`, m.
+    /// Returns the part of the line from `start_m`, m, to the next point of the field or to `end_m`.
     #[inline(never)] // one copy for all loops
     fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {

@@ -498,7 +498,7 @@ mod tests {
         }
     }
 
-    /// Checks that the last unknown is 0 if its pivot is too small, and that the other three solve their equations.
+    /// Checks that the last unknown is 0 if its pivot is too small. The others solve their equations.
     #[test]
     fn an_unknown_that_is_not_seen_is_left_out() {
         let factor = factor(10.0);
