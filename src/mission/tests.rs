@@ -29,6 +29,7 @@ pub(crate) fn paper(relays: u16) -> MissionConfig {
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     }
 }

@@ -66,6 +66,9 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
         add(&mut crc, &c.reverse.to_le_bytes());
         add(&mut crc, &c.rx_power_w.to_le_bytes());
     }
+    if cfg!(feature = "altitude") && c.fitted_gap > 0.0 {
+        add(&mut crc, &c.fitted_gap.to_le_bytes());
+    }
     low_half(crc.finalize())
 }
 

@@ -159,6 +159,8 @@ pub enum ConfigError {
     Listen,
     /// Traffic from receiver to transmitter, which the joint method does not support.
     Reverse,
+    /// Fitted slots, which need the joint method and a known interferer.
+    Fitted,
     /// Interferer in a block that also gives the interference as a distribution along x.
     Interferer,
     /// Number of points of the interference's distribution along x exceeds the capacity of a block.

@@ -11,6 +11,7 @@ use super::turn::TurnPass;
 use crate::mission::Profile;
 use crate::node::context::Context;
 use crate::node::sample::Meter;
+use crate::optimiser::joint::fitted::SlotShares;
 use crate::optimiser::joint::{MOST_SOLVED, Solver};
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::local::HopEnd;
@@ -54,6 +55,8 @@ pub(super) struct JointPlace {
     /// True if every relay goes as far along the pass as the target SIR permits (a plain pass). False if relays may
     /// stop before that x to help the next hop.
     pub(super) plain: bool,
+    /// x of this relay, m, and the shares of its slots; `None` unless the mission has fitted slots.
+    pub(super) fitted: Option<(f32, SlotShares)>,
 }
 
 /// State of one relay in the placement algorithms: current pass, own position, and the leader's task.
@@ -76,6 +79,8 @@ pub(crate) struct Computation {
     /// the end of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
+    /// Shares of this relay's slots at the agreed positions; `None` unless they were fitted.
+    pub(super) slot_shares: Option<SlotShares>,
     /// Average of the measured interference at the agreed position. Used only if the interference is a field (a known
     /// distribution along x).
     pub(super) meter: Meter,
@@ -108,6 +113,7 @@ impl Computation {
             cross_section: profile.on_line().cross_section,
             after: None,
             agreed_place: None,
+            slot_shares: None,
             meter: Meter::new(settings.measure),
             sensing: Sensing::new(settings.listen, now),
             target: None,
@@ -133,6 +139,7 @@ impl Computation {
 
     pub(crate) const fn discard_agreed_place(&mut self) {
         self.agreed_place = None;
+        self.slot_shares = None;
         self.after = None;
     }
 

@@ -209,6 +209,7 @@ impl Computation {
             measured_per_w: self.meter.published(),
             plain: chosen && there.is_none_or(|there| there.plain),
             end_m: there.map(|there| there.end_m),
+            fixed_m: there.and_then(|there| Some(there.fitted?.0)),
         }
     }
 
@@ -240,12 +241,14 @@ impl Computation {
         let target = if let Ok(target) = solved {
             let end_m = chain.end_m(mission, &seat_of, index);
             let (solved, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
+            let fitted = chain.fitted(mission, &seat_of, index);
             // The solver used the common profile, if this relay's own has not been collected yet.
             let cross_section = self.seat(context).room.nearest(solved);
             self.chosen = Some(JointPlace {
                 cross_section,
                 end_m,
                 plain,
+                fitted,
             });
             target
         } else {
@@ -264,6 +267,7 @@ impl Computation {
                 .nearest(self.profile.on_line().cross_section),
             end_m: context.mission().end_for(context.index(), 0.0),
             plain: true,
+            fitted: None,
         });
     }
 

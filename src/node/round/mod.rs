@@ -28,6 +28,7 @@ use super::context::{Context, Effects, LayerEvent, Member, Peer};
 use super::context::{PAUSE, earliest};
 use super::sample::{Meter, Sample};
 use crate::mission::Profile;
+use crate::optimiser::joint::fitted::SlotShares;
 use crate::place::Placement;
 use crate::settings::Settings;
 use crate::time::Instant;
@@ -302,6 +303,10 @@ impl Round {
     /// Returns the agreed position; `None` before an agreement. The guard may limit the setpoint on the way there.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
+    }
+
+    pub(crate) const fn slot_shares(&self) -> Option<SlotShares> {
+        self.computation.slot_shares
     }
 
     pub(crate) const fn meter(&self) -> &Meter {
