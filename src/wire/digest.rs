@@ -57,16 +57,18 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
         add(&mut crc, &band.least_m.to_le_bytes());
         add(&mut crc, &band.most_m.to_le_bytes());
     }
+    let fits = cfg!(feature = "altitude") && c.fitted_gap > 0.0;
     // Noise of 0 is omitted, so that missions without noise keep their earlier digest.
-    if c.noise_w > 0.0 {
+    if c.noise_w > 0.0 || fits {
         add(&mut crc, &c.noise_w.to_le_bytes());
     }
     // Likewise for the way back. With noise or without it, the two numbers make the input longer by eight bytes.
-    if cfg!(feature = "reverse") && c.reverse > 0.0 {
+    if cfg!(feature = "reverse") && c.reverse > 0.0 || fits {
         add(&mut crc, &c.reverse.to_le_bytes());
         add(&mut crc, &c.rx_power_w.to_le_bytes());
     }
-    if cfg!(feature = "altitude") && c.fitted_gap > 0.0 {
+    // Fitted slots make the input longer than all others.
+    if fits {
         add(&mut crc, &c.fitted_gap.to_le_bytes());
     }
     low_half(crc.finalize())

@@ -27,10 +27,7 @@ fn fitted(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Vec<(Placement, S
     let mut solver = Solver::<100, 10>::new(mission).unwrap();
     while solver.step(mission, &seat_of) == Poll::Pending {}
     (1..=mission.relays())
-        .map(|index| {
-            let (x_m, shares) = solver.fitted(mission, &seat_of, index).unwrap();
-            (solver.at(index, seat_of(index)).at(x_m), shares)
-        })
+        .map(|index| solver.fitted(mission, &seat_of, index).unwrap())
         .collect()
 }
 
@@ -75,7 +72,11 @@ fn places_on_the_line_carry_what_the_shortest_path_carries() {
             "SEED={seed}: {predicted} {own}"
         );
         if best / own < 0.999 {
-            println!("SEED={seed}: {:.5} of {case:?}", best / own);
+            println!(
+                "SEED={seed}: {:.5} of {case:?}\n{x:.1?}\n{:.1?}",
+                best / own,
+                times.refined(table.start(case.relays).unwrap()).1
+            );
         }
         shares.push(best / own);
     }
@@ -131,9 +132,10 @@ fn free_places_carry_no_less() {
         let places: Vec<Placement> = found.iter().map(|(at, _)| *at).collect();
         check_limits(&free, &places);
         let rate = rate_of(&places);
+        let predicted = f64::from(found[0].1.bits_per_hz);
         assert!(
-            (f64::from(found[0].1.bits_per_hz) / rate - 1.0).abs() < 1e-4,
-            "SEED={seed}"
+            (predicted / rate - 1.0).abs() < 1e-4,
+            "SEED={seed}: {predicted} {rate} {places:?} {case:?}"
         );
         let on_line: Vec<Placement> = fitted(&line, &powers).iter().map(|(at, _)| *at).collect();
         by_line.push(rate / rate_of(&on_line));

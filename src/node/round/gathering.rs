@@ -240,15 +240,18 @@ impl Computation {
         let index = context.index();
         let target = if let Ok(target) = solved {
             let end_m = chain.end_m(mission, &seat_of, index);
-            let (solved, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
             let fitted = chain.fitted(mission, &seat_of, index);
+            let (solved, plain) = match fitted {
+                Some((at, _)) => (at.cross_section(), true),
+                None => (chain.at(index, seat_of(index)), !chain.holds_back()),
+            };
             // The solver used the common profile, if this relay's own has not been collected yet.
             let cross_section = self.seat(context).room.nearest(solved);
             self.chosen = Some(JointPlace {
                 cross_section,
                 end_m,
                 plain,
-                fitted,
+                fitted: fitted.map(|(at, shares)| (at.x_m, shares)),
             });
             target
         } else {

@@ -19,10 +19,9 @@
 
 use super::chain::{Seat, SolverContext};
 use super::hop::{Triple, minus};
-use super::site::{Cell, Cells};
 use crate::mission::{Band, FINEST_STEP};
 use crate::optimiser::search::Infeasible;
-use crate::place::CrossSection;
+use crate::place::{CrossSection, Placement};
 use crate::sir::{Sender, in_noise, square, transmitter_gain};
 use core::f32::consts::LN_2;
 use core::task::Poll;
@@ -34,8 +33,6 @@ const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
 /// Bits of a state's number in the stored choices of a relay.
 const BITS: usize = 3;
 
-/// First width of the moves, as a fraction of the distance from Tx to Rx.
-const WIDEST: f32 = 1.0 / 16.0;
 /// Width of the moves at which the search of one initial chain ends.
 const NARROWEST: f32 = 1.0 / 131_072.0;
 /// Relative gain of a round of passes below which the width is halved.
@@ -51,15 +48,17 @@ const OTHERS_AT_ONCE: u16 = 10;
 /// Amount added to each squared hop length, in units of D^2, so that no time is 0.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first and last x of the relays, as fractions of the distance from Tx to Rx. Relays whose first x is
-/// their last are gathered there, at their minimum separation.
-const STARTS: [[f32; 2]; 6] = [
-    [0.5, 0.5],
-    [0.0, 1.0],
-    [0.0, 0.0],
-    [1.0, 1.0],
-    [0.5, 1.0],
-    [0.0, 0.5],
+/// Initial chains: first and last x of the relays, and first width of the moves, as fractions of the distance from Tx
+/// to Rx. Relays whose first x is their last are gathered there, at their minimum separation.
+const STARTS: [[f32; 3]; 8] = [
+    [0.5, 0.5, 0.125],
+    [0.0, 1.0, 0.125],
+    [0.0, 0.0, 0.125],
+    [1.0, 1.0, 0.125],
+    [0.5, 1.0, 0.125],
+    [0.0, 0.5, 0.125],
+    [0.0, 0.0, 0.007_812_5],
+    [1.0, 1.0, 0.007_812_5],
 ];
 /// Cross-sections of the initial chains: fractions of the largest lateral offset away from the interferer, and of the
 /// altitude band above the common altitude.
@@ -167,8 +166,6 @@ enum Work {
     Pass(u16),
     /// Way back toward Tx, on which the relays move. The fields are the next relay and its state.
     Back(u16, u8),
-    /// Storage of the best chain. The field is the number of relays that are done.
-    Keep(u16),
     /// Summation of the best chain's time, and its worst SIR. The field is the next node.
     Sum(u16),
 }
@@ -177,10 +174,9 @@ enum Work {
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
-    x: [f32; RELAYS],
-    pub(super) cells: Cells<RELAYS>,
-    best_x: [f32; RELAYS],
-    best_cells: Cells<RELAYS>,
+    /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
+    places: [Triple; RELAYS],
+    best_places: [Triple; RELAYS],
     /// Best state of the relay before, for each state of a relay: three bits each.
     choices: [u16; RELAYS],
     front: [State; STATES],
@@ -212,10 +208,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             from_tx: 0.0,
             from_rx: 0.0,
         },
-        x: [0.0; RELAYS],
-        cells: Cells::NEW,
-        best_x: [0.0; RELAYS],
-        best_cells: Cells::NEW,
+        places: [[0.0; 3]; RELAYS],
+        best_places: [[0.0; 3]; RELAYS],
         choices: [0; RELAYS],
         front: [State::NONE; STATES],
         work: Work::Begin(0),
@@ -240,26 +234,13 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
                 if !(self.best > 0.0) {
                     return Poll::Ready(Err(Infeasible));
                 }
-                (self.x, self.cells) = (self.best_x, self.best_cells);
+                self.places = self.best_places;
                 (self.time, self.worst) = (0.0, f32::INFINITY);
                 self.work = Work::Sum(1);
             }
             Work::Begin(done) => self.begin(chain, done),
             Work::Pass(index) => self.pass(chain, index),
             Work::Back(index, state) => self.back(chain, index, state),
-            Work::Keep(done) => {
-                let end = (done + OTHERS_AT_ONCE).min(relays);
-                let after = end + 1;
-                for index in done + 1..after {
-                    self.best_cells.set(index, self.cells.get(index));
-                }
-                if end < relays {
-                    self.work = Work::Keep(end);
-                } else {
-                    (self.best_x, self.best) = (self.x, self.time);
-                    self.next_start();
-                }
-            }
             Work::Sum(index) => {
                 let end = (index + OTHERS_AT_ONCE).min(relays + 2);
                 for index in index..end {
@@ -275,11 +256,6 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    fn next_start(&mut self) {
-        self.number += 1;
-        self.work = Work::Begin(0);
-    }
-
     /// Sets relays after the first `done` ones to their positions in the current initial chain.
     fn begin(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) {
         let config = chain.mission.config();
@@ -288,7 +264,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             self.gains = Gains::new(chain);
         }
         let number = usize::from(self.number);
-        let [first, last] = *STARTS.get(number % STARTS.len()).unwrap_or(&[0.0, 1.0]);
+        let [first, last, width] = *STARTS.get(number % STARTS.len()).unwrap_or(&[0.0; 3]);
         let [aside, up] = *ACROSS.get(number / STARTS.len()).unwrap_or(&[0.0; 2]);
         let step = chain.mission.step_with_room(0.0) / config.distance_m;
         let gathered = f32::from(relays - 1) * step;
@@ -312,21 +288,25 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
                 y_m: aside * away_m,
                 altitude_m: low_m + up * (room.band.most_m - low_m),
             };
-            self.set(index, x.min(1.0), Cell::of(room.nearest(place), room));
+            let place = room.nearest(place);
+            let unit = 1.0 / config.distance_m;
+            self.set(
+                index,
+                [x.min(1.0), place.y_m * unit, place.altitude_m * unit],
+            );
         }
         self.work = if end < relays {
             Work::Begin(end)
         } else {
-            (self.rounds, self.axis, self.width) = (0, 0, WIDEST);
+            (self.rounds, self.axis, self.width) = (0, 0, width);
             (self.time, self.before) = (f32::INFINITY, f32::INFINITY);
             Work::Pass(1)
         };
     }
 
-    fn set(&mut self, index: u16, x: f32, cell: Cell) {
-        self.cells.set(index, cell);
-        if let Some(kept) = self.x.get_mut(usize::from(index).wrapping_sub(1)) {
-            *kept = x;
+    fn set(&mut self, index: u16, at: Triple) {
+        if let Some(place) = self.places.get_mut(usize::from(index).wrapping_sub(1)) {
+            *place = at;
         }
     }
 
@@ -334,8 +314,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     /// is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, by: f32) -> Spot {
-        let x = self.x.get(usize::from(index).wrapping_sub(1));
-        let Some(&x) = x.filter(|_| index <= chain.mission.relays()) else {
+        let place = self.places.get(usize::from(index).wrapping_sub(1));
+        let Some(&place) = place.filter(|_| index <= chain.mission.relays()) else {
             let x = if index > 0 { 1.0 } else { 0.0 };
             return Spot {
                 at: [x, 0.0, 0.0],
@@ -344,8 +324,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
         let unit = 1.0 / chain.distance_m();
         let room = (chain.seat_of)(index).room;
-        let at = self.cells.get(index).place(room);
-        let mut at = [x, at.y_m * unit, at.altitude_m * unit];
+        let mut at = place;
         let limits = |band: Band| [band.least_m * unit, band.most_m * unit];
         let limits = [[0.0, 1.0], limits(room.lateral), limits(room.band)];
         let axis = usize::from(self.axis);
@@ -416,14 +395,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         let mut state = usize::from(state);
         for index in (end + 1..=index).rev() {
             let by = MOVES.get(state).copied().unwrap_or_default();
-            let [x, y, h] = self.spot(chain, index, by * self.width).at;
-            let distance_m = chain.distance_m();
-            let at = CrossSection {
-                y_m: y * distance_m,
-                altitude_m: h * distance_m,
-            };
-            let cell = Cell::of(at, (chain.seat_of)(index).room);
-            self.set(index, x, cell);
+            let Spot { at, .. } = self.spot(chain, index, by * self.width);
+            self.set(index, at);
             let choices = self.choices.get(usize::from(index - 1));
             state = usize::from(choices.copied().unwrap_or_default() >> (BITS * state) & 7);
         }
@@ -454,11 +427,12 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
         self.work = if self.width >= NARROWEST && self.rounds < ROUNDS {
             Work::Pass(1)
-        } else if self.time < f32::INFINITY && !(self.best > 0.0 && self.best <= self.time) {
-            Work::Keep(0)
         } else {
-            self.next_start();
-            return;
+            if self.time < f32::INFINITY && !(self.best > 0.0 && self.best <= self.time) {
+                (self.best_places, self.best) = (self.places, self.time);
+            }
+            self.number += 1;
+            Work::Begin(0)
         };
     }
 
@@ -482,16 +456,22 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the x of relay `index`, m, and the shares of its slots, once the chain is solved.
+    /// Returns the position of relay `index`, and the shares of its slots, once the chain is solved.
     pub(super) fn place(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         index: u16,
-    ) -> (f32, SlotShares) {
+    ) -> (Placement, SlotShares) {
         let [from_tx, to_tx] = self.hop_times(chain, index);
         let [to_rx, from_rx] = self.hop_times(chain, index + 1);
         let bits_per_hz = 1.0 / self.time;
-        let [x, ..] = self.spot(chain, index, 0.0).at;
+        let [x_m, y_m, altitude_m] = self
+            .spot(chain, index, 0.0)
+            .at
+            .map(|d| d * chain.distance_m());
+        let at = (chain.seat_of)(index)
+            .room
+            .nearest(CrossSection { y_m, altitude_m });
         let shares = SlotShares {
             to_rx: to_rx * bits_per_hz,
             to_tx: to_tx * bits_per_hz,
@@ -499,7 +479,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             from_rx: from_rx * bits_per_hz,
             bits_per_hz,
         };
-        (x * chain.distance_m(), shares)
+        (at.at(x_m), shares)
     }
 }
 

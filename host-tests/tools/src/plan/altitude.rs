@@ -63,10 +63,7 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
         }
     };
     if mission.fitted_gap() > 0.0 {
-        let place = |index| {
-            let (x_m, _) = solver.fitted(mission, &seat_of, index)?;
-            Some(solver.at(index, seat_of(index)).at(x_m))
-        };
+        let place = |index| Some(solver.fitted(mission, &seat_of, index)?.0);
         return (1..=mission.relays()).map(place).collect();
     }
     let own_of = |index| {

@@ -291,7 +291,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         match &self.0 {
             Way::OneWay(solver) => Some(&solver.cells),
             Way::Both(solver) => solver.first().map(|both| &both.interior.cells),
-            Way::Fitted(solver) => solver.first().map(|fitted| &fitted.cells),
+            Way::Fitted(_) => None,
         }
     }
 
@@ -348,14 +348,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the x of relay `index`, m, and the shares of its slots, once the chain is solved. `None` unless the
+    /// Returns the position of relay `index` and the shares of its slots, once the chain is solved. `None` unless the
     /// mission has fitted slots.
     pub fn fitted(
         &mut self,
         mission: &Mission,
         seat_of: &impl Fn(u16) -> Seat,
         index: u16,
-    ) -> Option<(f32, SlotShares)> {
+    ) -> Option<(Placement, SlotShares)> {
         let Way::Fitted(solver) = &mut self.0 else {
             return None;
         };
