@@ -130,6 +130,27 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
     assert!(Mission::try_new(paper(250)).is_ok());
 }
 
+#[test]
+fn a_gap_of_fitted_slots_is_0_or_within_1_to_1000() {
+    let with = |fitted_gap: f32| {
+        let config = MissionConfig {
+            fitted_gap,
+            ..paper(1)
+        };
+        Mission::try_new(config).map(|_| ())
+    };
+    let met = if cfg!(feature = "altitude") {
+        Ok(())
+    } else {
+        Err(MissionError::FittedFeature)
+    };
+    assert_eq!([0.0, 1.0, 1e3].map(with), [Ok(()), met, met]);
+    let low = 1.0_f32.next_down();
+    for bad in [-0.0, -1.0, low, 1e3_f32.next_up(), f32::NAN] {
+        assert_eq!(with(bad), Err(MissionError::FittedGap), "{bad}");
+    }
+}
+
 #[cfg(feature = "noise")]
 #[test]
 fn noise_that_leaves_nothing_of_the_interferer_is_refused() {

@@ -154,6 +154,10 @@ mod tests {
             assert_ne!(same, of(|c| c.noise_w = 1e-13));
         }
         assert_eq!(same, of(|c| c.rx_power_w = 5.0));
+        if cfg!(feature = "altitude") {
+            assert_ne!(same, of(|c| c.fitted_gap = 2.0));
+            assert_ne!(of(|c| c.fitted_gap = 1.0), of(|c| c.fitted_gap = 2.0));
+        }
         if cfg!(feature = "reverse") {
             let back = of(|c| c.reverse = 1.0);
             assert_ne!(same, back);

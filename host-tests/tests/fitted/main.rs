@@ -147,14 +147,13 @@ fn free_places_carry_no_less() {
             );
         }
     }
-    for (name, list) in [("line", &mut by_line), ("best SIR", &mut by_sir)] {
+    let mut lists = [("line", by_line), ("best SIR", by_sir)];
+    for (name, list) in &mut lists {
         list.sort_by(f64::total_cmp);
-        println!(
-            "rate over that of the {name}: least {:.5}, median {:.3}, most {:.1}",
-            list[0],
-            list[list.len() / 2],
-            list[list.len() - 1]
-        );
+        let [least, median, most] = [0, list.len() / 2, list.len() - 1].map(|at| list[at]);
+        println!("rate over that of the {name}: {least:.5} to {most:.1}, median {median:.3}");
+    }
+    for (name, list) in &lists {
         assert!(list[0] >= 1.0 - 1e-5, "{name}: {}", list[0]);
     }
 }

@@ -60,9 +60,13 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Cross-sections of the initial chains: fractions of the largest lateral offset away from the interferer, and of the
-/// altitude band above the common altitude.
-const ACROSS: [[f32; 2]; 3] = [[0.0, 0.0], [0.0, 0.5], [0.5, 0.0]];
+/// Number of the initial chain that is the best one along the line, if relays may leave the common altitude.
+const BEST: u8 = 8;
+/// First width of the moves of that chain.
+const BEST_WIDTH: f32 = 1.0 / 16.0;
+/// Cross-sections of the initial chains after it: fractions of the largest lateral offset away from the interferer, and
+/// of the altitude band above the common altitude.
+const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Shares of the frame time that the hops next to a relay have, with fitted slots.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -264,8 +268,13 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             self.gains = Gains::new(chain);
         }
         let number = usize::from(self.number);
-        let [first, last, width] = *STARTS.get(number % STARTS.len()).unwrap_or(&[0.0; 3]);
-        let [aside, up] = *ACROSS.get(number / STARTS.len()).unwrap_or(&[0.0; 2]);
+        let is_best = self.number == BEST;
+        let (number, across) = match number.checked_sub(STARTS.len() + 1) {
+            Some(number) => (number % STARTS.len(), ACROSS.get(number / STARTS.len())),
+            None => (number, None),
+        };
+        let [first, last, width] = *STARTS.get(number).unwrap_or(&[0.0, 0.0, BEST_WIDTH]);
+        let [aside, up] = *across.unwrap_or(&[0.0; 2]);
         let step = chain.mission.step_with_room(0.0) / config.distance_m;
         let gathered = f32::from(relays - 1) * step;
         let at = (first - 0.5 * gathered).min(1.0 - gathered).max(0.0);
@@ -290,10 +299,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             };
             let place = room.nearest(place);
             let unit = 1.0 / config.distance_m;
-            self.set(
-                index,
-                [x.min(1.0), place.y_m * unit, place.altitude_m * unit],
-            );
+            let at = [x.min(1.0), place.y_m * unit, place.altitude_m * unit];
+            let best = self.best_places.get(usize::from(index - 1));
+            self.set(index, *best.filter(|_| is_best).unwrap_or(&at));
         }
         self.work = if end < relays {
             Work::Begin(end)
@@ -411,6 +419,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     fn next_pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
         let config = chain.mission.config();
         self.axis += 1;
+        if self.number < BEST {
+            self.axis = 3;
+        }
         if self.axis == 1 && config.lateral.is_single() {
             self.axis = 2;
         }
@@ -489,7 +500,7 @@ fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
     if config.band.is_single() && config.lateral.is_single() {
         STARTS.len()
     } else {
-        STARTS.len() * ACROSS.len()
+        STARTS.len() * (1 + ACROSS.len()) + 1
     }
 }
 
