@@ -63,6 +63,19 @@ pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
     ..*HIGH.config()
 });
 
+/// Mission of three relays at one altitude for both directions in fitted slots.
+pub(crate) const FITTED: Mission = Mission::new(MissionConfig {
+    band: Band::at(20.0),
+    fitted_gap: 2.0,
+    ..*BOTH.config()
+});
+
+/// Mission of three relays with ranges of altitudes for both directions in fitted slots.
+pub(crate) const FITTED_HIGH: Mission = Mission::new(MissionConfig {
+    fitted_gap: 2.0,
+    ..*BOTH.config()
+});
+
 /// Mission of three relays that may choose altitudes, and of lateral offsets, 280 m to either side.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
