@@ -158,6 +158,24 @@ fn free_places_carry_no_less() {
     }
 }
 
+/// Checks that long chains are placed, up to the number of relays that just fit on the line with their separation.
+#[test]
+fn a_full_line_is_placed() {
+    for (relays, min_separation_m) in [(50, 4.0), (100, 4.0), (100, 10.0), (100, 10.1), (2, 999.9)]
+    {
+        let config = MissionConfig {
+            relays,
+            min_separation_m,
+            ..*Case::draw(3).mission().config()
+        };
+        let mission = Mission::try_new(config).unwrap();
+        let found = fitted(&mission, |_| Seat::common(&mission));
+        let places: Vec<Placement> = found.iter().map(|(at, _)| *at).collect();
+        check_limits(&mission, &places);
+        assert!(found[0].1.bits_per_hz > 0.0, "{relays} {min_separation_m}");
+    }
+}
+
 /// Checks that a mission with fitted slots is refused with another method than the joint one, and while listening.
 #[test]
 fn fitted_slots_need_the_joint_method() {
