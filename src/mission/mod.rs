@@ -88,11 +88,13 @@ impl MissionConfig {
         if self.reverse > 0.0 && !cfg!(feature = "reverse") {
             return Err(MissionError::ReverseFeature);
         }
-        if !(self.fitted_gap.to_bits() == 0 || within(self.fitted_gap, 1.0, 1e3)) {
-            return Err(MissionError::FittedGap);
-        }
-        if self.fitted_gap > 0.0 && !cfg!(feature = "altitude") {
-            return Err(MissionError::FittedFeature);
+        if self.fitted_gap.to_bits() != 0 {
+            if !within(self.fitted_gap, 1.0, 1e3) {
+                return Err(MissionError::FittedGap);
+            }
+            if !cfg!(feature = "altitude") {
+                return Err(MissionError::FittedFeature);
+            }
         }
         Ok(())
     }

@@ -55,8 +55,22 @@ pub(super) struct JointPlace {
     /// True if every relay goes as far along the pass as the target SIR permits (a plain pass). False if relays may
     /// stop before that x to help the next hop.
     pub(super) plain: bool,
-    /// x of this relay, m, and the shares of its slots; `None` unless the mission has fitted slots.
-    pub(super) fitted: Option<(f32, SlotShares)>,
+}
+
+/// Fitted slots of this relay; unused in a mission with equal slots.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FittedSlots {
+    /// x of this relay in its joint solution, m, and the shares of its slots there.
+    pub(super) solved: Option<(f32, SlotShares)>,
+    /// Shares of its slots at the agreed positions.
+    pub(super) agreed: Option<SlotShares>,
+}
+
+impl FittedSlots {
+    const NONE: Self = Self {
+        solved: None,
+        agreed: None,
+    };
 }
 
 /// State of one relay in the placement algorithms: current pass, own position, and the leader's task.
@@ -79,8 +93,8 @@ pub(crate) struct Computation {
     /// the end of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Shares of this relay's slots at the agreed positions; `None` unless they were fitted.
-    pub(super) slot_shares: Option<SlotShares>,
+    /// Fitted slots of this relay; no element without the feature `altitude`.
+    pub(super) fitted: [FittedSlots; ALTITUDE as usize],
     /// Average of the measured interference at the agreed position. Used only if the interference is a field (a known
     /// distribution along x).
     pub(super) meter: Meter,
@@ -113,7 +127,7 @@ impl Computation {
             cross_section: profile.on_line().cross_section,
             after: None,
             agreed_place: None,
-            slot_shares: None,
+            fitted: [FittedSlots::NONE; ALTITUDE as usize],
             meter: Meter::new(settings.measure),
             sensing: Sensing::new(settings.listen, now),
             target: None,
@@ -137,9 +151,9 @@ impl Computation {
         }
     }
 
-    pub(crate) const fn discard_agreed_place(&mut self) {
+    pub(crate) fn discard_agreed_place(&mut self) {
         self.agreed_place = None;
-        self.slot_shares = None;
+        self.set_slot_shares(None);
         self.after = None;
     }
 
@@ -174,6 +188,17 @@ impl Computation {
         self.cross_section = cross_section;
         // Samples of the previous position do not count.
         self.meter.restart();
+    }
+
+    /// Returns the shares of this relay's slots at the agreed positions; `None` unless they were fitted.
+    pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
+        self.fitted.first()?.agreed
+    }
+
+    pub(super) fn set_slot_shares(&mut self, shares: Option<SlotShares>) {
+        if let Some(fitted) = self.fitted.first_mut() {
+            fitted.agreed = shares;
+        }
     }
 
     pub(super) fn give_up(&mut self) -> Action {

@@ -238,7 +238,7 @@ impl Round {
     }
 
     /// Discards the agreed position; there is none until the next agreement.
-    pub(crate) const fn discard_agreed_place(&mut self) {
+    pub(crate) fn discard_agreed_place(&mut self) {
         self.computation.discard_agreed_place();
     }
 
@@ -305,8 +305,8 @@ impl Round {
         self.computation.agreed_place
     }
 
-    pub(crate) const fn slot_shares(&self) -> Option<SlotShares> {
-        self.computation.slot_shares
+    pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
+        self.computation.slot_shares()
     }
 
     pub(crate) const fn meter(&self) -> &Meter {
