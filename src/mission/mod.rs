@@ -89,11 +89,11 @@ impl MissionConfig {
             return Err(MissionError::ReverseFeature);
         }
         if self.fitted_gap.to_bits() != 0 {
-            if !within(self.fitted_gap, 1.0, 1e3) {
-                return Err(MissionError::FittedGap);
-            }
             if !cfg!(feature = "altitude") {
                 return Err(MissionError::FittedFeature);
+            }
+            if !within(self.fitted_gap, 1.0, 1e3) {
+                return Err(MissionError::FittedGap);
             }
         }
         Ok(())
@@ -139,7 +139,7 @@ pub enum MissionError {
     RxPower,
     /// `fitted_gap` is neither 0 nor within 1 to 1000.
     FittedGap,
-    /// `fitted_gap` is above 0, and the crate was built without its feature `altitude`.
+    /// `fitted_gap` is not 0, and the crate was built without its feature `altitude`.
     FittedFeature,
     /// `tolerance` is not within 1e-6 to 0.1.
     Tolerance,

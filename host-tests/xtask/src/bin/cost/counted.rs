@@ -156,7 +156,7 @@ const UPLOADED: &[Counted] = &[
         &["offer"],
         None,
     ),
-    ("length of its frame", "bytes", &["offer_bytes"], Some(148)),
+    ("length of its frame", "bytes", &["offer_bytes"], Some(149)),
 ];
 
 /// Row of the cost table: description, unit, names of measured figures, and budget.
