@@ -274,7 +274,7 @@ pub enum SetupError {
     Method,
     /// The mission has traffic from Rx to Tx (`reverse` above 0), which the method Joint does not support.
     Reverse,
-    /// The mission has fitted slots (`fitted_gap` above 0), for which the method must be Joint, and `listen` `None`.
+    /// The mission has fitted slots (`fitted_gap` above 0). The method must then be Joint, and `listen` `None`.
     Fitted,
     /// `method.explore_m` is not within 0 to 1e5, or its search grid has fewer than 2 columns or rows.
     Adjust,

@@ -107,8 +107,8 @@ pub struct MissionOptions {
     /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub rx_power: Option<f32>,
-    /// SNR gap of fitted slots, linear, 1 to 1000: `joint` then chooses the places of the largest data rate in slots as long as each
-    /// hop needs. 0 for equal slots
+    /// SNR gap of fitted slots, linear, 1 to 1000; 0 for equal slots. With a gap `joint` chooses the places of the largest data rate in
+    /// slots as long as each hop needs
     #[arg(long, value_name = "G", default_value_t = 0.0, allow_negative_numbers = true, value_parser = fitted_gap)]
     pub fitted_gap: f32,
     /// Minimum distance between two relays, m, 0 to 1e5

@@ -148,8 +148,9 @@ pub fn mission(
     Ok((mission, profiles))
 }
 
-/// Returns `mission` with the fitted slots of the scenario, if it has any: the mission of relays with the method
-/// `joint`. Other methods have equal slots on board.
+/// Returns `mission` with the fitted slots of the scenario, if it has any.
+///
+/// It is the mission of relays with the method `joint`. Other methods have equal slots on board.
 ///
 /// # Errors
 /// [`Refusal::Steps`] for fitted slots with a table of rate steps; [`Refusal::Mission`] if the SNR gap is out of

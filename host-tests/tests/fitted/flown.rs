@@ -51,7 +51,7 @@ fn check_shares(outcome: &Outcome, what: &str) {
     assert!((sum - 1.0).abs() < 1e-5, "{what}: {sum}");
 }
 
-/// Checks that simulated relays agree on the solver's positions and on the shares of one frame, also after a loss.
+/// Checks that simulated relays agree on the solver's positions and on the shares of one frame.
 #[test]
 fn a_chain_agrees_on_fitted_places_and_shares() {
     let first = number("SEED", 1);
@@ -76,7 +76,29 @@ fn a_chain_agrees_on_fitted_places_and_shares() {
     }
 }
 
-/// Checks that the agreed fitted slots deliver the predicted rate, in both directions for a chain of both.
+/// Checks that the remaining relays share one frame after the loss of a relay, which their slots no longer have.
+#[test]
+fn the_remaining_relays_share_the_frame_after_a_loss() {
+    let case = Case::draw(1);
+    assert!(case.relays > 5);
+    let mut setup = Setup {
+        profiles: setup(&case).profiles,
+        kills: vec![(3, Instant::from_millis(20_000))],
+        ..Setup::on_shared_channel(case.mission())
+    };
+    setup.settings.method = Method::Joint;
+    let outcome = run(setup).unwrap();
+    assert!(outcome.relays[2].killed.is_some());
+    assert!(
+        outcome
+            .relays
+            .iter()
+            .all(|relay| relay.killed.is_some() || relay.relays == case.relays - 1)
+    );
+    check_shares(&outcome, "relay 3 lost");
+}
+
+/// Checks that the agreed fitted slots deliver the predicted rate, also in both directions.
 #[test]
 fn fitted_slots_deliver_the_predicted_rate() {
     let first = number("SEED", 1);

@@ -1,4 +1,4 @@
-//! Fitted slots on board: positions and rates of the joint method, compared with the planner's exact shortest path.
+//! Fitted slots on board: positions and rates of the joint method. They are compared with the planner's shortest path.
 //!
 //! `COUNT` and `SEED` in the environment set the number of scenes and the first seed.
 #![allow(
@@ -47,7 +47,8 @@ fn check_limits(mission: &Mission, places: &[Placement]) {
     }
 }
 
-/// Checks that the relays' rate along the line is 0.999 of the planner's in 99.5 % of the scenes, and 0.98 in all.
+/// Checks that the relays' rate along the line is close to the planner's. It must be 0.999 of it in 99.5 % of the
+/// scenes, and 0.98 in all.
 #[test]
 fn places_on_the_line_carry_what_the_shortest_path_carries() {
     let first = number("SEED", 1);
@@ -92,8 +93,8 @@ fn places_on_the_line_carry_what_the_shortest_path_carries() {
     assert!(short * 200 <= shares.len() && shares[0] >= 0.98);
 }
 
-/// Checks that the rate with free altitudes and offsets is never below that at the common altitude, and never below
-/// that at the positions of the best SIR.
+/// Checks that the rate with free altitudes and offsets is not below that at the common altitude. It must not be below
+/// that at the positions of the best SIR, either.
 #[test]
 fn free_places_carry_no_less() {
     let first = number("SEED", 1);
@@ -158,7 +159,7 @@ fn free_places_carry_no_less() {
     }
 }
 
-/// Checks that long chains are placed, up to the number of relays that just fit on the line with their separation.
+/// Checks that long chains are placed, up to the number of relays that just fit on the line.
 #[test]
 fn a_full_line_is_placed() {
     for (relays, min_separation_m) in [(50, 4.0), (100, 4.0), (100, 10.0), (100, 10.1), (2, 999.9)]
@@ -176,7 +177,7 @@ fn a_full_line_is_placed() {
     }
 }
 
-/// Checks that a mission with fitted slots is refused with another method than the joint one, and while listening.
+/// Checks that a mission with fitted slots is refused with other methods, and while listening.
 #[test]
 fn fitted_slots_need_the_joint_method() {
     let config = MissionConfig {

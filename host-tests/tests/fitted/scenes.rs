@@ -24,8 +24,8 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// Draws a chain of 1 to 20 relays: one way or both, with noise or without, with the interferer on the line in a
-    /// fifth of the cases, else up to 800 m beside it.
+    /// Draws a chain of 1 to 20 relays: one way or both, with noise or without. In a fifth of the cases the interferer
+    /// is on the line, else up to 800 m beside it.
     pub(crate) fn draw(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let relays = rng.random_range(1..=20_u16);
@@ -102,7 +102,7 @@ impl Case {
         }
     }
 
-    /// Returns the time of one bit through relays at `places`, in units of 1 / bandwidth, by the true SINRs.
+    /// Returns the time of one bit through relays at `places` by the true SINRs, in 1 / bandwidth.
     pub(crate) fn time(&self, places: &[Placement]) -> f64 {
         let scene = Scene::new(&self.scenario, self.relays).unwrap();
         let places: Vec<Place> = places.iter().map(|at| (*at).into()).collect();

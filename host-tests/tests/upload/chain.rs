@@ -66,7 +66,7 @@ fn a_way_back_is_uploaded_and_flown_by_all() {
     }
 }
 
-/// Checks that all relays with the joint method fly an upload with fitted slots, and one without them after that.
+/// Checks that all relays with the joint method fly an upload that adds or removes fitted slots.
 #[test]
 fn fitted_slots_are_uploaded_and_flown_by_all() {
     let equal = *mission(5).config();

@@ -1,4 +1,4 @@
-//! Fitted slots: positions for the largest data rate of a chain whose time slots are as long as each hop needs.
+//! Fitted slots, each as long as its hop needs: positions of a chain for the largest data rate.
 //!
 //! With the spectral efficiency b = log2(1 + SINR / gap) of a hop, forward F and backward B, one bit to Rx and r bits back take
 //!
@@ -48,8 +48,8 @@ const OTHERS_AT_ONCE: u16 = 10;
 /// Amount added to each squared hop length, in units of D^2, so that no time is 0.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first and last x of the relays, and first width of the moves, as fractions of the distance from Tx
-/// to Rx. Relays whose first x is their last are gathered there, at their minimum separation.
+/// Initial chains: first and last x of the relays, and first width of the moves. All are fractions of the distance
+/// from Tx to Rx. Relays whose first x is their last are gathered there, at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -60,12 +60,12 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Number of the initial chain that is the best one along the line, if relays may leave the common altitude.
+/// Number of the initial chain that is the best one along the line. Only if relays may leave the common altitude.
 const BEST: u8 = 8;
 /// First width of the moves of that chain.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Cross-sections of the initial chains after it: fractions of the largest lateral offset away from the interferer, and
-/// of the altitude band above the common altitude.
+/// Cross-sections of the initial chains after it. The first number is a fraction of the largest lateral offset away
+/// from the interferer, the second one of the altitude band above the common altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Shares of the frame time that the hops next to a relay have, with fitted slots.
@@ -74,11 +74,11 @@ const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 pub struct SlotShares {
     /// Share of the slot in which this relay sends to the next node toward Rx.
     pub to_rx: f32,
-    /// Share of the slot in which this relay sends to the next node toward Tx; 0 in a mission of one direction.
+    /// Share of the slot in which this relay sends to the next node toward Tx. 0 in a mission of one direction.
     pub to_tx: f32,
     /// Share of the slot in which this relay receives from the next node toward Tx.
     pub from_tx: f32,
-    /// Share of the slot in which this relay receives from the next node toward Rx; 0 in a mission of one direction.
+    /// Share of the slot in which this relay receives from the next node toward Rx. 0 in a mission of one direction.
     pub from_rx: f32,
     /// Data rate of the whole chain to Rx, over the bandwidth, bit/s/Hz. The rate back is `reverse` times this.
     pub bits_per_hz: f32,
@@ -98,7 +98,8 @@ struct Gains {
     from_rx: f32,
 }
 
-/// Node of the chain at a position that is tried: the position, and the inverse interference there (1 at Tx and Rx).
+/// Node of the chain at a position that is tried: the position, and the inverse interference there. That is 1 at Tx
+/// and Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -122,7 +123,7 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains over the SNR gap, forward and backward, r, and the least squared distance.
+/// Hop between two nodes: its gains over the SNR gap, forward and backward, and r. Relays also have a least distance.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
@@ -318,8 +319,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns the position of node `index` moved by `by` along the current coordinate, and within its limits. Index 0
-    /// is Tx, and N + 1 is Rx.
+    /// Returns the position of node `index` moved by `by` along the current coordinate. The node stays within its
+    /// limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
@@ -447,7 +448,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns the times of the hop to node `index` of the current chain, and lowers `worst` to its worse SIR.
+    /// Returns the times of the hop to node `index` of the current chain. Lowers `worst` to the hop's worse SIR.
     fn hop_times(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -6,7 +6,7 @@ use uav_relay_scenario::scene::Scene;
 
 use super::{chain, example, json, refusal};
 
-/// Checks that `joint` flies fitted slots, whose rate is delivered, and that it refuses them with rate steps.
+/// Checks that `joint` flies fitted slots, and that their rate is delivered. Rate steps are refused.
 #[test]
 fn fitted_slots_are_flown_by_joint() {
     let file = std::env::temp_dir().join(format!("fitted_{}.toml", std::process::id()));
