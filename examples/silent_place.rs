@@ -33,6 +33,7 @@ const MISSION: Mission = Mission::new(MissionConfig {
     noise_w: 0.0,
     reverse: 0.0,
     rx_power_w: 80.0,
+    fitted_gap: 0.0,
     tolerance: 1e-4,
 });
 

@@ -91,6 +91,7 @@ pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfi
 pub use node::round::state::Phase;
 pub use node::sample::Sample;
 pub use node::view::record::{RecordError, ViewRecord};
+pub use optimiser::joint::fitted::SlotShares;
 pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
 pub use place::Placement;

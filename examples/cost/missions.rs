@@ -34,6 +34,7 @@ pub(crate) const fn mission(relays: u16) -> Mission {
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     })
 }
@@ -60,6 +61,19 @@ pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
 pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
     reverse: 1.0,
     ..*HIGH.config()
+});
+
+/// Mission of three relays at one altitude for both directions in fitted slots.
+pub(crate) const FITTED: Mission = Mission::new(MissionConfig {
+    band: Band::at(20.0),
+    fitted_gap: 2.0,
+    ..*BOTH.config()
+});
+
+/// Mission of three relays with ranges of altitudes for both directions in fitted slots.
+pub(crate) const FITTED_HIGH: Mission = Mission::new(MissionConfig {
+    fitted_gap: 2.0,
+    ..*BOTH.config()
 });
 
 /// Mission of three relays that may choose altitudes, and lateral offsets. The offsets from the line Tx-Rx are up to

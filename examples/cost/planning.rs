@@ -8,7 +8,7 @@ use uav_relay::planning::fleet::Fewest;
 use uav_relay::planning::single::theorems;
 
 use super::counter::instructions;
-use super::missions::{BOTH, HIGH, MISSION, WIDE};
+use super::missions::{BOTH, FITTED, FITTED_HIGH, HIGH, MISSION, WIDE};
 
 /// Measures the instructions for the paper's Theorems 1 to 3, and for the search for the fewest relays. The search
 /// finds the smallest number of relays with which every hop reaches a given SIR.
@@ -69,6 +69,9 @@ pub(crate) fn joint() {
         (&BOTH, 20, "_both"),
         (&BOTH, 50, "_both"),
         (&BOTH, 100, "_both"),
+        (&FITTED, 8, "_fitted"),
+        (&FITTED, 50, "_fitted"),
+        (&FITTED_HIGH, 8, "_fitted_high"),
     ] {
         let (total, longest_call, calls) = solve_instructions(of, relays);
         hprintln!("solved_{}{} {}", relays, suffix, total);

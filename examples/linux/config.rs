@@ -261,6 +261,11 @@ pub fn read<T: Parser>(
     let has = T::command();
     let file_only = mission_options(&scenario, &mut given)
         .map_err(|error| format!("--config {}: {error}", file.display()))?;
+    let method = value_of(&line, "--method").or_else(|| deployment.network.method.clone());
+    if method.as_deref() == Some("joint") {
+        fitted_slots(&scenario, &mut given)
+            .map_err(|error| format!("--config {}: {error}", file.display()))?;
+    }
     section(&deployment, &mut given);
     given.options.retain(|(name, _)| {
         has.get_arguments()
@@ -302,6 +307,16 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
         let word = word.to_str()?;
         word.strip_prefix("--config=").map(PathBuf::from)
     })
+}
+
+/// Adds the SNR gap of the file's fitted slots, if it has any, to the options `given`.
+fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), String> {
+    let error = |refusal: mission::Refusal| refusal.to_string();
+    let (mission, _) = mission::mission(scenario, 1, TOLERANCE).map_err(error)?;
+    let mission = mission::with_access(scenario, &mission).map_err(error)?;
+    let gap = mission.fitted_gap();
+    given.value("--fitted-gap", (gap > 0.0).then_some(gap));
+    Ok(())
 }
 
 /// Adds the mission of the file's scenario to the options `given`. Returns the settings for which there is no option.

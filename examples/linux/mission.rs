@@ -28,6 +28,17 @@ pub const NOISE_W: [f32; 2] = [0.0, 1.0];
 /// Permitted range of `--reverse`: SIR needed toward the transmitter / SIR needed toward the receiver.
 pub const REVERSE: [f32; 2] = [0.0, 1.0];
 
+/// Permitted range of `--fitted-gap` above 0: SNR gap of fitted slots, linear.
+pub const FITTED_GAP: [f32; 2] = [1.0, 1e3];
+
+fn fitted_gap(text: &str) -> Result<f32, String> {
+    if text == "0" {
+        Ok(0.0)
+    } else {
+        number(FITTED_GAP)(text)
+    }
+}
+
 /// Permitted range of the minimum separation of two relays, m.
 pub const SEPARATION_M: [f32; 2] = [0.0, 1e5];
 
@@ -96,6 +107,10 @@ pub struct MissionOptions {
     /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub rx_power: Option<f32>,
+    /// SNR gap of fitted slots, linear, 1 to 1000; 0 for equal slots. With a gap `joint` chooses the places of the largest data rate in
+    /// slots as long as each hop needs
+    #[arg(long, value_name = "G", default_value_t = 0.0, allow_negative_numbers = true, value_parser = fitted_gap)]
+    pub fitted_gap: f32,
     /// Minimum distance between two relays, m, 0 to 1e5
     #[arg(long, value_name = "M", default_value_t = 4.0, allow_negative_numbers = true, value_parser = number(SEPARATION_M))]
     pub min_separation: f32,
@@ -143,6 +158,7 @@ impl MissionOptions {
             noise_w: self.noise,
             reverse: self.reverse,
             rx_power_w: self.rx_power.unwrap_or(self.tx_power),
+            fitted_gap: self.fitted_gap,
             tolerance: 1e-4,
         })
     }

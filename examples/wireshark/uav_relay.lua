@@ -170,6 +170,7 @@ local messages = {
         { name = "noise_w", kind = "f32", unit = "W", text = "noise power at every receiver; 0 for none" },
         { name = "reverse", kind = "f32", unit = "", text = "r, the relative SIR of the way back; 0 for one direction" },
         { name = "rx_power_w", kind = "f32", unit = "W", text = "power of Rx on the way back" },
+        { name = "fitted_gap", kind = "f32", unit = "", text = "SNR gap of fitted slots; 0 for equal slots" },
         { name = "tx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Tx, positive north", per = 10000000, base = "degrees" },
         { name = "tx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Tx, positive east", per = 10000000, base = "degrees" },
         { name = "tx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Tx above mean sea level" },
@@ -245,7 +246,7 @@ local handshake = { name = "Handshake", fields = {
 
 -- What stands above is data; from here on it is read.
 
-local MOST = 143 -- bytes of a frame without COBS
+local MOST = 147 -- bytes of a frame without COBS
 local HEADER, TAG, CHECK = 10, 8, 4
 
 local proto = Proto("uav_relay", "UAV relay")

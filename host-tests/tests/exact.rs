@@ -41,6 +41,7 @@ fn is_met_greedily(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bo
             measured_per_w: None,
             plain: true,
             end_m: None,
+            fixed_m: None,
         };
         let mut reaches = PerTarget::new();
         link.extend(&[target as f32], &from, &mut reaches);

@@ -23,6 +23,7 @@ pub const MISSION: uav_relay::Mission = uav_relay::Mission::new(uav_relay::Missi
     noise_w: 0.0,
     reverse: 0.0,
     rx_power_w: 80.0,
+    fitted_gap: 0.0,
     tolerance: 1e-4,
 });
 

@@ -57,6 +57,9 @@ pub struct MissionConfig {
     /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
     /// 0.
     pub rx_power_w: f32,
+    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, the joint method maximises the data rate of slots
+    /// as long as each hop needs, whose spectral efficiency is log2(1 + SINR / gap).
+    pub fitted_gap: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,
 }
@@ -74,8 +77,8 @@ impl MissionConfig {
         Ok(())
     }
 
-    /// Checks the parameters of the traffic from Rx to Tx: `reverse`, `rx_power_w`, and the interference.
-    const fn way_back(&self) -> Result<(), MissionError> {
+    /// Checks the parameters of the data link: `reverse`, `rx_power_w` and `fitted_gap`.
+    const fn data_link(&self) -> Result<(), MissionError> {
         if !within(self.reverse, 0.0, 1.0) {
             return Err(MissionError::Reverse);
         }
@@ -84,6 +87,14 @@ impl MissionConfig {
         }
         if self.reverse > 0.0 && !cfg!(feature = "reverse") {
             return Err(MissionError::ReverseFeature);
+        }
+        if self.fitted_gap.to_bits() != 0 {
+            if !cfg!(feature = "altitude") {
+                return Err(MissionError::FittedFeature);
+            }
+            if !within(self.fitted_gap, 1.0, 1e3) {
+                return Err(MissionError::FittedGap);
+            }
         }
         Ok(())
     }
@@ -126,6 +137,10 @@ pub enum MissionError {
     ReverseFeature,
     /// `rx_power_w` is not within 1e-6 to 1e6.
     RxPower,
+    /// `fitted_gap` is neither 0 nor within 1 to 1000.
+    FittedGap,
+    /// `fitted_gap` is not 0, and the crate was built without its feature `altitude`.
+    FittedFeature,
     /// `tolerance` is not within 1e-6 to 0.1.
     Tolerance,
 }
@@ -147,6 +162,8 @@ error_texts!(MissionError {
     Reverse => "reverse (SIR required from Rx to Tx, as a share of the SIR from Tx to Rx) must be within 0 to 1",
     ReverseFeature => "a reverse above 0 needs the cargo feature `reverse`",
     RxPower => "rx_power_w must be within 1e-6 to 1e6",
+    FittedGap => "fitted_gap (SNR gap of fitted slots, linear) must be 0 for equal slots, or within 1 to 1000",
+    FittedFeature => "a fitted_gap above 0 (fitted slots) needs the cargo feature `altitude`",
     Tolerance => "tolerance must be within 1e-6 to 0.1",
 });
 
@@ -352,6 +369,7 @@ impl Mission {
             noise_w,
             reverse: _,
             rx_power_w: _,
+            fitted_gap: _,
             tolerance,
         } = config;
         if !within(distance_m, 1.0, 1e6) {
@@ -386,7 +404,7 @@ impl Mission {
         if !within(tolerance, 1e-6, 0.1) {
             return Err(MissionError::Tolerance);
         }
-        if let Err(error) = config.way_back() {
+        if let Err(error) = config.data_link() {
             return Err(error);
         }
         if !within(noise_w, 0.0, 1.0) {
@@ -466,6 +484,7 @@ impl Mission {
     ///     noise_w: 0.0,
     ///     reverse: 0.0,
     ///     rx_power_w: 80.0,
+    ///     fitted_gap: 0.0,
     ///     tolerance: 1e-4,
     /// });
     /// assert_eq!(MISSION.relays(), 5);
@@ -494,6 +513,7 @@ impl Mission {
     /// #   noise_w: 0.0,
     /// #   reverse: 0.0,
     /// #   rx_power_w: 80.0,
+    /// #   fitted_gap: 0.0,
     /// #   tolerance: 1e-4,
     /// });
     /// # assert_eq!(MISSION.relays(), 0);
@@ -572,6 +592,15 @@ impl Mission {
     pub const fn reverse(&self) -> f32 {
         if cfg!(feature = "reverse") && !matches!(self.config.interference, Interference::Unknown) {
             self.config.reverse
+        } else {
+            0.0
+        }
+    }
+
+    /// SNR gap of fitted slots, linear; 0 for equal slots. A constant without the feature `altitude`.
+    pub const fn fitted_gap(&self) -> f32 {
+        if cfg!(feature = "altitude") {
+            self.config.fitted_gap
         } else {
             0.0
         }

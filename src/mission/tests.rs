@@ -29,6 +29,7 @@ pub(crate) fn paper(relays: u16) -> MissionConfig {
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     }
 }
@@ -127,6 +128,27 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
         Err(MissionError::TooManyForDistance)
     );
     assert!(Mission::try_new(paper(250)).is_ok());
+}
+
+#[test]
+fn a_gap_of_fitted_slots_is_0_or_within_1_to_1000() {
+    let with = |fitted_gap: f32| {
+        let config = MissionConfig {
+            fitted_gap,
+            ..paper(1)
+        };
+        Mission::try_new(config).map(|_| ())
+    };
+    let (met, refused) = if cfg!(feature = "altitude") {
+        (Ok(()), Err(MissionError::FittedGap))
+    } else {
+        [Err(MissionError::FittedFeature); 2].into()
+    };
+    assert_eq!([0.0, 1.0, 1e3].map(with), [Ok(()), met, met]);
+    let low = 1.0_f32.next_down();
+    for bad in [-0.0, -1.0, low, 1e3_f32.next_up(), f32::NAN] {
+        assert_eq!(with(bad), refused, "{bad}");
+    }
 }
 
 #[cfg(feature = "noise")]

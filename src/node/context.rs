@@ -93,10 +93,11 @@ impl<'a> Context<'a> {
     }
 
     /// Returns true if every relay solves the whole chain by the joint method. The settings must select this method,
-    /// and the mission must leave the lateral offset or the altitude free.
+    /// and the mission must leave the lateral offset or the altitude free, or have fitted slots.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
-        let free = !(config.band.is_single() && config.lateral.is_single());
+        let is_line = config.band.is_single() && config.lateral.is_single();
+        let free = !is_line || self.mission().fitted_gap() > 0.0;
         cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
     }
 

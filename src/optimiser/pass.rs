@@ -17,10 +17,10 @@ use super::ladder::{Ladder, TARGETS};
 use super::retreat::{HopInterference, Retreat, Step, least};
 use super::reverse::FromRx;
 use super::spacing::{Hop, RequiredPosition, receiver_reach};
-use crate::mission::{Heading, Mission, Profile};
+use crate::mission::{Heading, Mission, Profile, ROUNDING};
 use crate::place::Station;
 use crate::root::sqrt_in_place;
-use crate::sir::{Sender, square, transmitter_gain};
+use crate::sir::{self, Sender, square, transmitter_gain};
 
 /// Maximum number of positions at which the last relay tries to receive Rx well enough. Only for traffic in both
 /// directions.
@@ -72,6 +72,8 @@ pub struct Link<'a> {
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
     /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
+    /// x that this relay takes for every target that its hop meets there, m. Only for fitted slots; else `None`.
+    pub fixed_m: Option<f32>,
 }
 
 /// Returns the x at which a pass starts, repeated for every target, m. It is the x of Tx, or of Rx in an interference
@@ -97,6 +99,15 @@ impl<'a> Link<'a> {
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
+        if let Some(x_m) = self.fixed_m
+            && cfg!(feature = "altitude")
+        {
+            let reach = |(&target, &from_m): (&f32, &f32)| {
+                self.is_met_at(x_m, target, from_m).then_some(x_m)
+            };
+            fill(reaches, pairs.map_while(reach));
+            return;
+        }
         match self.onward() {
             // Checked once for all the targets of a sweep.
             Some(Onward::Rx(hop)) if hop.is_simple() && !self.plain => {
@@ -142,6 +153,31 @@ impl<'a> Link<'a> {
         let mut reaches = PerTarget::new();
         self.extend(&[target], &[from_m], &mut reaches);
         reaches.first().copied()
+    }
+
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. It must
+    /// meet it in both directions, and two relays must be in order and separated.
+    fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
+        let mission = self.mission;
+        let at = self.own.cross_section.at(x_m);
+        let (there, back, apart) = match self.behind {
+            None => (
+                Sender::transmitter(mission).sir_at(mission, from_m, at),
+                sir::at_transmitter(mission, at, self.own.power_w),
+                0.0,
+            ),
+            Some(Behind { relay, .. }) => {
+                let across = at.cross_section().apart_squared(relay.cross_section);
+                let before = relay.cross_section.at(from_m);
+                (
+                    Sender::relay(mission, relay).sir_at(mission, from_m, at),
+                    Sender::relay(mission, self.own).sir_at(mission, x_m, before),
+                    mission.least_step(across).max(from_m.next_up() - from_m),
+                )
+            }
+        };
+        let rounding = mission.config().distance_m * ROUNDING;
+        x_m - from_m >= apart - rounding && there >= target && back >= mission.reverse() * target
     }
 
     fn onward(&self) -> Option<Onward<'a>> {
@@ -463,6 +499,7 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
             measured_per_w: None,
             plain: self.plain,
             end_m: None,
+            fixed_m: None,
         }
     }
 

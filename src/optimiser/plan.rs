@@ -93,6 +93,7 @@ impl Planner {
                 measured_per_w: None,
                 plain: self.search.ladder().is_plain(),
                 end_m: None,
+                fixed_m: None,
             };
             if !link.go_on(&targets, &self.reaches, &mut self.next) {
                 continue;

@@ -10,6 +10,7 @@ use crate::node::Node;
 use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::node::view::record::{RecordError, ViewRecord};
+use crate::optimiser::joint::fitted::SlotShares;
 use crate::place::Placement;
 use crate::pointing::Bearing;
 use crate::relay::frames;
@@ -63,6 +64,7 @@ use crate::wire::upload::{Upload, UploadError};
 ///     noise_w: 0.0,
 ///     reverse: 0.0,
 ///     rx_power_w: 80.0,
+///     fitted_gap: 0.0,
 ///     tolerance: 1e-4,
 /// })?;
 /// let identity = Identity { network: 7, index: 1 };
@@ -482,6 +484,14 @@ impl Relay {
     pub fn target(&self) -> Option<f32> {
         let known = !matches!(self.mission().interference(), Interference::Unknown);
         self.node.round().target().filter(|_| known)
+    }
+
+    /// Returns the shares of the frame time that this relay's slots have at the agreed positions.
+    ///
+    /// `None` unless the mission has fitted slots (`fitted_gap` above 0), and before an agreement. The shares of all hops
+    /// add up to 1.
+    pub fn slot_shares(&self) -> Option<SlotShares> {
+        self.node.round().slot_shares()
     }
 
     /// Returns an upper bound of the worst hop's SIR for any positions at the current altitudes, linear.

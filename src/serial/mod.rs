@@ -72,6 +72,7 @@
 //!     noise_w: 0.0,
 //!     reverse: 0.0,
 //!     rx_power_w: 80.0,
+//!     fitted_gap: 0.0,
 //!     tolerance: 1e-4,
 //! })?;
 //! let identity = Identity { network: 7, index: 1 };

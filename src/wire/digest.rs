@@ -57,14 +57,19 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
         add(&mut crc, &band.least_m.to_le_bytes());
         add(&mut crc, &band.most_m.to_le_bytes());
     }
+    let fits = cfg!(feature = "altitude") && c.fitted_gap > 0.0;
     // Noise of 0 is omitted, so that missions without noise keep their earlier digest.
-    if c.noise_w > 0.0 {
+    if c.noise_w > 0.0 || fits {
         add(&mut crc, &c.noise_w.to_le_bytes());
     }
     // Likewise for the way back. With noise or without it, the two numbers make the input longer by eight bytes.
-    if cfg!(feature = "reverse") && c.reverse > 0.0 {
+    if cfg!(feature = "reverse") && c.reverse > 0.0 || fits {
         add(&mut crc, &c.reverse.to_le_bytes());
         add(&mut crc, &c.rx_power_w.to_le_bytes());
+    }
+    // Fitted slots make the input longer than all others.
+    if fits {
+        add(&mut crc, &c.fitted_gap.to_le_bytes());
     }
     low_half(crc.finalize())
 }
@@ -149,6 +154,10 @@ mod tests {
             assert_ne!(same, of(|c| c.noise_w = 1e-13));
         }
         assert_eq!(same, of(|c| c.rx_power_w = 5.0));
+        if cfg!(feature = "altitude") {
+            assert_ne!(same, of(|c| c.fitted_gap = 2.0));
+            assert_ne!(of(|c| c.fitted_gap = 1.0), of(|c| c.fitted_gap = 2.0));
+        }
         if cfg!(feature = "reverse") {
             let back = of(|c| c.reverse = 1.0);
             assert_ne!(same, back);

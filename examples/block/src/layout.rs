@@ -53,6 +53,7 @@ pub(super) struct Layout {
     pub(super) probe_after_ms: U32,
     pub(super) reverse: F32,
     pub(super) rx_power_w: F32,
+    pub(super) fitted_gap: F32,
     pub(super) crc: U32,
 }
 

@@ -56,7 +56,8 @@
 //! | 372 | u32 | silence until a neighbour is probed, ms, at most 1200000; it is lost after three times as long. 0 means 5000 |
 //! | 376 | f32 | SIR needed on the way back from Rx to Tx, relative to that on the way there: 0 (one direction) to 1 |
 //! | 380 | f32 | power of the receiver on the way back, W; without effect if the number before is 0 |
-//! | 384 | u32 | CRC-32C of bytes 0 to 383 |
+//! | 384 | f32 | SNR gap of fitted slots, linear: 1 to 1000, with method 1 and without sensing; 0 for equal slots |
+//! | 388 | u32 | CRC-32C of bytes 0 to 387 |
 //!
 //! The ranges are those of [`MissionConfig`], `Channel::new`, `Profile`, `Adjust`, `Measure`, `Listen`, `Field` and, by
 //! `course.rs`, `Axis`.
@@ -96,10 +97,10 @@ pub const BAUD: u32 = 115_200;
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// Version of the configuration block's format.
-pub const VERSION: u16 = 10;
+pub const VERSION: u16 = 11;
 
 /// Length of a configuration block, bytes.
-pub const LEN: usize = 388;
+pub const LEN: usize = 392;
 
 /// Maximum number of points of a configuration block for the distribution of the interference along x.
 pub const MAX_POINTS: usize = 16;
@@ -111,7 +112,7 @@ const CHECKED: usize = LEN - 4;
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
-const LEN_FIELD: u16 = 388;
+const LEN_FIELD: u16 = 392;
 
 /// Configuration block as stored in flash.
 pub type Block = [u8; LEN];
@@ -181,6 +182,7 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
         noise_w: raw.noise_w.get(),
         reverse: raw.reverse.get(),
         rx_power_w: raw.rx_power_w.get(),
+        fitted_gap: raw.fitted_gap.get(),
         tolerance: raw.tolerance.get(),
     })
     .map_err(ConfigError::Mission)?;
@@ -200,6 +202,10 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
     let is_listening_joint = method == Method::Joint && listen.is_some();
     if is_listening_joint && mission.config().reverse > 0.0 {
         return Err(ConfigError::Reverse);
+    }
+    let is_known_joint = method == Method::Joint && listen.is_none();
+    if mission.fitted_gap() > 0.0 && !is_known_joint {
+        return Err(ConfigError::Fitted);
     }
     Ok(Config {
         identity: Identity {

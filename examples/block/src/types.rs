@@ -159,6 +159,8 @@ pub enum ConfigError {
     Listen,
     /// Error: there is traffic from receiver to transmitter, which the joint method does not support.
     Reverse,
+    /// Error: the block gives fitted slots, but not the joint method and a known interferer, which they need.
+    Fitted,
     /// Error: the block gives an interferer, but also the interference as a distribution along x.
     Interferer,
     /// Number of points of the interference's distribution along x exceeds the capacity of a block.

@@ -65,6 +65,7 @@ pub fn write(
         noise_w: mission.noise_w.into(),
         reverse: mission.reverse.into(),
         rx_power_w: mission.rx_power_w.into(),
+        fitted_gap: mission.fitted_gap.into(),
         autopilot_key: autopilot_key.unwrap_or_default(),
         probe_after_ms: config.probe_after_ms.into(),
         ..Layout::new_zeroed()

@@ -226,6 +226,11 @@ pub(crate) fn refused(error: ConfigError) {
         ConfigError::Reverse => {
             error!("configuration refused: a reverse above 0 needs the method align or adjust");
         }
+        ConfigError::Fitted => {
+            error!(
+                "configuration refused: a fitted_gap above 0 (fitted slots) needs the method joint and a known interferer"
+            );
+        }
         ConfigError::Interferer => {
             error!(
                 "configuration refused: it has both an interferer and an interference field: leave one out"

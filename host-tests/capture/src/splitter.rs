@@ -1,6 +1,6 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Largest number of bytes that the splitter stores between two frame delimiters. The longest frame has 145 bytes, so
+/// Largest number of bytes that the splitter stores between two frame delimiters. The longest frame has 149 bytes, so
 /// more bytes are noise, of which only the start is kept.
 pub const MOST: usize = 1_024;
 

@@ -46,7 +46,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unended => f.write_str("the delimiter at its end is missing"),
-            Self::Oversized(len) => write!(f, "too long: {len} bytes, a frame has at most 145"),
+            Self::Oversized(len) => write!(f, "too long: {len} bytes, a frame has at most 149"),
             Self::Truncated => f.write_str("cut short: the delimiter is inside a COBS block"),
             Self::Short(len) => write!(f, "too short: {len} bytes after COBS decoding"),
             Self::Crc(has, is) => write!(

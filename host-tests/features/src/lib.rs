@@ -38,6 +38,7 @@ pub fn paper(relays: u16) -> Mission {
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     })
     .expect("in range")

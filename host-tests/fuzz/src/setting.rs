@@ -85,6 +85,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     };
     Some(match kind {
@@ -169,6 +170,7 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: input.scaled(1e-6, 0.1),
     })
 }

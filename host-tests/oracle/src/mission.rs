@@ -45,6 +45,7 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
         noise_w: narrow(link.noise_w),
         reverse: 0.0,
         rx_power_w: narrow(link.tx_w),
+        fitted_gap: 0.0,
         tolerance: narrow(tolerance),
     };
     let own = (1..)
@@ -122,6 +123,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: narrow(link.tx_w),
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     };
     Mission::try_new(config).ok()

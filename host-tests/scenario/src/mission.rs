@@ -8,7 +8,8 @@ use uav_relay::mission::MissionError;
 use uav_relay::{Band, Channel, Field, FieldPoint, Interferer, Mission, MissionConfig, Profile};
 
 use crate::hypothetical::{self, Hypothetical};
-use crate::number::narrow;
+use crate::link::{Access, Link, RateModel};
+use crate::number::{factor, narrow};
 use crate::scene::Scene;
 use crate::{Interference, Scenario, Source};
 
@@ -27,6 +28,8 @@ pub enum Refusal {
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
+    /// The scenario has fitted slots with a table of rate steps, which relays cannot fit.
+    Steps,
     /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),
     /// [`Channel`] rejects a value of the scenario.
@@ -50,6 +53,9 @@ impl fmt::Display for Refusal {
                 "no placement: {relays} relays that stay {apart_m} m apart need {} m, but Tx and Rx are {distance_m} m apart: use fewer \
                  relays, or change geometry.min_separation_m or geometry.distance_m in a --scenario FILE",
                 f32::from(relays.saturating_sub(1)) * apart_m
+            ),
+            Self::Steps => f.write_str(
+                "link.access = \"fitted\" with link.steps: relays with the method joint fit slots to Shannon's formula only; use link.gap_db in place of link.steps, or another link.access"
             ),
             Self::Mission(error) => error.fmt(f),
             Self::Channel(error) => error.fmt(f),
@@ -112,6 +118,7 @@ pub fn mission(
         noise_w: narrow(scenario.noise.power_w()),
         reverse: narrow(scenario.reverse),
         rx_power_w: narrow(scenario.rx_w),
+        fitted_gap: 0.0,
         tolerance: narrow(tolerance),
     };
     let mission = Mission::try_new(config).map_err(|error| match error {
@@ -139,6 +146,32 @@ pub fn mission(
         })
         .collect();
     Ok((mission, profiles))
+}
+
+/// Returns `mission` with the fitted slots of the scenario, if it has any.
+///
+/// It is the mission of relays with the method `joint`. Other methods have equal slots on board.
+///
+/// # Errors
+/// [`Refusal::Steps`] for fitted slots with a table of rate steps; [`Refusal::Mission`] if the SNR gap is out of
+/// range.
+pub fn with_access(scenario: &Scenario, mission: &Mission) -> Result<Mission, Refusal> {
+    let fitted_gap = match &scenario.link {
+        Some(Link {
+            access: Access::Fitted,
+            model,
+            ..
+        }) => match model {
+            RateModel::Shannon { gap_db } => narrow(factor(*gap_db)),
+            RateModel::Steps(_) => return Err(Refusal::Steps),
+        },
+        _ => 0.0,
+    };
+    let config = MissionConfig {
+        fitted_gap,
+        ..*mission.config()
+    };
+    Mission::try_new(config).map_err(Refusal::Mission)
 }
 
 /// Returns the single interferer that best replaces the scenario's interferers.

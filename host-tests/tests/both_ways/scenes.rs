@@ -59,6 +59,7 @@ pub(crate) fn mission(chain: &Chain) -> Mission {
         noise_w: chain.noise_w as f32,
         reverse: chain.reverse as f32,
         rx_power_w: *chain.powers_w.last().unwrap() as f32,
+        fitted_gap: 0.0,
         tolerance: 1e-5,
     })
     .unwrap()

@@ -108,6 +108,7 @@ pub(crate) fn mission(rng: &mut impl Rng, most: u16) -> Option<Mission> {
         },
         reverse: 0.0,
         rx_power_w: scaled(rng, 80.0, 1e-6, 1e6),
+        fitted_gap: 0.0,
         tolerance: scaled(rng, 1e-4, 1e-6, 0.1),
     };
     let is_known = matches!(config.interference, Interference::Source(_));

@@ -66,6 +66,21 @@ fn a_way_back_is_uploaded_and_flown_by_all() {
     }
 }
 
+/// Checks that all relays with the joint method fly an upload that adds or removes fitted slots.
+#[test]
+fn fitted_slots_are_uploaded_and_flown_by_all() {
+    let equal = *mission(5).config();
+    let fitted = MissionConfig {
+        fitted_gap: 2.0,
+        ..equal
+    };
+    for (loaded, uploaded) in [(equal, fitted), (fitted, equal)] {
+        let mut setup = signed(Mission::try_new(loaded).unwrap(), true);
+        setup.settings.method = Method::Joint;
+        fly(setup, Side::Upstream, uploaded);
+    }
+}
+
 #[test]
 fn a_new_altitude_band_is_flown_to() {
     let base = MissionConfig {

@@ -301,6 +301,7 @@ fn upload(wire_message: &WireMessage, of: &MessageFields<'_>) -> Upload {
         ("noise_w", config.noise_w),
         ("reverse", config.reverse),
         ("rx_power_w", config.rx_power_w),
+        ("fitted_gap", config.fitted_gap),
     ];
     for (name, number) in numbers {
         assert_eq!(number, of.real(name), "{name}");

@@ -21,12 +21,14 @@ const RELAYS: usize = 5;
 const NOISE: usize = 83;
 /// Offset of the return direction's fields in an offer's body, bytes. They are `reverse` and the power of Rx.
 const BACK: usize = 87;
-const SITES_AT: usize = 95;
+/// Offset of the SNR gap of fitted slots, bytes.
+const GAP: usize = 95;
+const SITES_AT: usize = 99;
 
 /// Length of an offer's body, bytes.
-pub(crate) const BYTES: usize = 121;
+pub(crate) const BYTES: usize = 125;
 /// Length of the part of an offer's body that a relay stores: all but the number of the answered hello.
-pub(crate) const KEPT: usize = 119;
+pub(crate) const KEPT: usize = 123;
 
 /// Returns an offer of mission `version` that eight relays can fly. Their mission before flight has the digest
 /// `base`.
@@ -37,7 +39,7 @@ pub(crate) fn upload(version: u16, base: u16) -> WireMessage {
         "interferer_power_w": 62.5, "interferer_x_m": 600.0, "interferer_y_m": -250.5, "tolerance": 1e-4,
         "mu_los": 7000.0, "mu_nlos": 900_000.5, "eta": 7000.25,
         "altitude_min_m": 20.0, "altitude_max_m": 300.0, "lateral_min_m": -60.0, "lateral_max_m": 40.5,
-        "noise_w": 0.0, "reverse": 0.0, "rx_power_w": 80.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
+        "noise_w": 0.0, "reverse": 0.0, "rx_power_w": 80.0, "fitted_gap": 0.0, "tx_lat_e7": 0, "tx_lon_e7": 0, "tx_amsl_mm": 0,
         "rx_lat_e7": 0, "rx_lon_e7": 0, "rx_amsl_mm": 0, "offer_number": 0,
     });
     WireMessage::new("Offer", &fields)
@@ -62,11 +64,15 @@ pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
     let body = offer.body();
     let mut covered = body[RELAYS..NOISE].to_vec();
     // Noise and a relative SIR of 0 are left out.
-    if offer.number("noise_w") > 0.0 {
+    let fits = offer.number("fitted_gap") > 0.0;
+    if offer.number("noise_w") > 0.0 || fits {
         covered.extend(&body[NOISE..BACK]);
     }
-    if offer.number("reverse") > 0.0 {
-        covered.extend(&body[BACK..SITES_AT]);
+    if offer.number("reverse") > 0.0 || fits {
+        covered.extend(&body[BACK..GAP]);
+    }
+    if fits {
+        covered.extend(&body[GAP..SITES_AT]);
     }
     let digest = between(offer, low_half(&covered));
     (digest, offer.number("version") as u16)

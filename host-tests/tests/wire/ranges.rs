@@ -83,6 +83,7 @@ fn other(channel: Channel) -> MissionConfig {
         noise_w: 1e-12,
         reverse: 0.25,
         rx_power_w: 5.0,
+        fitted_gap: 2.5,
         tolerance: 2e-4,
     }
 }
@@ -113,7 +114,7 @@ fn an_upload_is_encoded_and_decoded_with_every_number() {
             "interferer_power_w": 60.0, "interferer_x_m": 700.0, "interferer_y_m": -300.0, "tolerance": 2e-4,
             "mu_los": channel.mu_los(), "mu_nlos": channel.mu_nlos(), "eta": channel.eta(),
             "altitude_min_m": 25.0, "altitude_max_m": 250.0, "lateral_min_m": -35.0, "lateral_max_m": 45.0,
-            "noise_w": 1e-12, "reverse": 0.25, "rx_power_w": 5.0, "offer_number": 77,
+            "noise_w": 1e-12, "reverse": 0.25, "rx_power_w": 5.0, "fitted_gap": 2.5, "offer_number": 77,
         }));
         let mut bytes = [0; KEPT];
         assert_eq!(upload.encode(&mut bytes), Some(KEPT));

@@ -11,6 +11,7 @@ use super::turn::TurnPass;
 use crate::mission::Profile;
 use crate::node::context::Context;
 use crate::node::sample::Meter;
+use crate::optimiser::joint::fitted::SlotShares;
 use crate::optimiser::joint::{MOST_SOLVED, Solver};
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::local::HopEnd;
@@ -56,6 +57,22 @@ pub(super) struct JointPlace {
     pub(super) plain: bool,
 }
 
+/// Fitted slots of this relay; unused in a mission with equal slots.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FittedSlots {
+    /// x of this relay in its joint solution, m, and the shares of its slots there.
+    pub(super) solved: Option<(f32, SlotShares)>,
+    /// Shares of its slots at the agreed positions.
+    pub(super) agreed: Option<SlotShares>,
+}
+
+impl FittedSlots {
+    const NONE: Self = Self {
+        solved: None,
+        agreed: None,
+    };
+}
+
 /// State of one relay in the placement algorithms: current pass, own position, and the leader's task.
 #[derive(Clone, Debug)]
 pub(crate) struct Computation {
@@ -76,6 +93,8 @@ pub(crate) struct Computation {
     /// the end of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
+    /// Fitted slots of this relay; no element without the feature `altitude`.
+    pub(super) fitted: [FittedSlots; ALTITUDE as usize],
     /// Average of the measured interference at the agreed position. Used only if the interference is a field (a known
     /// distribution along x).
     pub(super) meter: Meter,
@@ -108,6 +127,7 @@ impl Computation {
             cross_section: profile.on_line().cross_section,
             after: None,
             agreed_place: None,
+            fitted: [FittedSlots::NONE; ALTITUDE as usize],
             meter: Meter::new(settings.measure),
             sensing: Sensing::new(settings.listen, now),
             target: None,
@@ -131,8 +151,9 @@ impl Computation {
         }
     }
 
-    pub(crate) const fn discard_agreed_place(&mut self) {
+    pub(crate) fn discard_agreed_place(&mut self) {
         self.agreed_place = None;
+        self.set_slot_shares(None);
         self.after = None;
     }
 
@@ -167,6 +188,17 @@ impl Computation {
         self.cross_section = cross_section;
         // Samples of the previous position do not count.
         self.meter.restart();
+    }
+
+    /// Returns the shares of this relay's slots at the agreed positions; `None` unless they were fitted.
+    pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
+        self.fitted.first()?.agreed
+    }
+
+    pub(super) fn set_slot_shares(&mut self, shares: Option<SlotShares>) {
+        if let Some(fitted) = self.fitted.first_mut() {
+            fitted.agreed = shares;
+        }
     }
 
     pub(super) fn give_up(&mut self) -> Action {

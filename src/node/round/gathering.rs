@@ -10,6 +10,7 @@ use super::computation::{Computation, JointPlace, PassKind};
 use super::state::Action;
 use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
+use crate::optimiser::joint::fitted::SlotShares;
 use crate::optimiser::joint::{MOST_SOLVED, Seat};
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::pass::Link;
@@ -201,6 +202,8 @@ impl Computation {
 
     pub(super) fn link<'a>(&self, context: &Context<'a>, chosen: bool) -> Link<'a> {
         let there = self.chosen.filter(|_| chosen);
+        let fitted = self.fitted.first().filter(|_| there.is_some());
+        let fixed_m = fitted.and_then(|fitted| fitted.solved);
         Link {
             mission: context.mission(),
             behind: None,
@@ -209,6 +212,7 @@ impl Computation {
             measured_per_w: self.meter.published(),
             plain: chosen && there.is_none_or(|there| there.plain),
             end_m: there.map(|there| there.end_m),
+            fixed_m: fixed_m.map(|(x_m, _)| x_m),
         }
     }
 
@@ -239,14 +243,20 @@ impl Computation {
         let index = context.index();
         let target = if let Ok(target) = solved {
             let end_m = chain.end_m(mission, &seat_of, index);
-            let (solved, plain) = (chain.at(index, seat_of(index)), !chain.holds_back());
+            let fitted = chain.fitted(mission, &seat_of, index);
+            let (solved, plain) = match fitted {
+                Some((at, _)) => (at.cross_section(), true),
+                None => (chain.at(index, seat_of(index)), !chain.holds_back()),
+            };
             // The solver used the common profile, if this relay's own has not been collected yet.
             let cross_section = self.seat(context).room.nearest(solved);
+            let fitted = fitted.map(|(at, shares)| (at.x_m, shares));
             self.chosen = Some(JointPlace {
                 cross_section,
                 end_m,
                 plain,
             });
+            self.set_fitted(fitted);
             target
         } else {
             self.choose_configured(context);
@@ -256,7 +266,14 @@ impl Computation {
         Some(target)
     }
 
+    fn set_fitted(&mut self, solved: Option<(f32, SlotShares)>) {
+        if let Some(fitted) = self.fitted.first_mut() {
+            fitted.solved = solved;
+        }
+    }
+
     fn choose_configured(&mut self, context: &Context<'_>) {
+        self.set_fitted(None);
         self.chosen = Some(JointPlace {
             cross_section: self
                 .seat(context)

@@ -28,6 +28,7 @@ use super::context::{Context, Effects, LayerEvent, Member, Peer};
 use super::context::{PAUSE, earliest};
 use super::sample::{Meter, Sample};
 use crate::mission::Profile;
+use crate::optimiser::joint::fitted::SlotShares;
 use crate::place::Placement;
 use crate::settings::Settings;
 use crate::time::Instant;
@@ -237,7 +238,7 @@ impl Round {
     }
 
     /// Discards the agreed position; there is none until the next agreement.
-    pub(crate) const fn discard_agreed_place(&mut self) {
+    pub(crate) fn discard_agreed_place(&mut self) {
         self.computation.discard_agreed_place();
     }
 
@@ -302,6 +303,10 @@ impl Round {
     /// Returns the agreed position; `None` before an agreement. The guard may limit the setpoint on the way there.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
+    }
+
+    pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
+        self.computation.slot_shares()
     }
 
     pub(crate) const fn meter(&self) -> &Meter {

@@ -118,6 +118,9 @@ impl Computation {
             let cross_section = self.station_for(chosen).cross_section;
             self.agree_on(cross_section.at(x_m), cross_section);
             self.target = Some(target);
+            let fitted = self.fitted.first().filter(|_| chosen);
+            let shares = fitted.and_then(|fitted| Some(fitted.solved?.1));
+            self.set_slot_shares(shares);
             if let LeaderTask::Searching { search, .. } = &mut self.task
                 && !search.accept(target)
             {

@@ -22,6 +22,16 @@ pub(in crate::optimiser::joint) struct SolverContext<'a, F> {
 }
 
 impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
+    /// Creates the chain of `mission`; `None` in an interference field.
+    pub(in crate::optimiser::joint) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
+        Some(Self {
+            mission,
+            interferer: mission.interferer()?,
+            seat_of,
+            gain: mission.relay_gain(mission.config().common.power_w),
+        })
+    }
+
     pub(in crate::optimiser::joint) fn distance_m(&self) -> f32 {
         self.mission.config().distance_m
     }

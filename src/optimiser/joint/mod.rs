@@ -12,11 +12,13 @@
 //! | `ascent` | step control: the increase of the target, and the accepted fraction of the step |
 //! | `chain` | data shared by both solvers: the chain, a segment of it, the profile of one relay |
 //! | `interior` | with a way back: the interior-point method for both directions |
+//! | `fitted` | fitted slots: the largest data rate by dynamic programming over small moves |
 //! | `starts` | initial chains and initial targets of the ascents |
 //! | [`solver`] | the solution of a whole chain without messages |
 
 mod ascent;
 mod chain;
+pub mod fitted;
 mod hop;
 mod interior;
 mod outlook;

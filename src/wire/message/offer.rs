@@ -57,6 +57,8 @@ struct OfferBody {
     noise_w: f32,
     /// Required SIR from Rx to Tx, relative to that from Tx to Rx, and transmit power of Rx in W.
     back: [f32; 2],
+    /// SNR gap of fitted slots; 0 for equal slots.
+    fitted_gap: f32,
     /// Positions of Tx and Rx, encoded by [`Sites::to_bytes`]; all 0 if the upload has none.
     sites: SitesBody,
 }
@@ -95,6 +97,7 @@ impl OfferBody {
             ],
             noise_w: c.noise_w,
             back: [c.reverse, c.rx_power_w],
+            fitted_gap: c.fitted_gap,
             sites: upload.sites().map_or(NO_SITES, Sites::to_bytes),
         }
     }
@@ -141,6 +144,7 @@ impl OfferBody {
             noise_w: self.noise_w,
             reverse,
             rx_power_w,
+            fitted_gap: self.fitted_gap,
             tolerance,
         };
         let pass = self.pass;

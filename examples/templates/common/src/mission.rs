@@ -30,6 +30,7 @@ pub const MISSION: Mission = match Channel::new(2e9, 1.023_293, 125.892_54, AirG
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     }),
     Err(_) => panic!("a channel parameter is out of range"),

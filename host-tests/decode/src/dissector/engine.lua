@@ -1,7 +1,7 @@
 
 -- What stands above is data; from here on it is read.
 
-local MOST = 143 -- bytes of a frame without COBS
+local MOST = 147 -- bytes of a frame without COBS
 local HEADER, TAG, CHECK = 10, 8, 4
 
 local proto = Proto("uav_relay", "UAV relay")

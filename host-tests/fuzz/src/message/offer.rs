@@ -38,6 +38,8 @@ impl Body<'_, '_> {
         } else {
             &[0.0, 80.0]
         });
+        // SNR gap of fitted slots.
+        self.reals(&[if choice % 16 == 11 { 2.0 } else { 0.0 }]);
         self.sites(choice);
         self.answer(choice);
     }

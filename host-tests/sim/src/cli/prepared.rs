@@ -89,7 +89,12 @@ impl<'a> Prepared<'a> {
                 line,
             ))
         };
-        let (mission, profiles) = match mission::mission(&scenario, options.uavs, tolerance) {
+        let briefed = mission::mission(&scenario, options.uavs, tolerance);
+        let briefed = briefed.and_then(|(mission, profiles)| match options.method {
+            Method::Joint => Ok((mission::with_access(&scenario, &mission)?, profiles)),
+            _ => Ok((mission, profiles)),
+        });
+        let (mission, profiles) = match briefed {
             Ok(briefed) => briefed,
             // Without a scenario file, a message about its keys would not help the user.
             Err(Refusal::NoRoom { .. }) if is_default => {

@@ -17,7 +17,7 @@ use super::time::instant;
 pub struct Uploads {
     /// Upload the scenario's mission with changed parameters at second S of virtual time. Keys as in a scenario file: x_m, y_m
     /// and power_w of the interferer, altitude_m, altitude_min_m, altitude_max_m, lateral_min_m, lateral_max_m, min_separation_m,
-    /// distance_m, tx_w, uav_w, rx_w; reverse and noise_w, 0 to 1; and tolerance. If the scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and
+    /// distance_m, tx_w, uav_w, rx_w; reverse and noise_w, 0 to 1; fitted_gap, 0 or 1 to 1000; and tolerance. If the scenario has a site, tx_lat_deg, tx_lon_deg, tx_amsl_m and
     /// those of rx move an end and the distance follows. Repeatable: versions count from 1
     #[arg(long, value_name = "S[:KEY=VALUE,..]", value_parser = planned)]
     upload: Vec<Planned>,
@@ -61,6 +61,7 @@ enum Key {
     Noise,
     Reverse,
     RxPower,
+    FittedGap,
     Tolerance,
     TxLatitude,
     TxLongitude,
@@ -73,7 +74,7 @@ enum Key {
 /// Parameters that `--upload` can change: name in the option, kind, smallest and largest value.
 ///
 /// Most names are keys of scenario files; `tx_lat_deg` and similar ones are the geographic positions of Tx and Rx.
-const KEYS: [(&str, Key, f64, f64); 22] = [
+const KEYS: [(&str, Key, f64, f64); 23] = [
     ("x_m", Key::X, -1e7, 1e7),
     ("y_m", Key::Y, -1e7, 1e7),
     ("power_w", Key::Power, 1e-6, 1e9),
@@ -89,6 +90,7 @@ const KEYS: [(&str, Key, f64, f64); 22] = [
     ("noise_w", Key::Noise, 0.0, 1.0),
     ("reverse", Key::Reverse, 0.0, 1.0),
     ("rx_w", Key::RxPower, 1e-6, 1e6),
+    ("fitted_gap", Key::FittedGap, 0.0, 1e3),
     ("tolerance", Key::Tolerance, 1e-6, 0.1),
     ("tx_lat_deg", Key::TxLatitude, -90.0, 90.0),
     ("tx_lon_deg", Key::TxLongitude, -180.0, 180.0),
@@ -251,6 +253,7 @@ impl Planned {
             noise_w: to(Key::Noise, base.noise_w),
             reverse: to(Key::Reverse, base.reverse),
             rx_power_w: to(Key::RxPower, base.rx_power_w),
+            fitted_gap: to(Key::FittedGap, base.fitted_gap),
             tolerance: to(Key::Tolerance, base.tolerance),
             ..*base
         })

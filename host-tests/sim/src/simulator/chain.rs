@@ -145,6 +145,7 @@ impl Chain {
                 setpoint: member.relay.setpoint(),
                 target: member.relay.target(),
                 bound: member.relay.bound(),
+                slot_shares: member.relay.slot_shares(),
                 profile: member.relay.profile(),
                 stats: *member.relay.stats(),
                 killed: member.killed,

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use uav_relay::sensing::estimate::NumberedEstimate;
-use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, Stats};
+use uav_relay::{Duration, Instant, Placement, Profile, Side, Sites, SlotShares, Stats};
 
 use super::attack::AttackCounts;
 use super::drones::{Nearest, Point};
@@ -132,6 +132,8 @@ pub struct RelayEnd {
     /// Upper bound, linear, on the SIR of the worst hop that any chain at the relays' altitudes can reach. `None`
     /// except at the leader.
     pub bound: Option<f32>,
+    /// Shares of the frame time that the relay's slots have; `None` without fitted slots.
+    pub slot_shares: Option<SlotShares>,
     /// Altitude and power of the relay.
     pub profile: Profile,
     /// Counters of the relay since its last start.

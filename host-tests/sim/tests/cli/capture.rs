@@ -115,7 +115,7 @@ fn the_capture_has_uploads_from_both_ends() {
         let (_, frames) = captured(&format!("{arguments} {wire}"));
         let offers = frames
             .iter()
-            .filter(|frame| frame.interface == name && frame.bytes.len() == 145);
+            .filter(|frame| frame.interface == name && frame.bytes.len() == 149);
         assert!(offers.count() > 0, "{end} {wire:?}");
     }
 }

@@ -6,6 +6,37 @@ use uav_relay_scenario::scene::Scene;
 
 use super::{chain, example, json, refusal};
 
+/// Checks that `joint` flies fitted slots, and that their rate is delivered. Rate steps are refused.
+#[test]
+fn fitted_slots_are_flown_by_joint() {
+    let file = std::env::temp_dir().join(format!("fitted_{}.toml", std::process::id()));
+    let with = |link: &str| {
+        let text = uav_relay_scenario::DEFAULT;
+        let link =
+            format!("[link]\nreverse = 0.5\nbandwidth_hz = 1e6\naccess = \"fitted\"\n{link}");
+        std::fs::write(&file, format!("{text}\n{link}\n")).unwrap();
+    };
+    with("gap_db = 3.0");
+    let ask = format!("--uavs 5 --scenario {} --traffic both", file.display());
+    let rates = |method: &str| {
+        let report = json(&format!("{ask} --method {method}"));
+        ["promised_bps", "delivered_bps"].map(|key| report[key][0].as_f64().unwrap())
+    };
+    let ([equal, _], [fitted, delivered]) = (rates("align"), rates("joint"));
+    assert!(fitted > 1.3 * equal, "{fitted} {equal}");
+    assert!(
+        (0.95..=1.0).contains(&(delivered / fitted)),
+        "{delivered} {fitted}"
+    );
+    with("steps = [{ sinr_db = 0.0, bits_per_hz = 1.0 }]");
+    let (_, line) = refusal(&format!("{ask} --method joint"));
+    assert!(
+        line.contains("link.steps") && line.contains("joint"),
+        "{line}"
+    );
+    std::fs::remove_file(&file).unwrap();
+}
+
 #[test]
 fn a_way_back_is_flown_by_align_adjust_and_joint() {
     let file = std::env::temp_dir().join(format!("way_back_{}.toml", std::process::id()));

@@ -208,6 +208,8 @@ impl<'a> Asked<'a> {
         };
         Ok(flight
             .by(method)
+            .with_access(&self.scenario)
+            .map_err(|error| format!("{}: {error}", self.name))?
             .signed(secret)
             .signed_to_autopilots(autopilot_key)
             .measuring(measure(options, &self.scenario)?)

@@ -46,6 +46,7 @@ pub fn stretched(mission: &Mission, target: f32) -> Option<Chain> {
             measured_per_w: None,
             plain: true,
             end_m: None,
+            fixed_m: None,
         };
         link.extend(&[target], &from, &mut reaches);
         places.push(Placement::on_line(*reaches.first()?, profile.altitude_m));
@@ -103,6 +104,7 @@ pub fn descent(mission: &Mission, step: f64) -> Result<Vec<Sweep>, FigureError> 
                 measured_per_w: None,
                 plain: true,
                 end_m: None,
+                fixed_m: None,
             },
             ladder,
             // Without effect in the forward direction.

@@ -12,7 +12,7 @@ use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
-use uav_relay_scenario::Scenario;
+use uav_relay_scenario::{Scenario, mission};
 
 const MOST: usize = Mission::MAX_RELAYS as usize;
 
@@ -22,10 +22,14 @@ type Chain = Solver<MOST, { MOST / 10 }>;
 ///
 /// If the method finds none, the relays keep the altitudes that the scenario gives them.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
-    let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
+    let mut briefed = ProfiledMission::new(scenario, relays, tolerance)?;
+    // Relays refuse fitted slots with rate steps, so such a plan is that of the largest SIR.
+    briefed.mission = mission::with_access(scenario, &briefed.mission).unwrap_or(briefed.mission);
     match joint(&briefed) {
         Some(places) => {
-            let how = if scenario.reverse > 0.0 {
+            let how = if briefed.mission.fitted_gap() > 0.0 {
+                "the joint method for fitted slots"
+            } else if scenario.reverse > 0.0 {
                 "the joint method for both directions"
             } else {
                 "the joint method"
@@ -58,6 +62,10 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
             break solved.ok()?;
         }
     };
+    if mission.fitted_gap() > 0.0 {
+        let place = |index| Some(solver.fitted(mission, &seat_of, index)?.0);
+        return (1..=mission.relays()).map(place).collect();
+    }
     let own_of = |index| {
         let seat = seat_of(index);
         Station {
@@ -76,6 +84,7 @@ pub fn solved(mission: &Mission, seat_of: impl Fn(u16) -> Seat) -> Option<Vec<Pl
         measured_per_w: None,
         plain: !solver.holds_back(),
         end_m: Some(solver.end_m(mission, &seat_of, index)),
+        fixed_m: None,
     };
     let mut places: Vec<Placement> = Vec::new();
     for index in 1..=mission.relays() {

@@ -58,6 +58,9 @@ impl fmt::Display for BlockError {
             Self::Config(ConfigError::Reverse) => f.write_str(
                 "link.reverse above 0 with [listen] needs the method align or adjust: the method joint needs a known interferer",
             ),
+            Self::Config(ConfigError::Fitted) => f.write_str(
+                "link.access = \"fitted\" needs the method joint and a known interferer: leave [listen] out, or use another link.access",
+            ),
             Self::Config(ConfigError::Secret) => {
                 f.write_str("the key must contain a byte other than 0, and the epoch must be within 1 to 4294967294")
             }
@@ -146,6 +149,18 @@ impl Flight {
     /// Sets the method by which the relays choose their positions.
     pub fn by(self, method: Method) -> Self {
         Self { method, ..self }
+    }
+
+    /// Sets the slots of the relays as `scenario` describes them, if their method is the joint one.
+    ///
+    /// # Errors
+    /// [`BlockError::Refused`] if the relays cannot fit their slots.
+    pub fn with_access(self, scenario: &Scenario) -> Result<Self, BlockError> {
+        if self.method != Method::Joint {
+            return Ok(self);
+        }
+        let mission = mission::with_access(scenario, &self.mission).map_err(BlockError::Refused)?;
+        Ok(Self { mission, ..self })
     }
 
     /// Sets how the relays measure the interference along the line Tx-Rx; `None` if they do not.

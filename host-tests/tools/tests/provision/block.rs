@@ -7,6 +7,7 @@ use uav_relay::field::FieldError;
 use uav_relay::flight::course::Course;
 use uav_relay::mission::MissionError;
 use uav_relay::{Adjust, ChannelLoad, Instant, Local, Measure, Method, Relay, Settings, Wiring};
+use uav_relay_scenario::link::{Access, Link, RateModel};
 use uav_relay_scenario::{ListenSpec, Scenario};
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Config, ConfigError, LEN, MAX_POINTS};
@@ -20,7 +21,7 @@ use super::{changed, example, field, in_a_field, paper, reads, with};
 fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8])) -> Vec<u8> {
     let (method, hold, explore_m, rounds) = method;
     let (interferer, rest) = noise;
-    let mut bytes: Vec<u8> = b"UAVR\x0a\0\x84\x01\x03\0\x07\0\x05\0".to_vec();
+    let mut bytes: Vec<u8> = b"UAVR\x0b\0\x88\x01\x03\0\x07\0\x05\0".to_vec();
     bytes.extend([method, u8::from(hold)]);
     for number in [1000.0_f32, 4.0, 80.0, 20.0, 1.0, 20.0, 1.0] {
         bytes.extend(number.to_le_bytes());
@@ -39,6 +40,7 @@ fn by_hand(method: (u8, bool, f32, u16), band: [f32; 2], noise: ([f32; 3], &[u8]
     bytes.resize(376, 0);
     bytes.extend(0_f32.to_le_bytes());
     bytes.extend(80_f32.to_le_bytes());
+    bytes.extend(0_f32.to_le_bytes());
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
     bytes.extend(crc.to_le_bytes());
     bytes
@@ -390,6 +392,46 @@ fn a_field_out_of_range_is_named() {
             "byte {at}"
         );
     }
+}
+
+#[test]
+fn fitted_slots_are_stored_for_joint_only() {
+    let link = |model| {
+        let access = Access::Fitted;
+        Some(Link {
+            access,
+            bandwidth_hz: None,
+            model,
+        })
+    };
+    let scenario = Scenario {
+        link: link(RateModel::Shannon { gap_db: 3.0 }),
+        ..Scenario::default()
+    };
+    let flight = |scenario: &Scenario, method| {
+        let flight = Flight::new(scenario, 5, 1e-4, 7).unwrap().by(method);
+        flight.with_access(scenario)
+    };
+    let block = flight(&scenario, Method::Joint).unwrap().block(3).unwrap();
+    let gap = 10_f32.powf(0.3);
+    assert_eq!(block[384..388], gap.to_le_bytes());
+    flies(&reads(&block).unwrap());
+    let equal = flight(&scenario, Method::Align).unwrap().block(3).unwrap();
+    assert_eq!(equal[384..388], [0; 4]);
+    let by_align = reads(&changed(block, 14, &[0]));
+    assert_eq!(by_align, Err(ConfigError::Fitted));
+    let below = reads(&changed(block, 384, &0.5_f32.to_le_bytes()));
+    assert_eq!(below, Err(ConfigError::Mission(MissionError::FittedGap)));
+    let steps = Scenario {
+        link: link(RateModel::Steps(Vec::new())),
+        ..scenario
+    };
+    let error = flight(&steps, Method::Joint).err().unwrap().to_string();
+    assert!(
+        error.contains("link.steps") && error.contains("joint"),
+        "{error}"
+    );
+    assert!(flight(&steps, Method::Align).is_ok());
 }
 
 #[test]

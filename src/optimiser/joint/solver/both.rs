@@ -449,6 +449,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
             measured_per_w: None,
             plain: false,
             end_m: Some(end_m),
+            fixed_m: None,
         }
     }
 }

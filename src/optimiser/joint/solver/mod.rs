@@ -22,6 +22,7 @@ mod passes;
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
 use crate::optimiser::joint::chain::{Mark, SEGMENT, STAGES, Seat, SolverContext, Stage};
+use crate::optimiser::joint::fitted::{Fitted, SlotShares};
 use crate::optimiser::joint::site::{Cell, Cells};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
@@ -236,8 +237,11 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
     0
 };
 
-/// Joint solver of a chain: the solver for data in one direction, or the one for both directions. A mission needs
-/// only one of them, so they share their memory.
+/// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0.
+const FITTED: usize = if cfg!(feature = "altitude") { 1 } else { 0 };
+
+/// Joint solver of a chain: the solver for data in one direction, for both directions, or for fitted slots. A mission
+/// needs only one of them, so they share their memory.
 #[cfg_attr(
     feature = "altitude",
     expect(
@@ -250,6 +254,7 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
 enum Way<const RELAYS: usize, const SEGMENTS: usize> {
     OneWay(OneWay<RELAYS, SEGMENTS>),
     Both([Both<RELAYS, SEGMENTS>; BOTH]),
+    Fitted([Fitted<RELAYS>; FITTED]),
 }
 
 /// Joint solver of a chain of at most `RELAYS` relays, for one direction or both.
@@ -273,7 +278,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// an interference field, or with too many relays.
     #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
-        if mission.reverse() > 0.0 {
+        if mission.fitted_gap() > 0.0 {
+            self.0 = Way::Fitted([const { Fitted::NEW }; FITTED]);
+        } else if mission.reverse() > 0.0 {
             self.0 = Way::Both([const { Both::NEW }; BOTH]);
         }
         let fits = usize::from(mission.relays()) <= RELAYS.min(STAGES * SEGMENTS);
@@ -284,6 +291,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         match &self.0 {
             Way::OneWay(solver) => Some(&solver.cells),
             Way::Both(solver) => solver.first().map(|both| &both.interior.cells),
+            Way::Fitted(_) => None,
         }
     }
 
@@ -307,6 +315,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,
             Way::Both(_) => true,
+            Way::Fitted(_) => false,
         }
     }
 
@@ -323,14 +332,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission: &Mission,
         seat_of: impl Fn(u16) -> Seat,
     ) -> Poll<Result<f32, Infeasible>> {
-        let Some(interferer) = mission.interferer() else {
+        let Some(chain) = SolverContext::new(mission, &seat_of) else {
             return Poll::Ready(Err(Infeasible));
-        };
-        let chain = SolverContext {
-            mission,
-            interferer,
-            seat_of: &seat_of,
-            gain: mission.relay_gain(mission.config().common.power_w),
         };
         match &mut self.0 {
             Way::OneWay(solver) => solver.step(&chain),
@@ -338,7 +341,26 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
                 Some(solver) => solver.step(&chain),
                 None => Poll::Ready(Err(Infeasible)),
             },
+            Way::Fitted(solver) => match solver.first_mut() {
+                Some(solver) => solver.step(&chain),
+                None => Poll::Ready(Err(Infeasible)),
+            },
         }
+    }
+
+    /// Returns the position of relay `index` and the shares of its slots, once the chain is solved. `None` unless the
+    /// mission has fitted slots.
+    pub fn fitted(
+        &mut self,
+        mission: &Mission,
+        seat_of: &impl Fn(u16) -> Seat,
+        index: u16,
+    ) -> Option<(Placement, SlotShares)> {
+        let Way::Fitted(solver) = &mut self.0 else {
+            return None;
+        };
+        let chain = SolverContext::new(mission, seat_of)?;
+        Some(solver.first_mut()?.place(&chain, index))
     }
 }
 
@@ -412,6 +434,7 @@ mod tests {
             noise_w: 0.0,
             reverse: 0.0,
             rx_power_w: 80.0,
+            fitted_gap: 0.0,
             tolerance: 1e-4,
         });
         let holds = rng.next() < 0.3;

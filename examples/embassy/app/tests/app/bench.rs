@@ -147,6 +147,7 @@ fn config(relays: u16, index: u16, sites: Option<Sites>) -> Config {
         noise_w: 0.0,
         reverse: 0.0,
         rx_power_w: 80.0,
+        fitted_gap: 0.0,
         tolerance: 1e-4,
     });
     Config {

@@ -156,7 +156,7 @@ const UPLOADED: &[Counted] = &[
         &["offer"],
         None,
     ),
-    ("length of its frame", "bytes", &["offer_bytes"], Some(148)),
+    ("length of its frame", "bytes", &["offer_bytes"], Some(149)),
 ];
 
 /// Row of the cost table: description, unit, names of measured figures, and budget.
@@ -358,6 +358,39 @@ const COUNTED: &[Counted] = &[
         None,
     ),
     ("number of portions", "", &["portions_50_both"], None),
+    (
+        "8 relays on the line solved by the joint method for fitted slots, both directions",
+        "instructions",
+        &["solved_8_fitted"],
+        None,
+    ),
+    ("number of portions", "", &["portions_8_fitted"], None),
+    (
+        "its costliest portion",
+        "instructions",
+        &["portion_8_fitted"],
+        None,
+    ),
+    (
+        "50 relays on the line solved by the joint method for fitted slots, both directions",
+        "instructions",
+        &["solved_50_fitted"],
+        None,
+    ),
+    ("number of portions", "", &["portions_50_fitted"], None),
+    (
+        "its costliest portion",
+        "instructions",
+        &["portion_50_fitted"],
+        None,
+    ),
+    (
+        "8 relays with free altitudes solved by the joint method for fitted slots, both directions",
+        "instructions",
+        &["solved_8_fitted_high"],
+        None,
+    ),
+    ("number of portions", "", &["portions_8_fitted_high"], None),
     (
         "`size_of::<Solver>()` for up to 100 relays",
         "bytes",

@@ -1,0 +1,137 @@
+//! Chains that agree on fitted slots by messages, and carry data in them.
+
+use uav_relay::{Identity, Instant, Method, Mission, Placement, Relay, Settings, SetupError};
+use uav_relay_scenario::mission;
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::route::{DataLink, TrueHops};
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_sim::simulator::traffic::{TrafficSpec, traffic};
+
+use super::fitted;
+use super::scenes::{Case, TOLERANCE, number};
+
+/// Creates relay 1 of `mission`.
+pub(crate) fn relay(mission: &Mission, settings: Settings) -> Result<Relay, SetupError> {
+    let identity = Identity {
+        network: 7,
+        index: 1,
+    };
+    Relay::new(*mission, identity, settings, 1, Instant::ZERO)
+}
+
+/// Returns the setup of a simulated chain with the joint method and all profiles of `case`.
+fn setup(case: &Case) -> Setup {
+    let (_, profiles) = mission::mission(&case.scenario, case.relays, TOLERANCE).unwrap();
+    let mut setup = Setup {
+        profiles,
+        track: true,
+        ..Setup::new(case.mission())
+    };
+    setup.settings.method = Method::Joint;
+    setup
+}
+
+/// Checks that the relays have the shares of one frame: each slot has one share, and all add up to 1.
+fn check_shares(outcome: &Outcome, what: &str) {
+    let flying = outcome.relays.iter().filter(|relay| relay.killed.is_none());
+    let shares: Vec<_> = flying.map(|relay| relay.slot_shares.unwrap()).collect();
+    for pair in shares.windows(2) {
+        assert_eq!(pair[0].to_rx.to_bits(), pair[1].from_tx.to_bits(), "{what}");
+        assert_eq!(pair[0].from_rx.to_bits(), pair[1].to_tx.to_bits(), "{what}");
+        assert_eq!(pair[0].bits_per_hz.to_bits(), pair[1].bits_per_hz.to_bits());
+    }
+    let last = shares[shares.len() - 1];
+    let sum: f64 = shares
+        .iter()
+        .flat_map(|share| [share.from_tx, share.to_tx])
+        .chain([last.to_rx, last.from_rx])
+        .map(f64::from)
+        .sum();
+    assert!((sum - 1.0).abs() < 1e-5, "{what}: {sum}");
+}
+
+/// Checks that simulated relays agree on the solver's positions and on the shares of one frame.
+#[test]
+fn a_chain_agrees_on_fitted_places_and_shares() {
+    let first = number("SEED", 1);
+    for seed in first..first + number("COUNT", 30) {
+        let case = Case::draw(seed);
+        let what = format!("SEED={seed}: {case:?}");
+        let mission = case.mission();
+        let outcome = run(setup(&case)).unwrap();
+        assert_eq!(outcome.ending, Ending::Settled, "{what}");
+        let solved = fitted(&mission, case.seats(&mission));
+        let places: Vec<Placement> = solved.iter().map(|(at, _)| *at).collect();
+        let flown: Vec<Placement> = outcome
+            .relays
+            .iter()
+            .map(|relay| relay.setpoint.unwrap())
+            .collect();
+        assert_eq!(flown, places, "{what}");
+        check_shares(&outcome, &what);
+        for (relay, (_, shares)) in outcome.relays.iter().zip(&solved) {
+            assert_eq!(relay.slot_shares, Some(*shares), "{what}");
+        }
+    }
+}
+
+/// Checks that the remaining relays share one frame after the loss of a relay, which their slots no longer have.
+#[test]
+fn the_remaining_relays_share_the_frame_after_a_loss() {
+    let case = Case::draw(1);
+    assert!(case.relays > 5);
+    let mut setup = Setup {
+        profiles: setup(&case).profiles,
+        kills: vec![(3, Instant::from_millis(20_000))],
+        ..Setup::on_shared_channel(case.mission())
+    };
+    setup.settings.method = Method::Joint;
+    let outcome = run(setup).unwrap();
+    assert!(outcome.relays[2].killed.is_some());
+    assert!(
+        outcome
+            .relays
+            .iter()
+            .all(|relay| relay.killed.is_some() || relay.relays == case.relays - 1)
+    );
+    check_shares(&outcome, "relay 3 lost");
+}
+
+/// Checks that the agreed fitted slots deliver the predicted rate, also in both directions.
+#[test]
+fn fitted_slots_deliver_the_predicted_rate() {
+    let first = number("SEED", 1);
+    let mut worst = 1.0_f64;
+    for seed in first..first + number("COUNT", 15) {
+        let case = Case::draw(seed);
+        let what = format!("SEED={seed}: {case:?}");
+        let both = case.scenario.reverse > 0.0;
+        let setup = setup(&case);
+        let hops = TrueHops::new(&case.scenario, &setup, &case.mission());
+        let outcome = run(setup).unwrap();
+        let shares = outcome.relays[0].slot_shares.unwrap();
+        let to_rx_bps = f64::from(shares.bits_per_hz) * case.radio.bandwidth_hz;
+        let promised_bps = [to_rx_bps, case.scenario.reverse * to_rx_bps];
+        let slowest = if both { promised_bps[1] } else { to_rx_bps };
+        let spec = TrafficSpec {
+            link: DataLink {
+                radio: case.radio.clone(),
+                packet_bits: (10.0 * slowest).min(12_000.0),
+                both,
+                reverse: case.scenario.reverse,
+            },
+            queue_packets: 50,
+            offered_bps: None,
+        };
+        let sent = traffic(&spec, &hops, &outcome, case.relays.into());
+        let sent = sent.unwrap().unwrap();
+        assert_eq!(sent.flows.len(), if both { 2 } else { 1 });
+        for (flow, promised_bps) in sent.flows.iter().zip(promised_bps) {
+            let share = flow.delivered_bps / promised_bps;
+            assert!((0.95..=1.0 + TOLERANCE).contains(&share), "{share} {what}");
+            worst = worst.min(share);
+        }
+    }
+    println!("delivered at least {worst:.4} of the predicted rate");
+}

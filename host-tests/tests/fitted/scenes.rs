@@ -1,0 +1,121 @@
+//! Random chains with fitted slots.
+
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use uav_relay::optimiser::joint::Seat;
+use uav_relay::{Mission, Placement};
+use uav_relay_scenario::link::{Access, Link, Radio, RateModel};
+use uav_relay_scenario::scene::{Place, Scene};
+use uav_relay_scenario::{Interference, Noise, RelayOverride, Scenario, Source, mission};
+
+/// Relative tolerance of the SIR of all missions.
+pub(crate) const TOLERANCE: f64 = 1e-4;
+
+pub(crate) fn number(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().unwrap())
+}
+
+/// Random test case: scenario, data link with fitted slots, and number of relays.
+#[derive(Debug)]
+pub(crate) struct Case {
+    pub(crate) scenario: Scenario,
+    pub(crate) radio: Radio,
+    pub(crate) relays: u16,
+}
+
+impl Case {
+    /// Draws a chain of 1 to 20 relays: one way or both, with noise or without. In a fifth of the cases the interferer
+    /// is on the line, else up to 800 m beside it.
+    pub(crate) fn draw(seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let relays = rng.random_range(1..=20_u16);
+        let [tx_w, rx_w] = [[80.0, 80.0], [1.0, 1.0], [80.0, 1.0]][rng.random_range(0..3)];
+        let side = if rng.random() { 1.0 } else { -1.0 };
+        let source = Source {
+            power_w: 10_f64.powf(rng.random_range(0.0..2.0)),
+            x_m: rng.random_range(-200.0..1200.0),
+            y_m: if rng.random_bool(0.2) {
+                0.0
+            } else {
+                side * rng.random_range(20.0..800.0)
+            },
+        };
+        let reverse = [0.0, 1.0, rng.random_range(0.02..1.0)][rng.random_range(0..3)];
+        let gap_db = rng.random_range(0.0..6.0);
+        let link = Link {
+            access: Access::Fitted,
+            bandwidth_hz: None,
+            model: RateModel::Shannon { gap_db },
+        };
+        let mut scenario = Scenario {
+            tx_w,
+            rx_w,
+            reverse,
+            min_separation_m: if rng.random() {
+                4.0
+            } else {
+                rng.random_range(1.0..30.0)
+            },
+            interference: Interference::Sources(vec![source]),
+            link: Some(link.clone()),
+            ..Scenario::default()
+        };
+        if rng.random() {
+            scenario.noise = Noise {
+                power_dbm: Some(rng.random_range(-120.0..-60.0)),
+                ..Noise::default()
+            };
+        }
+        if rng.random_bool(0.3) {
+            let own = RelayOverride {
+                altitude_m: None,
+                power_w: Some(rng.random_range(0.2..3.0)),
+            };
+            scenario.relays.insert(rng.random_range(1..=relays), own);
+        }
+        Self {
+            scenario,
+            radio: Radio {
+                link,
+                bandwidth_hz: 1e6,
+            },
+            relays,
+        }
+    }
+
+    /// Returns the mission with fitted slots.
+    pub(crate) fn mission(&self) -> Mission {
+        let (mission, _) = mission::mission(&self.scenario, self.relays, TOLERANCE).unwrap();
+        mission::with_access(&self.scenario, &mission).unwrap()
+    }
+
+    /// Returns the profiles of the relays in `mission`.
+    pub(crate) fn seats(&self, mission: &Mission) -> impl Fn(u16) -> Seat + use<> {
+        let common = Seat::common(mission);
+        let own = self.scenario.relays.clone();
+        move |index| Seat {
+            power_w: own
+                .get(&index)
+                .and_then(|own| own.power_w)
+                .map_or(common.power_w, |power_w| power_w as f32),
+            ..common
+        }
+    }
+
+    /// Returns the time of one bit through relays at `places` by the true SINRs, in 1 / bandwidth.
+    pub(crate) fn time(&self, places: &[Placement]) -> f64 {
+        let scene = Scene::new(&self.scenario, self.relays).unwrap();
+        let places: Vec<Place> = places.iter().map(|at| (*at).into()).collect();
+        let time = |sirs: Vec<f64>| -> f64 {
+            sirs.iter()
+                .map(|sir| 1.0 / self.radio.link.model.bits_per_hz(*sir))
+                .sum()
+        };
+        let there = time(scene.hop_sirs(&places));
+        if self.scenario.reverse > 0.0 {
+            there + self.scenario.reverse * time(scene.hop_sirs_back(&places))
+        } else {
+            there
+        }
+    }
+}

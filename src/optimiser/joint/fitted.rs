@@ -1,0 +1,553 @@
+//! Fitted slots, each as long as its hop needs: positions of a chain for the largest data rate.
+//!
+//! With the spectral efficiency b = log2(1 + SINR / gap) of a hop, forward F and backward B, one bit to Rx and r bits back take
+//!
+//! ```text
+//! time = sum over hops of  1 / b(F) + r / b(B)
+//! ```
+//!
+//! in units of 1 / bandwidth; the rate is its inverse. A hop's time rises steeply with its length from 0, and is concave there. So the
+//! best chain mostly has a few long hops, and the other relays gather at their minimum separation: a sum with many local optima
+//! across which no derivative leads. But each term depends on two neighbours only. So if every relay may stay or move by one or two
+//! widths along one coordinate, the best of all 5^N combinations follows from one pass over the relays (dynamic programming; Viterbi
+//! 1967). The method repeats such passes over x, y and altitude, halves the width when a round gains little, and begins with a
+//! width at which relays jump from one group to another. No step raises the time. It needs no derivatives, and the minimum separation
+//! is simply a condition of each hop.
+//!
+//! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
+//! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.
+
+use super::chain::{Seat, SolverContext};
+use super::hop::{Triple, minus};
+use crate::mission::{Band, FINEST_STEP};
+use crate::optimiser::search::Infeasible;
+use crate::place::{CrossSection, Placement};
+use crate::sir::{Sender, in_noise, square, transmitter_gain};
+use core::f32::consts::LN_2;
+use core::task::Poll;
+
+/// Number of positions that a pass tries for each relay: its current one, and two on either side.
+const STATES: usize = 5;
+/// Moves of a relay that a pass tries, in widths. The first one is preferred among equals.
+const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
+/// Bits of a state's number in the stored choices of a relay.
+const BITS: usize = 3;
+
+/// Width of the moves at which the search of one initial chain ends.
+const NARROWEST: f32 = 1.0 / 131_072.0;
+/// Relative gain of a round of passes below which the width is halved.
+const LITTLE: f32 = 1e-3;
+/// Maximum number of rounds of passes per initial chain.
+const ROUNDS: u8 = 200;
+
+/// Number of relays of a pass that one portion of the work takes.
+const AT_ONCE: u16 = 3;
+/// Number of relays that one portion of other work takes.
+const OTHERS_AT_ONCE: u16 = 10;
+
+/// Amount added to each squared hop length, in units of D^2, so that no time is 0.
+const SHORTEST: f32 = 1e-12;
+
+/// Initial chains: first and last x of the relays, and first width of the moves. All are fractions of the distance
+/// from Tx to Rx. Relays whose first x is their last are gathered there, at their minimum separation.
+const STARTS: [[f32; 3]; 8] = [
+    [0.5, 0.5, 0.125],
+    [0.0, 1.0, 0.125],
+    [0.0, 0.0, 0.125],
+    [1.0, 1.0, 0.125],
+    [0.5, 1.0, 0.125],
+    [0.0, 0.5, 0.125],
+    [0.0, 0.0, 0.007_812_5],
+    [1.0, 1.0, 0.007_812_5],
+];
+/// Number of the initial chain that is the best one along the line. Only if relays may leave the common altitude.
+const BEST: u8 = 8;
+/// First width of the moves of that chain.
+const BEST_WIDTH: f32 = 1.0 / 16.0;
+/// Cross-sections of the initial chains after it. The first number is a fraction of the largest lateral offset away
+/// from the interferer, the second one of the altitude band above the common altitude.
+const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
+
+/// Shares of the frame time that the hops next to a relay have, with fitted slots.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SlotShares {
+    /// Share of the slot in which this relay sends to the next node toward Rx.
+    pub to_rx: f32,
+    /// Share of the slot in which this relay sends to the next node toward Tx. 0 in a mission of one direction.
+    pub to_tx: f32,
+    /// Share of the slot in which this relay receives from the next node toward Tx.
+    pub from_tx: f32,
+    /// Share of the slot in which this relay receives from the next node toward Rx. 0 in a mission of one direction.
+    pub from_rx: f32,
+    /// Data rate of the whole chain to Rx, over the bandwidth, bit/s/Hz. The rate back is `reverse` times this.
+    pub bits_per_hz: f32,
+}
+
+/// Gains over the SNR gap. SINR over gap is the gain times the inverse interference at the receiver, over the squared
+/// hop length. The gains at Rx and Tx include the interference there.
+#[derive(Clone, Copy, Debug)]
+struct Gains {
+    source: Triple,
+    /// Receiver noise over the interferer's power received at the distance D.
+    noise: f32,
+    relay_per_w: f32,
+    to_rx_per_w: f32,
+    to_tx_per_w: f32,
+    from_tx: f32,
+    from_rx: f32,
+}
+
+/// Node of the chain at a position that is tried: the position, and the inverse interference there. That is 1 at Tx
+/// and Rx.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    at: Triple,
+    quiet: f32,
+}
+
+/// Position that is tried for one relay, and the least time of the hops before it.
+#[derive(Clone, Copy, Debug)]
+struct State {
+    spot: Spot,
+    time: f32,
+}
+
+impl State {
+    const NONE: Self = Self {
+        spot: Spot {
+            at: [0.0; 3],
+            quiet: 0.0,
+        },
+        time: 0.0,
+    };
+}
+
+/// Hop between two nodes: its gains over the SNR gap, forward and backward, and r. Relays also have a least distance.
+#[derive(Clone, Copy, Debug)]
+struct Hop {
+    gains: [f32; 2],
+    reverse: f32,
+    /// Least squared distance of two relays, in units of D^2; `None` if an end is Tx or Rx.
+    apart: Option<f32>,
+}
+
+impl Hop {
+    /// Returns SINR over gap, forward and backward.
+    fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
+        let [x, y, h] = minus(to.at, from.at);
+        let l = square(x) + square(y) + square(h) + SHORTEST;
+        let [there, back] = self.gains;
+        [there * to.quiet / l, back * from.quiet / l]
+    }
+
+    /// Returns the time of a bit to Rx and of r bits back. Infinite if two relays are too close or in the wrong order.
+    #[inline(never)]
+    fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
+        let [x, y, h] = minus(to.at, from.at);
+        let is_apart = match self.apart {
+            Some(least) => x >= FINEST_STEP && square(x) + square(y) + square(h) >= least,
+            None => x >= 0.0,
+        };
+        if !is_apart {
+            return [f32::INFINITY; 2];
+        }
+        let [there, back] = self.sinrs(from, to);
+        let back = if self.reverse > 0.0 {
+            self.reverse * LN_2 / libm::log1pf(back)
+        } else {
+            0.0
+        };
+        [LN_2 / libm::log1pf(there), back]
+    }
+}
+
+#[repr(u8)] // so that the bytes of `Begin` are 0
+#[derive(Clone, Copy, Debug)]
+enum Work {
+    /// Choice of the positions of an initial chain. The field is the number of relays that are done.
+    Begin(u16),
+    /// Pass over the relays toward Rx, which finds the best combination of moves. The field is the next node.
+    Pass(u16),
+    /// Way back toward Tx, on which the relays move. The fields are the next relay and its state.
+    Back(u16, u8),
+    /// Summation of the best chain's time, and its worst SIR. The field is the next node.
+    Sum(u16),
+}
+
+/// Solver of a chain with fitted slots.
+#[derive(Clone, Debug)]
+pub(super) struct Fitted<const RELAYS: usize> {
+    gains: Gains,
+    /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
+    places: [Triple; RELAYS],
+    best_places: [Triple; RELAYS],
+    /// Best state of the relay before, for each state of a relay: three bits each.
+    choices: [u16; RELAYS],
+    front: [State; STATES],
+    work: Work,
+    /// Number of the current initial chain.
+    number: u8,
+    rounds: u8,
+    /// Coordinate that the current pass changes: 0, 1, 2 for x, y, altitude.
+    axis: u8,
+    width: f32,
+    /// Time of the current chain; infinite if relays are too close.
+    time: f32,
+    /// Time of the current chain before the current round of passes.
+    before: f32,
+    /// Time of the best chain; 0 before the first.
+    best: f32,
+    worst: f32,
+}
+
+impl<const RELAYS: usize> Fitted<RELAYS> {
+    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
+    pub(super) const NEW: Self = Self {
+        gains: Gains {
+            source: [0.0; 3],
+            noise: 0.0,
+            relay_per_w: 0.0,
+            to_rx_per_w: 0.0,
+            to_tx_per_w: 0.0,
+            from_tx: 0.0,
+            from_rx: 0.0,
+        },
+        places: [[0.0; 3]; RELAYS],
+        best_places: [[0.0; 3]; RELAYS],
+        choices: [0; RELAYS],
+        front: [State::NONE; STATES],
+        work: Work::Begin(0),
+        number: 0,
+        rounds: 0,
+        axis: 0,
+        width: 0.0,
+        time: 0.0,
+        before: 0.0,
+        best: 0.0,
+        worst: 0.0,
+    };
+
+    /// Processes one portion of the solution; ready with the worst SIR, linear, at the end.
+    pub(super) fn step(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+    ) -> Poll<Result<f32, Infeasible>> {
+        let relays = chain.mission.relays();
+        match self.work {
+            Work::Begin(0) if usize::from(self.number) >= starts(chain) => {
+                if !(self.best > 0.0) {
+                    return Poll::Ready(Err(Infeasible));
+                }
+                self.places = self.best_places;
+                (self.time, self.worst) = (0.0, f32::INFINITY);
+                self.work = Work::Sum(1);
+            }
+            Work::Begin(done) => self.begin(chain, done),
+            Work::Pass(index) => self.pass(chain, index),
+            Work::Back(index, state) => self.back(chain, index, state),
+            Work::Sum(index) => {
+                let end = (index + OTHERS_AT_ONCE).min(relays + 2);
+                for index in index..end {
+                    let [there, back] = self.hop_times(chain, index);
+                    self.time += there + back;
+                }
+                if end > relays + 1 {
+                    return Poll::Ready(Ok(self.worst));
+                }
+                self.work = Work::Sum(end);
+            }
+        }
+        Poll::Pending
+    }
+
+    /// Sets relays after the first `done` ones to their positions in the current initial chain.
+    fn begin(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) {
+        let config = chain.mission.config();
+        let relays = chain.mission.relays();
+        if done == 0 {
+            self.gains = Gains::new(chain);
+        }
+        let number = usize::from(self.number);
+        let is_best = self.number == BEST;
+        let (number, across) = match number.checked_sub(STARTS.len() + 1) {
+            Some(number) => (number % STARTS.len(), ACROSS.get(number / STARTS.len())),
+            None => (number, None),
+        };
+        let [first, last, width] = *STARTS.get(number).unwrap_or(&[0.0, 0.0, BEST_WIDTH]);
+        let [aside, up] = *across.unwrap_or(&[0.0; 2]);
+        let step = chain.mission.step_with_room(0.0) / config.distance_m;
+        let gathered = f32::from(relays - 1) * step;
+        let at = (first - 0.5 * gathered).min(1.0 - gathered).max(0.0);
+        let end = (done + OTHERS_AT_ONCE).min(relays);
+        let after = end + 1;
+        for index in done + 1..after {
+            let room = (chain.seat_of)(index).room;
+            let x = if first < last {
+                first + (last - first) * f32::from(index) / f32::from(relays + 1)
+            } else {
+                at + f32::from(index - 1) * step
+            };
+            let away_m = if chain.interferer.y_m > 0.0 {
+                room.lateral.least_m
+            } else {
+                room.lateral.most_m
+            };
+            let low_m = config.common.altitude_m;
+            let place = CrossSection {
+                y_m: aside * away_m,
+                altitude_m: low_m + up * (room.band.most_m - low_m),
+            };
+            let place = room.nearest(place);
+            let unit = 1.0 / config.distance_m;
+            let at = [x.min(1.0), place.y_m * unit, place.altitude_m * unit];
+            let best = self.best_places.get(usize::from(index - 1));
+            self.set(index, *best.filter(|_| is_best).unwrap_or(&at));
+        }
+        self.work = if end < relays {
+            Work::Begin(end)
+        } else {
+            (self.rounds, self.axis, self.width) = (0, 0, width);
+            (self.time, self.before) = (f32::INFINITY, f32::INFINITY);
+            Work::Pass(1)
+        };
+    }
+
+    fn set(&mut self, index: u16, at: Triple) {
+        if let Some(place) = self.places.get_mut(usize::from(index).wrapping_sub(1)) {
+            *place = at;
+        }
+    }
+
+    /// Returns the position of node `index` moved by `by` along the current coordinate. The node stays within its
+    /// limits. Index 0 is Tx, and N + 1 is Rx.
+    #[inline(never)]
+    fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, by: f32) -> Spot {
+        let place = self.places.get(usize::from(index).wrapping_sub(1));
+        let Some(&place) = place.filter(|_| index <= chain.mission.relays()) else {
+            let x = if index > 0 { 1.0 } else { 0.0 };
+            return Spot {
+                at: [x, 0.0, 0.0],
+                quiet: 1.0,
+            };
+        };
+        let unit = 1.0 / chain.distance_m();
+        let room = (chain.seat_of)(index).room;
+        let mut at = place;
+        let limits = |band: Band| [band.least_m * unit, band.most_m * unit];
+        let limits = [[0.0, 1.0], limits(room.lateral), limits(room.band)];
+        let axis = usize::from(self.axis);
+        if let (Some(cell), Some([low, high])) = (at.get_mut(axis), limits.get(axis)) {
+            *cell = (*cell + by).max(*low).min(*high);
+        }
+        Spot {
+            at,
+            quiet: self.gains.quiet(at),
+        }
+    }
+
+    fn pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, first: u16) {
+        let relays = chain.mission.relays();
+        if first <= 1 {
+            let spot = self.spot(chain, 0, 0.0);
+            self.front = [State { spot, time: 0.0 }; STATES];
+        }
+        let end = (first + AT_ONCE).min(relays + 2);
+        for index in first..end {
+            let hop = self.gains.hop(chain, index);
+            let mut next = [State::NONE; STATES];
+            let mut choices = 0;
+            for (k, (state, by)) in next.iter_mut().zip(MOVES).enumerate() {
+                let spot = self.spot(chain, index, by * self.width);
+                let mut best = (f32::INFINITY, 0);
+                for (before, from) in self.front.iter().zip(0_u16..) {
+                    if !(before.time < best.0) {
+                        continue;
+                    }
+                    let [there, back] = hop.times(&before.spot, &spot);
+                    let time = before.time + there + back;
+                    if time < best.0 {
+                        best = (time, from);
+                    }
+                }
+                *state = State { spot, time: best.0 };
+                choices |= best.1 << (BITS * k);
+            }
+            self.front = next;
+            if let Some(kept) = self.choices.get_mut(usize::from(index - 1))
+                && index <= relays
+            {
+                *kept = choices;
+            } else {
+                // All states of Rx are one; their choice is the state of the last relay.
+                let [rx, ..] = next;
+                self.conclude(chain, rx.time, (choices & 7) as u8);
+                return;
+            }
+        }
+        self.work = Work::Pass(end);
+    }
+
+    /// Continues after a pass whose best combination of moves takes `time`, with the last relay in `state`.
+    fn conclude(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, time: f32, state: u8) {
+        if time < self.time {
+            self.time = time;
+            self.work = Work::Back(chain.mission.relays(), state);
+        } else {
+            self.next_pass(chain);
+        }
+    }
+
+    /// Moves relays toward Tx from relay `index` on, which is in `state`.
+    fn back(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, state: u8) {
+        let end = index.saturating_sub(OTHERS_AT_ONCE);
+        let mut state = usize::from(state);
+        for index in (end + 1..=index).rev() {
+            let by = MOVES.get(state).copied().unwrap_or_default();
+            let Spot { at, .. } = self.spot(chain, index, by * self.width);
+            self.set(index, at);
+            let choices = self.choices.get(usize::from(index - 1));
+            state = usize::from(choices.copied().unwrap_or_default() >> (BITS * state) & 7);
+        }
+        if end > 0 {
+            self.work = Work::Back(end, u8::try_from(state).unwrap_or_default());
+        } else {
+            self.next_pass(chain);
+        }
+    }
+
+    /// Selects the coordinate and the width of the next pass. After the last one the chain is kept if it is the best.
+    fn next_pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
+        let config = chain.mission.config();
+        self.axis += 1;
+        if self.number < BEST {
+            self.axis = 3;
+        }
+        if self.axis == 1 && config.lateral.is_single() {
+            self.axis = 2;
+        }
+        if self.axis == 2 && config.band.is_single() {
+            self.axis = 3;
+        }
+        if self.axis > 2 {
+            self.axis = 0;
+            self.rounds += 1;
+            if !(self.time < self.before * (1.0 - LITTLE)) {
+                self.width *= 0.5;
+            }
+            self.before = self.time;
+        }
+        self.work = if self.width >= NARROWEST && self.rounds < ROUNDS {
+            Work::Pass(1)
+        } else {
+            if self.time < f32::INFINITY && !(self.best > 0.0 && self.best <= self.time) {
+                (self.best_places, self.best) = (self.places, self.time);
+            }
+            self.number += 1;
+            Work::Begin(0)
+        };
+    }
+
+    /// Returns the times of the hop to node `index` of the current chain. Lowers `worst` to the hop's worse SIR.
+    fn hop_times(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+    ) -> [f32; 2] {
+        let hop = self.gains.hop(chain, index);
+        let (from, to) = (
+            self.spot(chain, index - 1, 0.0),
+            self.spot(chain, index, 0.0),
+        );
+        let gap = chain.mission.fitted_gap();
+        let [there, back] = hop.sinrs(&from, &to).map(|sinr| sinr * gap);
+        self.worst = self.worst.min(there);
+        if hop.reverse > 0.0 {
+            self.worst = self.worst.min(back / hop.reverse);
+        }
+        hop.times(&from, &to)
+    }
+
+    /// Returns the position of relay `index`, and the shares of its slots, once the chain is solved.
+    pub(super) fn place(
+        &mut self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+    ) -> (Placement, SlotShares) {
+        let [from_tx, to_tx] = self.hop_times(chain, index);
+        let [to_rx, from_rx] = self.hop_times(chain, index + 1);
+        let bits_per_hz = 1.0 / self.time;
+        let [x_m, y_m, altitude_m] = self
+            .spot(chain, index, 0.0)
+            .at
+            .map(|d| d * chain.distance_m());
+        let at = (chain.seat_of)(index)
+            .room
+            .nearest(CrossSection { y_m, altitude_m });
+        let shares = SlotShares {
+            to_rx: to_rx * bits_per_hz,
+            to_tx: to_tx * bits_per_hz,
+            from_tx: from_tx * bits_per_hz,
+            from_rx: from_rx * bits_per_hz,
+            bits_per_hz,
+        };
+        (at.at(x_m), shares)
+    }
+}
+
+/// Returns the number of initial chains: more if relays may choose their lateral offsets or altitudes.
+fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
+    let config = chain.mission.config();
+    if config.band.is_single() && config.lateral.is_single() {
+        STARTS.len()
+    } else {
+        STARTS.len() * (1 + ACROSS.len()) + 1
+    }
+}
+
+impl Gains {
+    fn new(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Self {
+        let (mission, interferer) = (chain.mission, chain.interferer);
+        let d = mission.config().distance_m;
+        let gap = mission.fitted_gap();
+        let on_ground = |gain: f32| gain / d / d / gap;
+        Self {
+            source: [interferer.x_m / d, interferer.y_m / d, 0.0],
+            noise: mission.noise_at_a_metre() * d * d,
+            relay_per_w: mission.relay_gain(1.0).value() / gap,
+            to_rx_per_w: on_ground(mission.receiver_gain(1.0)),
+            to_tx_per_w: on_ground(transmitter_gain(mission, 1.0)),
+            from_tx: mission.tx_gain().value() / gap,
+            from_rx: Sender::receiver(mission).gain.value() / gap,
+        }
+    }
+
+    fn quiet(&self, at: Triple) -> f32 {
+        let [x, y, h] = minus(at, self.source);
+        in_noise(square(x) + square(y) + square(h), self.noise)
+    }
+
+    /// Returns the hop to node `index`, 1..=N + 1.
+    fn hop(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Hop {
+        let config = chain.mission.config();
+        let relays = config.relays;
+        let power_w = |index: u16| (chain.seat_of)(index).power_w;
+        let there = match index {
+            1 => self.from_tx,
+            _ if index > relays => self.to_rx_per_w * power_w(relays),
+            _ => self.relay_per_w * power_w(index - 1),
+        };
+        let back = match index {
+            _ if index > relays => self.from_rx,
+            1 => self.to_tx_per_w * power_w(1),
+            _ => self.relay_per_w * power_w(index),
+        };
+        let is_between = index > 1 && index <= relays;
+        let least = config.min_separation_m / config.distance_m + 0.5 * FINEST_STEP;
+        Hop {
+            gains: [there, back],
+            reverse: chain.mission.reverse(),
+            apart: is_between.then_some(square(least)),
+        }
+    }
+}
