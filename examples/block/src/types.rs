@@ -159,7 +159,7 @@ pub enum ConfigError {
     Listen,
     /// Error: there is traffic from receiver to transmitter, which the joint method does not support.
     Reverse,
-    /// Error: the block gives fitted slots, but not the joint method and a known interferer, which they need.
+    /// Error: the block gives fitted slots, but not the joint method or no known interferer.
     Fitted,
     /// Error: the block gives an interferer, but also the interference as a distribution along x.
     Interferer,

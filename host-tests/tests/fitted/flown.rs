@@ -76,7 +76,7 @@ fn a_chain_agrees_on_fitted_places_and_shares() {
     }
 }
 
-/// Checks that the remaining relays share one frame after the loss of a relay, which their slots no longer have.
+/// Checks that after the loss of a relay the slots of the remaining ones fill the frame again.
 #[test]
 fn the_remaining_relays_share_the_frame_after_a_loss() {
     let case = Case::draw(1);

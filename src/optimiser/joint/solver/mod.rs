@@ -240,8 +240,9 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
 /// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0.
 const FITTED: usize = if cfg!(feature = "altitude") { 1 } else { 0 };
 
-/// Joint solver of a chain: the solver for data in one direction, for both directions, or for fitted slots. A mission
-/// needs only one of them, so they share their memory.
+/// Joint solver of a chain: that for one direction, for both directions, or for fitted slots.
+///
+/// A mission needs only one of the three, so they share their memory.
 #[cfg_attr(
     feature = "altitude",
     expect(
